@@ -1,0 +1,71 @@
+# One command each; the environment is .venv and is made on first use.
+# Needs Python 3.11 or newer, make, and a package index; no root, no compiler.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(VENV)/bin
+UV_INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt
+
+# a found `python3.11` may be a version manager's empty shim, so each candidate is asked to run
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
+	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
+
+.PHONY: help setup demo serve test test-slow faults bench check format clean
+
+help:  ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+$(VENV)/.stamp-uv:
+	@test -n "$(PYTHON)" || { echo "MorphID needs Python 3.11 or newer with the venv module; none was found."; \
+		echo "Install it (Debian: apt install python3 python3-venv) or say where: make PYTHON=/path/to/python"; exit 1; }
+	@echo "setup: making $(VENV) with $(PYTHON)"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt uv
+	@touch $@
+
+# what the service needs: enough for `make demo` and `make serve`
+$(VENV)/.stamp-server: $(VENV)/.stamp-uv pyproject.toml constraints.txt
+	@test -e $(VENV)/.stamp-full || { echo "setup: installing the service"; $(UV_INSTALL) -e '.[server]'; }
+	@touch $@
+
+# and what its developers need
+$(VENV)/.stamp-full: $(VENV)/.stamp-uv pyproject.toml constraints.txt
+	@echo "setup: installing the service, the oracles and the development tools"
+	@$(UV_INSTALL) -e '.[server,oracles,dev]'
+	@touch $@ $(VENV)/.stamp-server
+
+setup: $(VENV)/.stamp-full  ## make .venv with everything in it
+
+demo: $(VENV)/.stamp-server  ## identify a model from the example flights through the running service
+	@$(BIN)/python examples/demo.py
+
+serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
+	@exec $(BIN)/morphid serve
+
+test: setup  ## the tests (under 12 minutes on two cores)
+	@$(BIN)/pytest -q
+
+test-slow: setup  ## the long proofs
+	@$(BIN)/pytest -q -m slow --timeout 1800
+
+faults: setup  ## kill processes and watch the service recover
+	@$(BIN)/pytest -q -m faults --timeout 900
+
+bench: setup  ## the benchmark figures of this machine
+	@$(BIN)/morphid bench
+
+check: setup  ## formatting, lint, types, import contracts, OpenAPI document, migrations
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python .ci/gates.py
+
+format: setup  ## let ruff format and repair
+	@$(BIN)/ruff check --fix-only -q . ; $(BIN)/ruff format .
+
+clean:  ## forget caches and outputs (not .venv, not var/)
+	@rm -rf build dist demo-output .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	@find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""MorphID's proofs, room by room as the source tree."""
