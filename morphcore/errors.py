@@ -1,0 +1,79 @@
+"""The error tree of the library: every error carries data and a sentence that says what to do."""
+
+from __future__ import annotations
+
+
+class MorphError(Exception):
+    """Base of all errors raised by morphcore.
+
+    Parameters
+    ----------
+    message : what is wrong, as a sentence.
+    pointer : JSON pointer (RFC 6901) to the offending field of the input document, "" for the whole.
+    hint : what the user can do about it.
+    """
+
+    code = "error"
+
+    def __init__(self, message: str, *, pointer: str = "", hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.pointer = pointer
+        self.hint = hint
+
+    def __str__(self) -> str:
+        where = f"{self.pointer}: " if self.pointer else ""
+        hint = f" ({self.hint})" if self.hint else ""
+        return f"{where}{self.message}{hint}"
+
+
+class InvalidInput(MorphError):
+    """A field of the input is missing, malformed or out of its range."""
+
+    code = "invalid_input"
+
+
+class TrimNotFound(MorphError):
+    """Newton's iteration found no steady level flight.
+
+    Parameters
+    ----------
+    residual : largest remaining joint acceleration or vertical specific force, rad/s^2 or m/s^2.
+    iterations : Newton steps taken.
+    """
+
+    code = "trim_not_found"
+
+    def __init__(self, *, residual: float, iterations: int) -> None:
+        super().__init__(
+            f"no trimmed level flight found: residual {residual:.3g} after {iterations} Newton steps",
+            pointer="/flight",
+            hint="raise the airspeed, lower the mass, or stiffen the wings",
+        )
+        self.residual = residual
+        self.iterations = iterations
+
+
+class FlightDiverged(MorphError):
+    """The integration left the domain in which the model means anything.
+
+    Parameters
+    ----------
+    time_s : the last time at which the state was finite and within limits.
+    """
+
+    code = "diverged"
+
+    def __init__(self, *, time_s: float) -> None:
+        super().__init__(
+            f"the flight diverged at t = {time_s:.3f} s",
+            pointer="/model",
+            hint="check stiffness and damping, or choose a smaller step_s",
+        )
+        self.time_s = time_s
+
+
+class UnsupportedRegime(MorphError):
+    """A condition outside the validity of a method, such as Mach numbers beyond 0.7."""
+
+    code = "unsupported_regime"

@@ -1,0 +1,98 @@
+"""Lifting surfaces and their hinges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from morphcore.geometry.section import GivenSection, Material, SectionProperties, solid_box
+
+Array = NDArray[np.float64]
+Side = Literal["right", "left"]
+
+AXES = ("x", "y", "z")
+DEFAULT_HINGE_RANGE_RAD = 1.3  # either way from unswept; at more the wing lies along the fuselage
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A hinge of prescribed motion between fuselage and surface.
+
+    ``axis`` "z" sweeps (positive: tip aft), "x" folds (positive: tip up), "y" sets incidence (positive: nose up), on
+    both sides alike. ``position_m`` is in B from the fuselage reference point.
+    """
+
+    position_m: tuple[float, float, float]
+    axis: Literal["x", "y", "z"]
+    min_rad: float = -DEFAULT_HINGE_RANGE_RAD
+    max_rad: float = DEFAULT_HINGE_RANGE_RAD
+
+    @property
+    def axis_index(self) -> int:
+        """0, 1 or 2 for x, y, z."""
+        return AXES.index(self.axis)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A flat lifting surface: straight mid-chord line along its own y, linear taper.
+
+    Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans +y, the left
+    one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the x (positive forward) of the elastic axis and of
+    the line of centres of mass, from mid-chord.
+    """
+
+    name: str
+    side: Side
+    span_m: float
+    root_chord_m: float
+    tip_chord_m: float
+    thickness_m: float
+    material: Material
+    hinge: Hinge | None
+    position_m: tuple[float, float, float]
+    flexible: bool
+    profile_drag: float = 0.0
+    section: GivenSection | None = None
+    elastic_axis_offset_m: float = 0.0
+    mass_axis_offset_m: float = 0.0
+
+    @property
+    def span_sign(self) -> float:
+        """+1 for a right surface (spans +y), -1 for a left one."""
+        return 1.0 if self.side == "right" else -1.0
+
+    @property
+    def rotation_sign(self) -> float:
+        """Sign of the right-handed rotation about the hinge axis for a positive hinge coordinate.
+
+        Sweep and fold mirror with the side, incidence does not: positive fold turns the right wing about -x.
+        """
+        if self.hinge is None or self.hinge.axis == "y":
+            return 1.0
+        return self.span_sign if self.hinge.axis == "z" else -self.span_sign
+
+    @property
+    def mean_chord_m(self) -> float:
+        """Area over span."""
+        return 0.5 * (self.root_chord_m + self.tip_chord_m)
+
+    @property
+    def area_m2(self) -> float:
+        """Planform area."""
+        return self.span_m * self.mean_chord_m
+
+    def chord_at(self, distance_m: ArrayLike) -> Array:
+        """Chord (m) at a distance from the root along the span, shape of the input."""
+        fraction = np.asarray(distance_m, dtype=np.float64) / self.span_m
+        return self.root_chord_m + (self.tip_chord_m - self.root_chord_m) * fraction
+
+    def section_at(self, distance_m: ArrayLike) -> SectionProperties:
+        """Section properties at distances from the root, shape (stations,)."""
+        chord = np.atleast_1d(self.chord_at(distance_m))
+        if self.section is not None:
+            return self.section.at(chord)
+        return solid_box(self.material, chord, self.thickness_m)
