@@ -1,0 +1,135 @@
+"""Engines and transactions: SQLite (WAL, one writer at a time) and Postgres behind one small shell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Double, Engine, create_engine, event, make_url
+from sqlalchemy.engine import Connection
+from sqlalchemy.ext.compiler import compiles
+from sqlalchemy.orm import Session
+from sqlalchemy.sql.compiler import SQLCompiler
+from sqlalchemy.sql.functions import FunctionElement
+
+BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
+BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
+
+
+class database_time(FunctionElement[float]):  # noqa: N801 - reads as the SQL function it is
+    """The database's clock as SQL: seconds since 1970 UTC (double). No process's own clock rules leases.
+
+    Postgres uses ``clock_timestamp()``, not ``now()``: a transaction that waited for a lock must not act in
+    the past.
+    """
+
+    type = Double()
+    name = "database_time"
+    inherit_cache = True
+
+
+@compiles(database_time, "sqlite")
+def _sqlite_time(_element: database_time, _compiler: SQLCompiler, **_options: Any) -> str:
+    # julianday, not unixepoch('subsec'): that one needs SQLite 3.42
+    return "((julianday('now') - 2440587.5) * 86400.0)"
+
+
+@compiles(database_time, "postgresql")
+def _postgres_time(_element: database_time, _compiler: SQLCompiler, **_options: Any) -> str:
+    return "CAST(extract(epoch FROM clock_timestamp()) AS DOUBLE PRECISION)"
+
+
+def normal_url(url: str) -> str:
+    """Name the driver that is installed: ``postgres://`` and ``postgresql://`` mean psycopg 3."""
+    for prefix in ("postgres://", "postgresql://"):
+        if url.startswith(prefix):
+            return "postgresql+psycopg://" + url.removeprefix(prefix)
+    return url
+
+
+def make_engine(url: str) -> Engine:
+    """Open an engine for `url`; an SQLite file's folder is made when it is missing."""
+    parsed = make_url(normal_url(url))
+    if parsed.get_backend_name() != "sqlite":
+        return create_engine(parsed, pool_pre_ping=True, pool_size=20, max_overflow=40)
+    if parsed.database and parsed.database != ":memory:":
+        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    engine = create_engine(parsed, pool_size=20, max_overflow=40)
+
+    @event.listens_for(engine, "connect")
+    def _on_connect(connection: Any, _record: Any) -> None:
+        # the driver must not open transactions by itself, or BEGIN IMMEDIATE comes too late
+        connection.isolation_level = None
+        cursor = connection.cursor()
+        cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
+        cursor.execute("PRAGMA journal_mode = WAL")
+        cursor.execute("PRAGMA synchronous = FULL")  # an accepted job survives a power cut, not only a crash
+        cursor.execute("PRAGMA foreign_keys = ON")
+        cursor.close()
+
+    @event.listens_for(engine, "begin")
+    def _on_begin(connection: Connection) -> None:
+        mode = connection.get_execution_options().get(BEGIN_OPTION, "DEFERRED")
+        connection.exec_driver_sql(f"BEGIN {mode}")
+
+    return engine
+
+
+class Database:
+    """One engine and its two kinds of transaction.
+
+    Parameters
+    ----------
+    url : str
+        SQLAlchemy URL, ``sqlite:///...`` or ``postgresql://...``.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = normal_url(url)
+        self.engine = make_engine(url)
+        # SQLite: a transaction that will write takes the write lock at once; upgrading later may fail
+        self._writer = self.engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"})
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A transaction that is committed at the end of the block, or rolled back by an exception."""
+        with Session(self._writer, expire_on_commit=False) as session, session.begin():
+            yield session
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A transaction for reading; whatever it wrote is rolled back."""
+        with Session(self.engine, expire_on_commit=False) as session:
+            yield session
+
+    def dispose(self) -> None:
+        """Close every pooled connection (also call it in a forked child before first use)."""
+        self.engine.dispose()
+
+
+def migration_config(url: str) -> Any:
+    """Alembic configuration for `url`, found from the installed package: no working directory is assumed."""
+    from alembic.config import Config  # lazy: only a start or an operator migrates
+
+    import migrations
+
+    config = Config()
+    config.set_main_option("script_location", str(Path(migrations.__file__).parent))
+    config.attributes["url"] = url
+    return config
+
+
+def upgrade(url: str, revision: str = "head") -> None:
+    """Migrate the database at `url` up to `revision`; safe when several processes start at once."""
+    from alembic import command
+
+    command.upgrade(migration_config(url), revision)
+
+
+def downgrade(url: str, revision: str) -> None:
+    """Migrate the database at `url` down to `revision` (``base`` empties it)."""
+    from alembic import command
+
+    command.downgrade(migration_config(url), revision)

@@ -1,0 +1,29 @@
+"""Identifiers that sort by the time of their making and cannot be guessed."""
+
+from __future__ import annotations
+
+import secrets
+import time
+
+ALPHABET = "0123456789abcdefghjkmnpqrstvwxyz"  # Crockford base 32: no i, l, o, u
+TIME_CHARACTERS = 10  # 50 bits of milliseconds: until the year 37000
+RANDOM_CHARACTERS = 16  # 80 bits
+
+
+def _base32(number: int, characters: int) -> str:
+    digits = []
+    for _ in range(characters):
+        number, digit = divmod(number, 32)
+        digits.append(ALPHABET[digit])
+    return "".join(reversed(digits))
+
+
+def new_identifier(kind: str) -> str:
+    """Return ``kind_`` and 26 characters: milliseconds since 1970, then randomness (the layout of ULID).
+
+    The order is for listing only; nothing depends on two clocks agreeing.
+    """
+    milliseconds = time.time_ns() // 1_000_000
+    return (
+        f"{kind}_{_base32(milliseconds, TIME_CHARACTERS)}{_base32(secrets.randbits(80), RANDOM_CHARACTERS)}"
+    )

@@ -1,0 +1,53 @@
+"""Files that a job leaves behind, as rows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+
+from sqlalchemy import delete, insert
+from sqlalchemy.orm import Session
+
+from app.database import database_time
+from app.tables import artifacts
+
+ARTIFACT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}")  # a plain file name: no folder, no dot file
+
+MEDIA_TYPES = {
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".csv": "text/csv; charset=utf-8",
+    ".json": "application/json",
+    ".html": "text/html; charset=utf-8",
+    ".txt": "text/plain; charset=utf-8",
+}
+
+
+def media_type(name: str) -> str:
+    """Media type of a file by its ending."""
+    return MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
+
+
+def store_artifacts(session: Session, job_id: str, files: Mapping[str, bytes]) -> None:
+    """Write the files of a job, replacing those of the same name.
+
+    Raises
+    ------
+    ValueError
+        When a name is not a plain file name.
+    """
+    for name, data in files.items():
+        if not ARTIFACT_NAME.fullmatch(name):
+            raise ValueError(f"artifact name {name!r} is not a plain file name")
+        session.execute(delete(artifacts).where(artifacts.c.job_id == job_id, artifacts.c.name == name))
+        session.execute(
+            insert(artifacts).values(
+                job_id=job_id,
+                name=name,
+                media_type=media_type(name),
+                size_bytes=len(data),
+                data=data,
+                at=database_time(),
+            )
+        )

@@ -1,0 +1,89 @@
+"""Wake-up messages to workers: hints that a row waits. Losing one delays a job, it never loses it."""
+
+from __future__ import annotations
+
+import logging
+from functools import lru_cache
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any
+
+from app.settings import load_settings
+
+TASK_NAME = "morphid.run_job"
+QUEUE_NAME = "morphid"
+CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
+SOCKET_TIMEOUT_S = 2.0
+
+logger = logging.getLogger(__name__)
+
+
+@lru_cache(maxsize=4)
+def _client(broker_url: str) -> Any:
+    """A Celery client that fails fast; it opens no connection before the first message."""
+    from celery import Celery
+
+    client = Celery("morphid", broker=broker_url, set_as_current=False)
+    client.conf.update(
+        task_ignore_result=True,
+        broker_connection_timeout=CONNECT_TIMEOUT_S,
+        broker_connection_retry=False,
+        broker_transport_options={
+            "socket_connect_timeout": CONNECT_TIMEOUT_S,
+            "socket_timeout": SOCKET_TIMEOUT_S,
+            "max_retries": 0,
+        },
+    )
+    return client
+
+
+def publish(job_id: str, broker_url: str | None = None) -> bool:
+    """Tell the workers that a job waits; call it after the commit.
+
+    Returns
+    -------
+    bool
+        False when the broker cannot be reached: the reaper repeats the message later, so nothing is lost.
+    """
+    url = broker_url or load_settings().broker_url
+    try:
+        _client(url).send_task(TASK_NAME, args=[job_id], queue=QUEUE_NAME, retry=False)
+    except Exception as error:  # noqa: BLE001 - whatever a broker does, the row is safe and the caller goes on
+        logger.warning("wake-up message for %s not sent (%s); the reaper will repeat it", job_id, error)
+        return False
+    return True
+
+
+class Publisher:
+    """Sends wake-up messages from its own thread, so that no request waits for a broker.
+
+    Parameters
+    ----------
+    broker_url : str
+        Where to send; never contacted before the first message.
+    """
+
+    def __init__(self, broker_url: str) -> None:
+        self._broker_url = broker_url
+        self._waiting: SimpleQueue[str | None] = SimpleQueue()
+        self._thread: Thread | None = None
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread = Thread(target=self._run, name="wake-up-messages", daemon=True)
+        self._thread.start()
+
+    def publish(self, job_id: str) -> None:
+        """Hand over one job id and return at once."""
+        self._waiting.put(job_id)
+
+    def stop(self, timeout_s: float = 5.0) -> None:
+        """Send what waits, then end the thread; what is left after `timeout_s` is the reaper's to repeat."""
+        if self._thread is not None:
+            self._waiting.put(None)
+            self._thread.join(timeout_s)
+            self._thread = None
+
+    def _run(self) -> None:
+        while (job_id := self._waiting.get()) is not None:
+            publish(job_id, self._broker_url)

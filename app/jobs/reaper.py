@@ -1,0 +1,134 @@
+"""The reaper: ends what ran out of time, gives back what a dead worker held, repeats lost wake-up messages.
+
+Any number of reapers may run at once: each change is a compare-and-set on the fence that the reaper saw.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
+from sqlalchemy.orm import Session
+
+from app.database import database_time
+from app.documents import Document
+from app.jobs.records import HELD, JobStatus, ReapReport
+from app.jobs.store import transition
+from app.tables import jobs
+
+DEADLINE_GRACE_S = (
+    30.0  # a worker that heeds the deadline itself keeps its best so far; then the reaper ends the job
+)
+ROUND_LIMIT = 500  # rows per round: a round stays a short transaction whatever the backlog
+PUBLISH_LIMIT = 100  # messages per round: more would only queue up in the broker
+
+
+def reap(
+    session: Session,
+    now: float | None = None,
+    *,
+    republish_after_s: float = 15.0,
+    deadline_grace_s: float = DEADLINE_GRACE_S,
+) -> ReapReport:
+    """Make one round and report what was done.
+
+    Parameters
+    ----------
+    now : float, optional
+        Seconds since 1970 UTC; the database's own clock when None.
+    republish_after_s : float
+        A job queued this long after its last message gets another.
+    deadline_grace_s : float
+        How long a running job may outlive its deadline while its worker winds down.
+
+    Returns
+    -------
+    ReapReport
+        Publish the ids in ``publish`` after the commit.
+    """
+    clock: ColumnElement[float] = database_time() if now is None else literal(now)
+    done: dict[str, list[str]] = {"requeued": [], "failed": [], "cancelled": [], "expired": []}
+    for row in _overdue(session, clock, deadline_grace_s):
+        kind, event, values = _verdict(row)
+        changed = transition(
+            session,
+            jobs.c.id == row.id,
+            jobs.c.fence == row.fence,
+            jobs.c.status == row.status,
+            event=event,
+            payload={"reason": row.reason, **({"error": values["error"]} if "error" in values else {})},
+            fence=jobs.c.fence + 1,  # a stalled worker that wakes up now writes in vain
+            lease_until=None,
+            worker=None,
+            **values,
+        )
+        if changed is not None:
+            done[kind].append(row.id)
+    return ReapReport(
+        requeued=tuple(done["requeued"]),
+        failed=tuple(done["failed"]),
+        cancelled=tuple(done["cancelled"]),
+        expired=tuple(done["expired"]),
+        publish=(*done["requeued"], *_unheard(session, clock, republish_after_s, set(done["requeued"]))),
+    )
+
+
+def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> list[Row[Any]]:
+    """Jobs whose lease ran out, or whose deadline has passed."""
+    held = jobs.c.status.in_(HELD)
+    lease_lost = held & (jobs.c.lease_until < clock)
+    overrun = held & (jobs.c.deadline_at + grace_s < clock)
+    waited_too_long = (jobs.c.status == JobStatus.QUEUED.value) & (jobs.c.deadline_at < clock)
+    rows = session.execute(
+        select(
+            jobs.c.id,
+            jobs.c.fence,
+            jobs.c.status,
+            jobs.c.attempt,
+            jobs.c.max_attempts,
+            case((lease_lost, "lease_lost"), else_="deadline").label("reason"),
+            (jobs.c.deadline_at < clock).label("deadline_passed"),
+        )
+        .where(or_(lease_lost, overrun, waited_too_long))
+        .order_by(jobs.c.id)
+        .limit(ROUND_LIMIT)
+    )
+    return list(rows.all())
+
+
+def _verdict(row: Row[Any]) -> tuple[str, str, Document]:
+    """Decide what becomes of an overdue job: (report list, event type, columns to set)."""
+    end: Document = {"finished_at": database_time()}
+    if row.status == JobStatus.CANCELLING.value:
+        return "cancelled", "cancelled", {**end, "status": JobStatus.CANCELLED.value}
+    if row.deadline_passed:
+        error = {
+            "code": "deadline_exceeded",
+            "detail": "The job did not end before its deadline.",
+            "hint": "Raise search.max_seconds, or search with fewer particles, generations or links.",
+        }
+        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
+    if row.attempt >= row.max_attempts:
+        error = {
+            "code": "worker_lost",
+            "detail": f"The worker died or stalled in each of {row.attempt} attempts.",
+            "hint": "A search that does not fit in memory does this: fewer particles, or see its log.",
+        }
+        return "failed", "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
+    return "requeued", "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}
+
+
+def _unheard(
+    session: Session, clock: ColumnElement[float], after_s: float, fresh: set[str]
+) -> tuple[str, ...]:
+    """Queued jobs whose message must have been lost; they are marked as published now."""
+    ids = session.scalars(
+        select(jobs.c.id)
+        .where(jobs.c.status == JobStatus.QUEUED.value, jobs.c.published_at + after_s < clock)
+        .order_by(jobs.c.priority.desc(), jobs.c.id)
+        .limit(PUBLISH_LIMIT)
+    ).all()
+    lost = [job_id for job_id in ids if job_id not in fresh]
+    if lost:
+        session.execute(update(jobs).where(jobs.c.id.in_(lost)).values(published_at=clock))
+    return tuple(lost)

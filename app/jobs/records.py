@@ -1,0 +1,114 @@
+"""What the job store hands out: plain frozen values, detached from any session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any
+
+
+class JobStatus(StrEnum):
+    """States of a job: ``queued -> running -> succeeded | failed | cancelled | expired``."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    CANCELLING = "cancelling"  # a running job that was asked to wind down
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    EXPIRED = "expired"
+
+
+HELD = (JobStatus.RUNNING.value, JobStatus.CANCELLING.value)  # a worker holds the claim
+FINISHED = (
+    JobStatus.SUCCEEDED.value,
+    JobStatus.FAILED.value,
+    JobStatus.CANCELLED.value,
+    JobStatus.EXPIRED.value,
+)
+
+
+def moment(seconds: float) -> datetime:
+    """Database time (s since 1970 UTC) as an aware datetime."""
+    return datetime.fromtimestamp(seconds, UTC)
+
+
+def optional_moment(seconds: float | None) -> datetime | None:
+    """The same for a time that may not have come yet."""
+    return None if seconds is None else moment(seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One job row without its request, result and artifacts."""
+
+    id: str
+    owner: str
+    operation: str
+    status: JobStatus
+    priority: int
+    summary: Mapping[str, Any]
+    progress: Mapping[str, Any] | None
+    error: Mapping[str, Any] | None
+    attempt: int
+    max_attempts: int
+    event_seq: int
+    model_id: str | None
+    partial: bool
+    created_at: datetime
+    started_at: datetime | None
+    updated_at: datetime
+    finished_at: datetime | None
+    deadline_at: datetime | None
+    replayed: bool = False  # this answer repeats an earlier one with the same idempotency key
+
+    @property
+    def finished(self) -> bool:
+        """Whether the job is in a state that it never leaves."""
+        return self.status.value in FINISHED
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A worker's right to write to one job, until its lease runs out or a later claim has a higher fence."""
+
+    job_id: str
+    owner: str
+    operation: str
+    fence: int
+    attempt: int
+    max_attempts: int
+    worker: str
+    max_seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseState:
+    """Answer to a heartbeat."""
+
+    held: bool  # False: another claim or the reaper took the job; stop, write nothing
+    cancel_requested: bool = False
+    deadline_passed: bool = False  # finish as `expired`, with the best so far
+
+
+@dataclass(frozen=True, slots=True)
+class ReapReport:
+    """What one round of the reaper did; each entry is a job id."""
+
+    requeued: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
+    cancelled: tuple[str, ...] = ()
+    expired: tuple[str, ...] = ()
+    publish: tuple[str, ...] = ()  # send a wake-up message for these, after the commit
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One row of a job's history; `seq` rises by one."""
+
+    seq: int
+    type: str
+    payload: Mapping[str, Any]
+    at: datetime

@@ -1,0 +1,459 @@
+"""The life of a job as rows: created, claimed, kept alive, finished.
+
+The row is the truth, messages are hints. Every function takes a `Session` and leaves the commit to its caller
+(a worker, or an endpoint's transaction). Every change of state passes through `transition`: a compare-and-set
+that writes its event in the same transaction. Writes of a worker carry its claim's fence; a stale one changes
+nothing and answers False.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, select, update
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import Session
+
+from app.database import database_time
+from app.documents import Document, digest, finite, packed, unpacked
+from app.errors import IdempotencyConflict, JobNotFound
+from app.identifiers import new_identifier
+from app.jobs.artifacts import store_artifacts
+from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState, moment, optional_moment
+from app.models.repository import insert_model
+from app.tables import idempotency_keys, job_checkpoints, job_events, job_requests, job_results, jobs
+
+JOB_COLUMNS = (
+    jobs.c.id,
+    jobs.c.owner,
+    jobs.c.operation,
+    jobs.c.status,
+    jobs.c.priority,
+    jobs.c.summary,
+    jobs.c.progress,
+    jobs.c.error,
+    jobs.c.attempt,
+    jobs.c.max_attempts,
+    jobs.c.event_seq,
+    jobs.c.model_id,
+    jobs.c.partial,
+    jobs.c.created_at,
+    jobs.c.started_at,
+    jobs.c.updated_at,
+    jobs.c.finished_at,
+    jobs.c.deadline_at,
+)
+CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds)
+
+
+def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
+    """Turn a row of `JOB_COLUMNS` into a value."""
+    return Job(
+        id=row.id,
+        owner=row.owner,
+        operation=row.operation,
+        status=JobStatus(row.status),
+        priority=row.priority,
+        summary=row.summary,
+        progress=row.progress,
+        error=row.error,
+        attempt=row.attempt,
+        max_attempts=row.max_attempts,
+        event_seq=row.event_seq,
+        model_id=row.model_id,
+        partial=bool(row.partial),
+        created_at=moment(row.created_at),
+        started_at=optional_moment(row.started_at),
+        updated_at=moment(row.updated_at),
+        finished_at=optional_moment(row.finished_at),
+        deadline_at=optional_moment(row.deadline_at),
+        replayed=replayed,
+    )
+
+
+def get_job(session: Session, owner: str, job_id: str) -> Job:
+    """Read one job of `owner`.
+
+    Raises
+    ------
+    JobNotFound
+        When there is none with this id, or it is another owner's.
+    """
+    row = session.execute(
+        select(*JOB_COLUMNS).where(jobs.c.id == job_id, jobs.c.owner == owner)
+    ).one_or_none()
+    if row is None:
+        raise JobNotFound(job_id)
+    return job_from_row(row)
+
+
+def transition(
+    session: Session,
+    *conditions: ColumnElement[bool],
+    event: str | None,
+    payload: Mapping[str, Any] | None = None,
+    **values: Any,
+) -> Row[*tuple[Any, ...]] | None:
+    """Compare-and-set on one job row, with its event.
+
+    Parameters
+    ----------
+    *conditions
+        What must hold of the row (its id, and its state or fence).
+    event, payload
+        Type and content of the event; the job's new ``status`` and ``attempt`` are added.
+        None writes no event.
+    **values
+        Columns to set.
+
+    Returns
+    -------
+    Row or None
+        The row as it is now (`JOB_COLUMNS` and `CLAIM_COLUMNS`), or None when the conditions did not hold.
+    """
+    if event is not None:
+        values["event_seq"] = jobs.c.event_seq + 1
+    row = session.execute(
+        update(jobs)
+        .where(*conditions)
+        .values(**values, updated_at=database_time())
+        .returning(*JOB_COLUMNS, *CLAIM_COLUMNS)
+    ).one_or_none()
+    if row is not None and event is not None:
+        _insert_event(session, row.id, row.event_seq, event, row.status, row.attempt, payload)
+    return row
+
+
+def _insert_event(
+    session: Session,
+    job_id: str,
+    seq: int,
+    event: str,
+    status: str,
+    attempt: int,
+    payload: Mapping[str, Any] | None,
+) -> None:
+    content = {**(payload or {}), "status": status, "attempt": attempt}
+    session.execute(
+        insert(job_events).values(
+            job_id=job_id, seq=seq, type=event, payload=finite(content), at=database_time()
+        )
+    )
+
+
+def create_job(
+    session: Session,
+    *,
+    owner: str,
+    operation: str,
+    request: Document,
+    idempotency_key: str | None = None,
+    priority: int = 0,
+    max_attempts: int = 3,
+    max_seconds: float | None = None,
+    summary: Document | None = None,
+) -> Job:
+    """Write a queued job; publish its id after the commit.
+
+    Parameters
+    ----------
+    request : dict
+        The whole request, every sample inline: what `load_request` gives the worker.
+    idempotency_key : str, optional
+        With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
+    max_seconds : float, optional
+        Deadline counted from the first claim, s.
+    summary : dict, optional
+        The few small facts of the request that listings show.
+
+    Raises
+    ------
+    IdempotencyConflict
+        The key was used for another request.
+    """
+    job_id = new_identifier("job")
+    fingerprint = digest(request)
+    if idempotency_key is not None:
+        earlier = _take_idempotency_key(session, owner, idempotency_key, operation, fingerprint, job_id)
+        if earlier is not None:
+            return earlier
+    session.execute(
+        insert(jobs).values(
+            id=job_id,
+            owner=owner,
+            operation=operation,
+            status=JobStatus.QUEUED.value,
+            priority=priority,
+            summary=finite(summary or {}),
+            attempt=0,
+            max_attempts=max_attempts,
+            fence=0,
+            event_seq=1,
+            partial=False,
+            max_seconds=max_seconds,
+            published_at=database_time(),
+            created_at=database_time(),
+            updated_at=database_time(),
+        )
+    )
+    session.execute(insert(job_requests).values(job_id=job_id, document=packed(request), sha256=fingerprint))
+    _insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
+    return get_job(session, owner, job_id)
+
+
+def _take_idempotency_key(
+    session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
+) -> Job | None:
+    """Write the key, or return the job that holds it. The unique key decides between two racing requests."""
+    keys = idempotency_keys
+    values = {
+        "owner": owner,
+        "key": key,
+        "operation": operation,
+        "sha256": fingerprint,
+        "job_id": job_id,
+        "at": database_time(),
+    }
+    dialect = sqlite if session.get_bind().dialect.name == "sqlite" else postgresql
+    taken = session.execute(
+        dialect.insert(keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
+    ).one_or_none()
+    if taken is not None:
+        return None
+    earlier = session.execute(select(keys).where(keys.c.owner == owner, keys.c.key == key)).one()
+    if (earlier.operation, earlier.sha256) != (operation, fingerprint):
+        raise IdempotencyConflict(key)
+    row = session.execute(
+        select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
+    ).one()
+    return job_from_row(row, replayed=True)
+
+
+def load_request(session: Session, job_id: str) -> Document:
+    """Return the request document of a job, every sample inline."""
+    data = session.execute(
+        select(job_requests.c.document).where(job_requests.c.job_id == job_id)
+    ).scalar_one_or_none()
+    if data is None:
+        raise JobNotFound(job_id)
+    document: Document = unpacked(data)
+    return document
+
+
+def next_queued(session: Session) -> str | None:
+    """Id of the queued job that should run next: highest priority, then oldest."""
+    return session.execute(
+        select(jobs.c.id)
+        .where(jobs.c.status == JobStatus.QUEUED.value)
+        .order_by(jobs.c.priority.desc(), jobs.c.id)
+        .limit(1)
+    ).scalar_one_or_none()
+
+
+def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 60.0) -> Claim | None:
+    """Take a queued job: fence and attempt rise by one, the lease runs from now (database time).
+
+    Returns None when the job is not queued any more: someone else was first, or it was cancelled.
+    """
+    now = database_time()
+    row = transition(
+        session,
+        jobs.c.id == job_id,
+        jobs.c.status == JobStatus.QUEUED.value,
+        event="started",
+        payload={"worker": worker_name},
+        status=JobStatus.RUNNING.value,
+        fence=jobs.c.fence + 1,
+        attempt=jobs.c.attempt + 1,
+        worker=worker_name,
+        lease_until=now + lease_s,
+        started_at=case((jobs.c.started_at.is_(None), now), else_=jobs.c.started_at),
+        deadline_at=case((jobs.c.deadline_at.is_(None), now + jobs.c.max_seconds), else_=jobs.c.deadline_at),
+    )
+    if row is None:
+        return None
+    return Claim(
+        job_id=row.id,
+        owner=row.owner,
+        operation=row.operation,
+        fence=row.fence,
+        attempt=row.attempt,
+        max_attempts=row.max_attempts,
+        worker=worker_name,
+        max_seconds=row.max_seconds,
+    )
+
+
+def _held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
+    return (jobs.c.id == claim.job_id, jobs.c.fence == claim.fence, jobs.c.status.in_(HELD))
+
+
+def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseState:
+    """The heartbeat: push the lease out and learn whether to stop."""
+    row = session.execute(
+        update(jobs)
+        .where(*_held_by(claim))
+        .values(lease_until=database_time() + lease_s)
+        .returning(jobs.c.status, (jobs.c.deadline_at < database_time()).label("deadline_passed"))
+    ).one_or_none()
+    if row is None:
+        return LeaseState(held=False)
+    return LeaseState(
+        held=True,
+        cancel_requested=row.status == JobStatus.CANCELLING.value,
+        deadline_passed=bool(row.deadline_passed),
+    )
+
+
+def save_progress(session: Session, claim: Claim, progress: Document, checkpoint: bytes | None) -> bool:
+    """Write progress, its event and (when given) the checkpoint, all or nothing.
+
+    Parameters
+    ----------
+    progress : dict
+        ``fraction`` (0..1), ``generation``, ``best_cost``, ``flights``, ``flights_per_s``, ``eta_s``,
+        ``phase``, ``message``; any may be missing. NaN and infinity become null.
+
+    Returns
+    -------
+    bool
+        False when the claim is stale; nothing was written then.
+    """
+    clean = finite(progress)
+    row = transition(session, *_held_by(claim), event="progress", payload=clean, progress=clean)
+    if row is None:
+        return False
+    if checkpoint is not None:
+        session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
+        session.execute(
+            insert(job_checkpoints).values(
+                job_id=claim.job_id, data=checkpoint, fence=claim.fence, at=database_time()
+            )
+        )
+    return True
+
+
+def load_checkpoint(session: Session, claim: Claim) -> bytes | None:
+    """Return the last checkpoint of the claimed job, whichever attempt wrote it."""
+    data = session.execute(
+        select(job_checkpoints.c.data).where(job_checkpoints.c.job_id == claim.job_id)
+    ).scalar_one_or_none()
+    return None if data is None else bytes(data)
+
+
+def finish_job(
+    session: Session,
+    claim: Claim,
+    status: JobStatus | str,
+    *,
+    result: Document | None = None,
+    error: Document | None = None,
+    artifacts: Mapping[str, bytes] | None = None,
+) -> bool:
+    """End a claimed job, with what it leaves behind.
+
+    Parameters
+    ----------
+    status
+        ``succeeded``, ``failed``, ``cancelled`` or ``expired``. Any but the first marks a result as partial.
+    error : dict, optional
+        ``{"code", "detail", "hint"?, "pointer"?}`` of a failure; stored and shown as it is.
+    artifacts : mapping, optional
+        File name -> content.
+
+    Returns
+    -------
+    bool
+        False when the claim is stale; nothing was written then.
+    """
+    ending = JobStatus(status).value
+    if ending not in FINISHED:
+        raise ValueError(f"{ending} is not an end")
+    partial = result is not None and ending != JobStatus.SUCCEEDED.value
+    values: Document = {
+        "status": ending,
+        "partial": partial,
+        "lease_until": None,
+        "finished_at": database_time(),
+    }
+    if error is not None:
+        values["error"] = finite(error)
+    if ending == JobStatus.SUCCEEDED.value and result is not None and claim.operation == "identify":
+        values["model_id"] = new_identifier("model")
+    payload = {"error": values["error"]} if error is not None else None
+    row = transition(session, *_held_by(claim), event=ending, payload=payload, **values)
+    if row is None:
+        return False
+    if result is not None:
+        session.execute(
+            insert(job_results).values(
+                job_id=claim.job_id,
+                document=packed({**result, "partial": True} if partial else result),
+                partial=partial,
+                at=database_time(),
+            )
+        )
+    store_artifacts(session, claim.job_id, artifacts or {})
+    if row.model_id is not None and result is not None:
+        insert_model(
+            session,
+            model_id=row.model_id,
+            owner=row.owner,
+            job_id=row.id,
+            request=load_request(session, row.id),
+            result=result,
+        )
+    if ending == JobStatus.SUCCEEDED.value:
+        session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
+    return True
+
+
+def release_job(session: Session, claim: Claim) -> bool:
+    """Give a running job back to the queue with its checkpoint (graceful stop); the attempt is not counted.
+
+    A job that was being cancelled ends as cancelled instead. Publish the id after the commit.
+    """
+    cancelling = jobs.c.status == JobStatus.CANCELLING.value
+    row = transition(
+        session,
+        *_held_by(claim),
+        event="released",
+        payload={"worker": claim.worker},
+        status=case((cancelling, literal(JobStatus.CANCELLED.value)), else_=literal(JobStatus.QUEUED.value)),
+        finished_at=case((cancelling, database_time()), else_=None),
+        attempt=jobs.c.attempt - 1,
+        lease_until=None,
+        worker=None,
+        published_at=database_time(),
+    )
+    return row is not None
+
+
+def request_cancel(session: Session, owner: str, job_id: str) -> Job:
+    """Ask a job to end: a queued one does at once, a running one winds down, a finished one stays as it is.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    """
+    row = transition(
+        session,
+        jobs.c.id == job_id,
+        jobs.c.owner == owner,
+        jobs.c.status == JobStatus.QUEUED.value,
+        event="cancelled",
+        status=JobStatus.CANCELLED.value,
+        finished_at=database_time(),
+    )
+    if row is None:
+        row = transition(
+            session,
+            jobs.c.id == job_id,
+            jobs.c.owner == owner,
+            jobs.c.status == JobStatus.RUNNING.value,
+            event="cancelling",
+            status=JobStatus.CANCELLING.value,
+        )
+    return get_job(session, owner, job_id) if row is None else job_from_row(row)

@@ -1,0 +1,1 @@
+"""Identified models as things of their own."""

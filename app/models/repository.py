@@ -1,0 +1,88 @@
+"""SQL of identified models; every read is filtered by owner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Row, insert, select
+from sqlalchemy.orm import Session
+
+from app.database import database_time
+from app.documents import Document, packed, unpacked
+from app.errors import ModelNotFound
+from app.jobs.records import moment
+from app.tables import models
+
+NAME_LENGTH = 200
+
+SUMMARY_COLUMNS = (models.c.id, models.c.name, models.c.job_id, models.c.links_per_wing, models.c.created_at)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSummary:
+    """One identified model without its document."""
+
+    id: str
+    name: str
+    job_id: str | None
+    links_per_wing: int | None
+    created_at: datetime
+
+
+def insert_model(
+    session: Session, *, model_id: str, owner: str, job_id: str, request: Document, result: Document
+) -> None:
+    """Store the model of a successful identification with all that is needed to fly it again."""
+    model = result.get("model") or {}
+    aircraft = request.get("aircraft") or {}
+    links = model.get("links_per_wing")
+    name = str(aircraft.get("name") or "aircraft")
+    session.execute(
+        insert(models).values(
+            id=model_id,
+            owner=owner,
+            name=f"{name}, {links} links per wing"[:NAME_LENGTH],
+            job_id=job_id,
+            links_per_wing=links,
+            document=packed(
+                {
+                    "model": model,
+                    "fit": result.get("fit", []),
+                    "aircraft": aircraft,
+                    "flight": request.get("flight") or {},
+                    "options": request.get("model") or {},
+                }
+            ),
+            created_at=database_time(),
+        )
+    )
+
+
+def _summary(row: Row[*tuple[Any, ...]]) -> ModelSummary:
+    return ModelSummary(row.id, row.name, row.job_id, row.links_per_wing, moment(row.created_at))
+
+
+def list_models(session: Session, owner: str, *, before: str | None, limit: int) -> list[ModelSummary]:
+    """Newest models of `owner` first, older than `before` when given."""
+    query = select(*SUMMARY_COLUMNS).where(models.c.owner == owner).order_by(models.c.id.desc()).limit(limit)
+    if before is not None:
+        query = query.where(models.c.id < before)
+    return [_summary(row) for row in session.execute(query)]
+
+
+def get_model(session: Session, owner: str, model_id: str) -> tuple[ModelSummary, Document]:
+    """Read one model with its document.
+
+    Raises
+    ------
+    ModelNotFound
+        When `owner` has no such model.
+    """
+    row = session.execute(
+        select(*SUMMARY_COLUMNS, models.c.document).where(models.c.id == model_id, models.c.owner == owner)
+    ).one_or_none()
+    if row is None:
+        raise ModelNotFound(model_id)
+    return _summary(row), unpacked(row.document)

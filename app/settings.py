@@ -1,0 +1,118 @@
+"""Settings of the service, read from ``MORPHID_*`` environment variables, refusing unsafe combinations."""
+
+from __future__ import annotations
+
+import ipaddress
+from pathlib import Path
+from typing import Self
+from urllib.parse import urlsplit
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+LOOPBACK_NAMES = frozenset({"localhost", "ip6-localhost"})
+
+
+class UnsafeSettings(ValueError):
+    """The settings contradict one another or would expose the service; the message says what to change."""
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether `host` (a name or an address, with or without brackets) reaches this machine only."""
+    bare = host.strip("[]").lower()
+    if bare in LOOPBACK_NAMES:
+        return True
+    try:
+        return ipaddress.ip_address(bare).is_loopback
+    except ValueError:
+        return False
+
+
+class Settings(BaseSettings):
+    """Everything that an operator may set; defaults serve one user on one machine."""
+
+    model_config = SettingsConfigDict(env_prefix="MORPHID_", extra="forbid", frozen=True)
+
+    data_dir: Path = Field(default=Path("var"), description="Folder of the SQLite file and local state.")
+    database_url: str = Field(
+        default="",
+        description="SQLAlchemy URL; empty means SQLite in `data_dir`. Postgres for several hosts.",
+    )
+    broker_url: str = Field(
+        default="redis://127.0.0.1:6399/0", description="Redis or Valkey for wake-up messages."
+    )
+    host: str = Field(default="127.0.0.1", description="Address the API listens on.")
+    port: int = Field(default=8000, ge=0, le=65535)
+    allow_open: bool = Field(
+        default=False,
+        description="Serve beyond this machine without API keys: everyone who reaches the port may use it.",
+    )
+    max_body_bytes: int = Field(
+        default=64 * 2**20, ge=1024, description="Largest request body, counted as it streams."
+    )
+    max_wait_s: float = Field(
+        default=60.0, ge=0.0, le=600.0, description="Longest `Prefer: wait` that is honoured."
+    )
+    event_poll_s: float = Field(
+        default=0.2, gt=0.0, le=10.0, description="How often watched jobs are looked at."
+    )
+    keep_alive_s: float = Field(
+        default=15.0, gt=0.0, le=300.0, description="Comment line on an idle event stream."
+    )
+    lease_s: float = Field(default=60.0, gt=0.0, description="Life of a worker's claim without a heartbeat.")
+    heartbeat_s: float = Field(default=10.0, gt=0.0, description="How often a worker renews its claim.")
+    republish_after_s: float = Field(
+        default=15.0, gt=0.0, description="A queued job not claimed for this long gets a new wake-up message."
+    )
+    job_max_attempts: int = Field(default=3, ge=1, le=100)
+    job_max_seconds: float = Field(
+        default=6 * 3600.0, gt=0.0, description="Deadline of a job without its own."
+    )
+
+    @model_validator(mode="after")
+    def _fill_and_refuse(self) -> Self:
+        if not self.database_url:
+            url = f"sqlite:///{self.data_dir.expanduser().resolve() / 'morphid.sqlite3'}"
+            object.__setattr__(self, "database_url", url)
+        if not self.allow_open and not is_loopback(self.host):
+            raise UnsafeSettings(
+                f"host {self.host} is reachable from other machines and there are no API keys. "
+                "Listen on 127.0.0.1 behind a proxy that asks for a password, "
+                "or set MORPHID_ALLOW_OPEN=1 to let everyone in on purpose."
+            )
+        broker_host = urlsplit(self.broker_url).hostname or ""
+        if self.uses_sqlite and broker_host and not is_loopback(broker_host):
+            raise UnsafeSettings(
+                f"the broker is on another host ({broker_host}) but the database is an SQLite file, which "
+                "hosts cannot share. Set MORPHID_DATABASE_URL to a Postgres database, or use a broker here."
+            )
+        if self.heartbeat_s * 2 > self.lease_s:
+            raise UnsafeSettings(
+                "heartbeat_s must be at most half of lease_s: one late heartbeat would lose a healthy job. "
+                "Lower MORPHID_HEARTBEAT_S or raise MORPHID_LEASE_S."
+            )
+        return self
+
+    @property
+    def uses_sqlite(self) -> bool:
+        """Whether the job store is an SQLite file."""
+        return self.database_url.startswith("sqlite")
+
+
+def load_settings(**overrides: object) -> Settings:
+    """Read the environment, with `overrides` on top.
+
+    Raises
+    ------
+    UnsafeSettings
+        With one sentence per problem, fit to be printed to the operator.
+    """
+    try:
+        return Settings(**overrides)  # type: ignore[arg-type]  # checked by pydantic itself
+    except ValidationError as error:
+        sentences = []
+        for item in error.errors():
+            where = ".".join(str(part) for part in item["loc"])
+            message = item["msg"].removeprefix("Value error, ")
+            sentences.append(f"MORPHID_{where.upper()}: {message}" if where else message)
+        raise UnsafeSettings("\n".join(sentences)) from None

@@ -1,0 +1,1 @@
+"""Database migrations (Alembic); `app.database.upgrade` runs them."""
