@@ -1,1 +1,1 @@
-
+"""The `morphid` command: serves, identifies, talks to a service."""

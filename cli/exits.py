@@ -1,0 +1,46 @@
+"""Exit codes of the ``morphid`` command and the one error that carries them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Exit(IntEnum):
+    """What a shell script can rely on."""
+
+    OK = 0
+    FAILED = 1  # the job failed, or something unforeseen happened
+    USAGE = 2  # the command line itself was wrong (typer's own code)
+    INVALID_INPUT = 3  # a file is missing or unreadable, or a value in it is refused
+    STOPPED = 4  # the job was cancelled or ran out of time; a partial result may have been written
+    UNREACHABLE = 5  # no service answers at the given address
+    ENVIRONMENT = 6  # this machine lacks something: a free port, a program, a writable directory
+    INTERRUPTED = 130  # Ctrl-C
+
+
+class CommandError(Exception):
+    """A sentence for the user and the exit code that goes with it.
+
+    Parameters
+    ----------
+    message : what is wrong.
+    code : exit code.
+    hint : what to do about it.
+    pointer : JSON pointer to the offending field, "" when there is none.
+    """
+
+    def __init__(self, message: str, *, code: Exit = Exit.FAILED, hint: str = "", pointer: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.code = code
+        self.hint = hint
+        self.pointer = pointer
+
+    def to_document(self) -> dict[str, str | int]:
+        """Give the error as the JSON that ``--json`` prints."""
+        return {
+            "error": self.message,
+            "pointer": self.pointer,
+            "hint": self.hint,
+            "exit_code": int(self.code),
+        }

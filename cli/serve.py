@@ -1,0 +1,223 @@
+"""``morphid serve``: broker, API and worker as three supervised children of one command."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.error import URLError
+from urllib.request import urlopen
+
+from rich.console import Console
+
+from cli.broker import LOOPBACK, Broker, free_port, prepare_broker
+from cli.exits import CommandError, Exit
+from cli.supervisor import Child, ChildSpec, Supervisor
+
+BROKER_WITHIN_S = 10.0
+API_WITHIN_S = 30.0
+WORKER_STOP_S = 25.0  # a running job is checkpointed and handed back in this time
+LOCK_NAME = "serve.lock"
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """What the user asked of ``morphid serve``.
+
+    Parameters
+    ----------
+    host, port : where the API listens; port 0 takes a free one.
+    workers : jobs that run at once; each gets its share of the cores.
+    data_dir : database, queue journal and logs.
+    json_events : one JSON object per line instead of sentences.
+    """
+
+    host: str
+    port: int
+    workers: int
+    data_dir: Path
+    json_events: bool
+
+
+class Announcer:
+    """Tell the user what happens, in sentences or as JSON lines."""
+
+    def __init__(self, *, json_events: bool) -> None:
+        self._json = json_events
+        self._console = Console(highlight=False, soft_wrap=True)
+
+    def event(self, kind: str, sentence: str, **data: object) -> None:
+        """Announce one event."""
+        if self._json:
+            sys.stdout.write(json.dumps({"event": kind, "message": sentence, **data}) + "\n")
+            sys.stdout.flush()
+        else:
+            self._console.print(sentence, markup=False)
+
+
+def serve(options: ServeOptions) -> None:
+    """Run the service until Ctrl-C or SIGTERM.
+
+    Raises
+    ------
+    CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
+    """
+    announcer = Announcer(json_events=options.json_events)
+    with _own_data_dir(options.data_dir) as data_dir:
+        port = _api_port(options.host, options.port)
+        environment = _environment(options, data_dir, port)
+        _migrate(environment["MORPHID_DATABASE_URL"])
+        supervisor = Supervisor(
+            data_dir / "logs", report=lambda sentence: announcer.event("restart", f"morphid: {sentence}")
+        )
+        supervisor.on_signals()
+        try:
+            _start_children(supervisor, environment, options, port, data_dir)
+            if not supervisor.stopping:
+                url = f"http://{_in_url(options.host)}:{port}"
+                announcer.event(
+                    "ready",
+                    f"MorphID is ready at {url} (documentation at {url}/docs, logs in {data_dir / 'logs'}). "
+                    "Ctrl-C ends it.",
+                    url=url,
+                    pid=os.getpid(),
+                    children={name: child.pid for name, child in supervisor.children.items()},
+                )
+                supervisor.watch()
+        finally:
+            announcer.event("stopping", "morphid: ending")
+            supervisor.stop()
+
+
+def _start_children(
+    supervisor: Supervisor, environment: dict[str, str], options: ServeOptions, port: int, data_dir: Path
+) -> None:
+    if "MORPHID_BROKER_URL" not in os.environ:
+        broker = prepare_broker(data_dir)
+        environment["MORPHID_BROKER_URL"] = broker.url
+        _start_broker(supervisor, broker)
+    if supervisor.stopping:
+        return
+    api = supervisor.start(_api(environment, options.host, port))
+    # the worker loads while the API does; a wake-up that comes early waits in the queue
+    supervisor.start(_worker(environment, options.workers))
+    _expect(supervisor, api, lambda: _alive(options.host, port), API_WITHIN_S)
+
+
+def _start_broker(supervisor: Supervisor, broker: Broker) -> None:
+    child = supervisor.start(broker.spec)
+    _expect(supervisor, child, broker.answers, BROKER_WITHIN_S)
+
+
+def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], within_s: float) -> None:
+    if supervisor.wait_until(child, ready, within_s) or supervisor.stopping:
+        return
+    state = "ended" if child.exit_code is not None else f"did not answer within {within_s:g} s"
+    raise CommandError(
+        f"the {child.spec.name} {state}; the end of its log {child.log_path}:\n{child.last_words()}",
+        code=Exit.ENVIRONMENT,
+        hint="repair what the log says and start again",
+    )
+
+
+def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
+    command = [
+        *(sys.executable, "-m", "uvicorn", "app.main:create_app", "--factory"),
+        *("--host", host, "--port", str(port)),
+        *("--no-access-log", "--timeout-graceful-shutdown", "5"),
+    ]
+    return ChildSpec(name="api", command=command, environment=environment)
+
+
+def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
+    command = [
+        *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "worker"),
+        *("--queues", "morphid", "--concurrency", str(workers), "--prefetch-multiplier", "1"),
+        *("--loglevel", "INFO", "--without-gossip", "--without-mingle"),
+        *("--beat", "--scheduler", "celery.beat:Scheduler"),  # nothing on disk that a kill could spoil
+    ]
+    return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
+
+
+def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, str]:
+    from app.settings import UnsafeSettings, load_settings
+
+    try:
+        settings = load_settings(data_dir=data_dir, host=options.host, port=port)
+    except UnsafeSettings as error:
+        raise CommandError(str(error), code=Exit.USAGE) from None
+    return {
+        "MORPHID_DATA_DIR": str(data_dir),
+        "MORPHID_HOST": options.host,
+        "MORPHID_PORT": str(port),
+        "MORPHID_DATABASE_URL": settings.database_url,
+        "MORPHID_WORKERS": str(options.workers),
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+def _migrate(database_url: str) -> None:
+    from app.database import upgrade
+
+    upgrade(database_url)
+
+
+@contextmanager
+def _own_data_dir(data_dir: Path) -> Iterator[Path]:
+    """Make the data directory and hold it alone."""
+    home = data_dir.expanduser().resolve()
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        lock = (home / LOCK_NAME).open("a")
+    except OSError as error:
+        raise CommandError(
+            f"the data directory {home} cannot be written: {error.strerror}",
+            code=Exit.ENVIRONMENT,
+            hint="choose another: morphid serve --data-dir DIR",
+        ) from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise CommandError(
+                f"another `morphid serve` uses the data directory {home}",
+                code=Exit.ENVIRONMENT,
+                hint="end it first, or choose another: morphid serve --data-dir DIR",
+            ) from None
+        yield home
+
+
+def _api_port(host: str, port: int) -> int:
+    if port == 0:
+        return free_port(0, host)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise CommandError(
+                f"cannot listen on {host} port {port}: {error.strerror}",
+                code=Exit.ENVIRONMENT,
+                hint="another program may use it; take any free port with `morphid serve --port 0`",
+            ) from None
+    return port
+
+
+def _in_url(host: str) -> str:
+    everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}  # noqa: S104 - recognised here, not bound
+    return everywhere.get(host, f"[{host}]" if ":" in host else host)
+
+
+def _alive(host: str, port: int) -> bool:
+    try:
+        with urlopen(f"http://{_in_url(host)}:{port}/livez", timeout=1.0) as answer:
+            return bool(answer.status == 200)
+    except (URLError, OSError):
+        return False

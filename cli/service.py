@@ -1,0 +1,130 @@
+"""Talk to a running MorphID service: short methods over httpx, errors as sentences."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+
+from cli.exits import CommandError, Exit
+
+Document = dict[str, Any]
+FINISHED = frozenset({"succeeded", "failed", "cancelled", "expired"})
+POLL_S = 0.25
+PATIENCE_S = 30.0  # a service that restarts comes back within this
+
+
+class Service:
+    """One MorphID service.
+
+    Parameters
+    ----------
+    url : base address, such as ``http://127.0.0.1:8000``.
+    transport : handed in by tests.
+    """
+
+    def __init__(self, url: str, *, transport: httpx.BaseTransport | None = None) -> None:
+        self.url = url.rstrip("/")
+        self._http = httpx.Client(base_url=self.url, timeout=30.0, transport=transport)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._http.close()
+
+    def submit(self, operation: str, body: Document, *, idempotency_key: str | None = None) -> Document:
+        """Post a job and give its representation."""
+        headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
+        return self._document("POST", f"/{operation}", json=body, headers=headers)
+
+    def upload(self, path: Path) -> Document:
+        """Upload a sample file and give its representation, with an ``id``."""
+        with path.open("rb") as stream:
+            return self._document("POST", "/trajectories", files={"file": (path.name, stream)})
+
+    def jobs(self, *, status: str | None = None, limit: int = 20) -> Sequence[Document]:
+        """List jobs, the newest first."""
+        query: dict[str, str | int] = {"limit": limit}
+        if status:
+            query["status"] = status
+        items: Sequence[Document] = self._document("GET", "/jobs", params=query)["items"]
+        return items
+
+    def job(self, job_id: str) -> Document:
+        """Give one job."""
+        return self._document("GET", f"/jobs/{job_id}")
+
+    def cancel(self, job_id: str) -> Document:
+        """Ask for a job's end."""
+        return self._document("POST", f"/jobs/{job_id}/cancel")
+
+    def result(self, job_id: str) -> Document:
+        """Give the result of a finished job."""
+        return self._document("GET", f"/jobs/{job_id}/result")
+
+    def watch(self, job_id: str, *, poll_s: float = POLL_S) -> Iterator[Document]:
+        """Give the job again and again until it is finished; wait for a service that restarts meanwhile."""
+        patience_until = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                job = self.job(job_id)
+            except CommandError as error:
+                if error.code is not Exit.UNREACHABLE or time.monotonic() > patience_until:
+                    raise
+            else:
+                patience_until = time.monotonic() + PATIENCE_S
+                yield job
+                if job["status"] in FINISHED:
+                    return
+            time.sleep(poll_s)
+
+    def save_artifacts(self, job_id: str, folder: Path) -> list[Path]:
+        """Download every artifact of a job into a folder."""
+        folder.mkdir(parents=True, exist_ok=True)
+        saved = []
+        for item in self._document("GET", f"/jobs/{job_id}/artifacts")["items"]:
+            target = folder / Path(item["name"]).name
+            target.write_bytes(self._request("GET", f"/jobs/{job_id}/artifacts/{item['name']}").content)
+            saved.append(target)
+        return saved
+
+    def _document(self, method: str, path: str, **kwargs: Any) -> Document:
+        document: Document = self._request(method, path, **kwargs).json()
+        return document
+
+    def _request(self, method: str, path: str, **kwargs: Any) -> httpx.Response:
+        try:
+            answer = self._http.request(method, path, **kwargs)
+        except httpx.TransportError as error:
+            raise CommandError(
+                f"no MorphID service answers at {self.url} ({type(error).__name__})",
+                code=Exit.UNREACHABLE,
+                hint="start one with `morphid serve`, or name its address with --url or MORPHID_URL",
+            ) from None
+        if answer.is_error:
+            raise _refusal(answer)
+        return answer
+
+
+def _refusal(answer: httpx.Response) -> CommandError:
+    """Turn a problem document (RFC 9457) into a sentence."""
+    try:
+        problem = answer.json()
+    except ValueError:
+        problem = {}
+    if not isinstance(problem, dict):
+        problem = {}
+    code = Exit.INVALID_INPUT if 400 <= answer.status_code < 500 else Exit.FAILED
+    return CommandError(
+        str(problem.get("detail") or problem.get("title") or f"the service answered {answer.status_code}"),
+        code=code,
+        hint=str(problem.get("hint") or ""),
+        pointer=str(problem.get("pointer") or ""),
+    )

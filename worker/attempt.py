@@ -1,0 +1,218 @@
+"""One attempt at one job: work step by step with checkpoints; every way it can end has its own branch."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from enum import Enum
+
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
+
+from app.database import Database
+from app.jobs.records import Claim, JobStatus
+from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
+from morphcore.errors import MorphError
+from worker.lease import StopReason, Vigil
+from worker.numerics import Kernels
+from worker.operations import Begin, Document, Outcome, Step, UnknownOperation, Work, WorkInterrupted
+from worker.progress import Pace
+
+log = logging.getLogger(__name__)
+
+SAVE_EVERY_S = (
+    0.5  # a generation may take milliseconds; two writes a second serve the user's eye and the disk
+)
+PERSIST_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # a database that restarts is back within these
+
+
+class Ending(Enum):
+    """What became of one wake-up."""
+
+    NOTHING_QUEUED = "nothing queued"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    EXPIRED = "expired"
+    RELEASED = "released"  # back in the queue with its checkpoint
+    ABANDONED = "abandoned"  # another claim holds the job
+
+
+ENDINGS = {
+    JobStatus.SUCCEEDED: Ending.SUCCEEDED,
+    JobStatus.FAILED: Ending.FAILED,
+    JobStatus.CANCELLED: Ending.CANCELLED,
+    JobStatus.EXPIRED: Ending.EXPIRED,
+}
+
+
+class StaleClaim(Exception):
+    """The store refused a write: the job is someone else's now."""
+
+
+class Attempt:
+    """The work on one claimed job.
+
+    Parameters
+    ----------
+    database : the job store.
+    claim : the right to write to the job.
+    vigil : keeps the claim alive and knows when to stop.
+    kernels : the compiled kernels of this process.
+    clock : seconds that only rise.
+    sleep : waits a number of seconds.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        claim: Claim,
+        vigil: Vigil,
+        kernels: Kernels,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._database = database
+        self._claim = claim
+        self._vigil = vigil
+        self._kernels = kernels
+        self._clock = clock
+        self._sleep = sleep
+        self._pace = Pace(clock)
+        self._work: Work | None = None
+        self._checkpoint: bytes | None = None
+        self._unsaved: Step | None = None
+        self._saved_at = float("-inf")
+
+    def run(self, find_operation: Callable[[str], Begin]) -> Ending:
+        """Work to an end, whatever it is."""
+        try:
+            return self._run(find_operation)
+        except StaleClaim:
+            return Ending.ABANDONED
+        except MorphError as error:
+            return self._fail(_error(error.code, error.message, hint=error.hint, pointer=error.pointer))
+        except MemoryError:
+            hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
+            return self._fail(_error("out_of_memory", "the job needs more memory than there is", hint=hint))
+        except UnknownOperation as error:
+            return self._fail(_error("unknown_operation", str(error), hint="update the workers"))
+        except Exception:
+            log.exception("job %s: unforeseen", self._claim.job_id)
+            hint = f"the worker's log tells more about {self._claim.job_id}; please report it"
+            return self._fail(_error("internal_error", "the worker met an unforeseen error", hint=hint))
+
+    def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
+        with self._database.read() as session:
+            request = load_request(session, self._claim.job_id)
+            self._checkpoint = load_checkpoint(session, self._claim)
+        if not self._prepare_kernels():
+            return self._stopped()
+        self._work = find_operation(self._claim.operation)(request, self._kernels.threads)
+        try:
+            for step in self._work.steps(self._checkpoint, self._vigil.should_stop):
+                self._note(step)
+        except WorkInterrupted:
+            return self._stopped()
+        if self._checkpoint is None:
+            raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
+        self._save_unsaved()
+        return self._finish(JobStatus.SUCCEEDED, outcome=self._work.outcome(self._checkpoint))
+
+    def _prepare_kernels(self) -> bool:
+        if self._kernels.ready:
+            return True
+        message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
+        self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
+        return self._kernels.wait(self._vigil.should_stop)
+
+    # progress
+
+    def _note(self, step: Step) -> None:
+        self._checkpoint, self._unsaved = step.checkpoint, step
+        if self._clock() - self._saved_at >= SAVE_EVERY_S:
+            self._save_unsaved()
+
+    def _save_unsaved(self) -> None:
+        if self._unsaved is not None:
+            self._save(self._pace.progress(self._unsaved), self._unsaved.checkpoint)
+            self._unsaved, self._saved_at = None, self._clock()
+
+    def _save(self, progress: Document, checkpoint: bytes | None) -> None:
+        self._persist(lambda session: save_progress(session, self._claim, progress, checkpoint))
+
+    # ends
+
+    def _stopped(self) -> Ending:
+        reason = self._vigil.reason
+        if reason is StopReason.SHUTDOWN:
+            self._save_unsaved()
+            self._persist(lambda session: release_job(session, self._claim))
+            return Ending.RELEASED
+        if reason is StopReason.CANCEL:
+            return self._finish(JobStatus.CANCELLED, outcome=self._best_so_far())
+        if reason is StopReason.DEADLINE:
+            hint = "raise search.max_seconds, or search with fewer particles, generations or links"
+            error = _error("deadline_exceeded", "the job did not end before its deadline", hint=hint)
+            return self._finish(JobStatus.EXPIRED, outcome=self._best_so_far(), error=error)
+        raise StaleClaim
+
+    def _fail(self, error: Document) -> Ending:
+        log.warning("job %s failed: %s", self._claim.job_id, error)
+        try:
+            return self._finish(JobStatus.FAILED, outcome=self._best_so_far(), error=error)
+        except StaleClaim:
+            return Ending.ABANDONED
+
+    def _best_so_far(self) -> Outcome | None:
+        if self._work is None or self._checkpoint is None:
+            return None
+        try:
+            return self._work.best_so_far(self._checkpoint)
+        except Exception:
+            # how the job ended matters more than what it leaves behind
+            log.exception("job %s: no result at its last checkpoint", self._claim.job_id)
+            return None
+
+    def _finish(
+        self, status: JobStatus, *, outcome: Outcome | None = None, error: Document | None = None
+    ) -> Ending:
+        self._persist(
+            lambda session: finish_job(
+                session,
+                self._claim,
+                status,
+                result=None if outcome is None else outcome.document,
+                error=error,
+                artifacts={} if outcome is None else dict(outcome.artifacts),
+            )
+        )
+        return ENDINGS[status]
+
+    def _persist(self, write: Callable[[Session], bool]) -> None:
+        """Write in a transaction of its own; wait out a database that restarts.
+
+        Raises
+        ------
+        StaleClaim : the store refused the write.
+        """
+        for pause_s in (*PERSIST_PAUSES_S, None):
+            try:
+                with self._database.write() as session:
+                    accepted = write(session)
+            except OperationalError:
+                if pause_s is None:
+                    raise
+                log.warning("job %s: the job store does not answer, trying again", self._claim.job_id)
+                self._sleep(pause_s)
+            else:
+                if not accepted:
+                    raise StaleClaim
+                return
+
+
+def _error(code: str, detail: str, *, hint: str = "", pointer: str = "") -> Document:
+    error = {"code": code, "detail": detail, "hint": hint, "pointer": pointer}
+    return {key: value for key, value in error.items() if value}

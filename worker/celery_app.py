@@ -1,0 +1,94 @@
+"""The Celery application of the workers: messages are wake-up hints, the job table is the truth.
+
+Started as ``celery --app worker.celery_app:app worker --queues morphid`` by `morphid serve` and
+docker-compose.yml.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from celery import Celery
+from celery.signals import (
+    worker_init,
+    worker_process_init,
+    worker_ready,
+    worker_shutdown,
+    worker_shutting_down,
+)
+
+from app.settings import Settings, load_settings
+from worker import numerics, shutdown
+
+QUEUE = "morphid"
+RUN_JOB = "morphid.run_job"
+REAP = "morphid.reap"
+REAP_EVERY_S = 10.0  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
+HARD_LIMIT_GRACE_S = 120.0  # after a job's own deadline, when a kernel never returned
+
+
+def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celery:
+    """Configure Celery for work that our own tables keep track of."""
+    celery = Celery("morphid", broker=settings.broker_url, include=["worker.tasks"])
+    celery.conf.update(
+        task_default_queue=QUEUE,
+        task_acks_late=False,  # redelivery by visibility timeout would run an hour-long job twice
+        task_ignore_result=True,  # results belong in our tables
+        worker_prefetch_multiplier=1,
+        worker_disable_prefetch=True,  # a busy worker must not sit on a hint that an idle one could take
+        worker_concurrency=int(os.environ.get("MORPHID_WORKERS", "1")),
+        worker_hijack_root_logger=False,
+        worker_send_task_events=False,
+        worker_enable_remote_control=True,  # `celery inspect ping` is the container's health check
+        task_time_limit=settings.job_max_seconds + HARD_LIMIT_GRACE_S,
+        broker_connection_retry_on_startup=True,
+        broker_connection_max_retries=None,
+        task_serializer="json",
+        accept_content=["json"],
+        beat_schedule={
+            "reap": {
+                "task": REAP,
+                "schedule": reap_every_s,
+                "options": {"expires": reap_every_s, "queue": QUEUE},
+            }
+        },
+    )
+    return celery
+
+
+def threads_per_job() -> int:
+    """Numeric threads of one job: this machine's cores shared by the jobs that run at once."""
+    return numerics.share_cores(int(os.environ.get("MORPHID_WORKERS", "1")))
+
+
+app = make_app(load_settings(), reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+numerics.prepare_environment(threads_per_job())
+
+
+@worker_init.connect
+def _before_the_pool(**_: Any) -> None:
+    shutdown.arm()
+
+
+@worker_process_init.connect
+def _in_each_child(**_: Any) -> None:
+    from worker import tasks
+
+    tasks.enter_process()
+
+
+@worker_ready.connect
+def _look_at_the_table(**_: Any) -> None:
+    # hints sent while no worker was there may be lost: publish every queued row again
+    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=60)
+
+
+@worker_shutting_down.connect
+def _tell_the_children(**_: Any) -> None:
+    shutdown.announce()
+
+
+@worker_shutdown.connect
+def _after_the_pool(**_: Any) -> None:
+    shutdown.disarm()

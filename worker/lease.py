@@ -1,0 +1,129 @@
+"""The vigil over one running job: renews its lease and learns, within half a second, that it should stop."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from enum import Enum
+from types import TracebackType
+from typing import Self
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database import Database
+from app.errors import JobNotFound
+from app.jobs.records import Claim, JobStatus, LeaseState
+from app.jobs.store import get_job, renew_lease
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S = 0.5  # a cancelled job must end within two seconds, and a chunk of numeric work may take one
+
+
+class StopReason(Enum):
+    """Why running work was asked to stop."""
+
+    CANCEL = "cancel"  # the user wants no more of it
+    DEADLINE = "deadline"  # its time is over
+    SHUTDOWN = "shutdown"  # this worker ends; another will go on from the checkpoint
+    LOST = "lost"  # another claim holds the job now; nothing we write counts
+
+
+class Vigil:
+    """A thread that keeps one claim alive while kernels run (they release the GIL).
+
+    Use as a context manager around the work, and hand `should_stop` to it.
+
+    Parameters
+    ----------
+    database : the job store.
+    claim : what to keep alive.
+    lease_s : how long each renewal lasts, s.
+    heartbeat_s : time between renewals, s.
+    shutting_down : tells that this worker is asked to end.
+    look_every_s : time between two looks, s.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        claim: Claim,
+        *,
+        lease_s: float,
+        heartbeat_s: float,
+        shutting_down: Callable[[], bool],
+        look_every_s: float = LOOK_EVERY_S,
+    ) -> None:
+        self._database = database
+        self._claim = claim
+        self._lease_s = lease_s
+        self._heartbeat_s = heartbeat_s
+        self._shutting_down = shutting_down
+        self._look_every_s = min(look_every_s, heartbeat_s)
+        self._over = threading.Event()
+        self._reason: StopReason | None = None
+        self._thread = threading.Thread(target=self._watch, name=f"vigil-{claim.job_id}", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    @property
+    def reason(self) -> StopReason | None:
+        """Why the work should stop, None while it should go on."""
+        return self._reason
+
+    def should_stop(self) -> bool:
+        """Whether the work should stop; cheap enough to ask between chunks."""
+        return self._reason is not None
+
+    def lose(self) -> None:
+        """Note that a write was refused: the claim is stale."""
+        self._reason = StopReason.LOST
+
+    def _watch(self) -> None:
+        renewed_at = time.monotonic()  # the claim itself began the lease
+        while not self._over.wait(self._look_every_s):
+            now = time.monotonic()
+            try:
+                if now - renewed_at >= self._heartbeat_s or self._changed():
+                    state = self._renew()
+                    renewed_at = now
+                    self._judge(state)
+            except JobNotFound:
+                self.lose()
+            except SQLAlchemyError:
+                log.warning("the job store does not answer; lease of %s not renewed", self._claim.job_id)
+                if now - renewed_at > self._lease_s:
+                    self.lose()
+            if self._reason is None and self._shutting_down():
+                self._reason = StopReason.SHUTDOWN
+            if self._reason is StopReason.LOST:
+                return
+
+    def _changed(self) -> bool:
+        """Whether the row says anything but "running" (a read; the heartbeat then finds out what)."""
+        with self._database.read() as session:
+            job = get_job(session, self._claim.owner, self._claim.job_id)
+        overdue = job.deadline_at is not None and job.deadline_at.timestamp() < time.time()
+        return self._reason is None and (job.status is not JobStatus.RUNNING or overdue)
+
+    def _renew(self) -> LeaseState:
+        with self._database.write() as session:
+            return renew_lease(session, self._claim, self._lease_s)
+
+    def _judge(self, state: LeaseState) -> None:
+        if not state.held:
+            self._reason = StopReason.LOST
+        elif self._reason is None and state.cancel_requested:
+            self._reason = StopReason.CANCEL
+        elif self._reason is None and state.deadline_passed:
+            self._reason = StopReason.DEADLINE

@@ -1,0 +1,112 @@
+"""Threads and compiled kernels of one worker process.
+
+The thread count is fixed by environment variables before numba is imported. Kernels are compiled or loaded
+from the cache in the pool's child, in the background, while it already listens: run in the parent, they
+would break its forks.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+CGROUP_CPU_LIMIT = Path("/sys/fs/cgroup/cpu.max")  # "<quota> <period>" in microseconds, or "max <period>"
+
+
+def usable_cores() -> int:
+    """Count the cores this process may use: affinity, and the container's quota rounded up."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        quota, period = CGROUP_CPU_LIMIT.read_text().split()
+        if quota != "max":
+            cores = min(cores, -(-int(quota) // int(period)))
+    except (OSError, ValueError):
+        pass  # no quota that we could read
+    return max(1, cores)
+
+
+def share_cores(concurrency: int, *, cores: int | None = None) -> int:
+    """Give each of the concurrent jobs its share of the cores, at least one.
+
+    Parameters
+    ----------
+    concurrency : jobs that run at once on this machine.
+    cores : cores to share, all usable ones when None.
+
+    Returns
+    -------
+    Threads per job.
+    """
+    return max(1, (usable_cores() if cores is None else cores) // max(1, concurrency))
+
+
+def prepare_environment(threads: int) -> None:
+    """Fix the thread count of this process and of those it forks; must run before numba is imported."""
+    os.environ["NUMBA_NUM_THREADS"] = str(threads)
+    # plain threads: OpenMP dies in forked children, TBB may be missing
+    os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
+    # the kernels spread blocks over threads themselves; a second pool under them would fight for the cores
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+class Kernels:
+    """The compiled kernels of this process, made ready once, in the background.
+
+    Parameters
+    ----------
+    warm_up : compiles or loads them (threads -> None).
+    threads : numeric threads of one job.
+    """
+
+    def __init__(self, warm_up: Callable[[int], object], threads: int) -> None:
+        self.threads = threads
+        self._warm_up = warm_up
+        self._done = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin in the background; a second call does nothing."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="warm-up", daemon=True)
+            self._thread.start()
+
+    @property
+    def ready(self) -> bool:
+        """Whether the warm-up is over."""
+        return self._done.is_set()
+
+    def wait(self, stop: Callable[[], bool], *, poll_s: float = 0.2) -> bool:
+        """Wait for the end of the warm-up: two threads must not run parallel kernels at once.
+
+        Returns
+        -------
+        False when ``stop()`` turned true first.
+        """
+        self.start()
+        while not self._done.wait(poll_s):
+            if stop():
+                return False
+        return True
+
+    def _run(self) -> None:
+        try:
+            self._warm_up(self.threads)
+        except Exception:
+            # the job itself will meet the same trouble and say so where the user sees it
+            log.exception("the numeric kernels could not be made ready")
+        finally:
+            self._done.set()
+
+
+def warm_up_library(threads: int) -> None:
+    """Compile or load the kernels of morphcore for one tiny flight."""
+    import morphcore
+
+    morphcore.warm_up(threads)

@@ -1,0 +1,91 @@
+"""What a worker can do, as data: the name of an operation and where its work begins.
+
+An operation is one function ``begin(request, threads) -> Work``. To add one, write a module with such a
+function and name it in `OPERATIONS`; nothing else in the worker changes. Modules are imported on first use,
+so that the pool's parent process never loads the compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, Protocol
+
+Document = dict[str, Any]
+Stop = Callable[[], bool]
+
+
+class WorkInterrupted(Exception):
+    """The work saw its stop signal and ended between two chunks; the last step's checkpoint holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of long work.
+
+    Parameters
+    ----------
+    progress : what the user sees: ``fraction`` (0..1), ``generation``, ``best_cost``, ``flights``,
+        ``phase`` and ``message``.
+    checkpoint : complete state; work begun from it goes on to the bit-identical end.
+    """
+
+    progress: Document
+    checkpoint: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What finished (or interrupted) work leaves behind.
+
+    Parameters
+    ----------
+    document : the result, in the names that API.md fixes.
+    artifacts : file name -> content.
+    """
+
+    document: Document
+    artifacts: Mapping[str, bytes] = field(default_factory=dict)
+
+
+class Work(Protocol):
+    """Long work as an iterator of steps with serialisable state."""
+
+    def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
+        """Give one step after another; raise `WorkInterrupted` soon after ``stop()`` turns true."""
+
+    def outcome(self, checkpoint: bytes) -> Outcome:
+        """Give the result at the last step's checkpoint, with everything that belongs to it."""
+
+    def best_so_far(self, checkpoint: bytes) -> Outcome:
+        """Give the result at any checkpoint, within a second: someone waits for the job to end."""
+
+
+Begin = Callable[[Document, int], Work]
+
+OPERATIONS: Mapping[str, str] = {
+    "identify": "worker.operations.identification:begin",
+}
+
+
+class UnknownOperation(LookupError):
+    """This worker does not know the operation of a job; a newer one may."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"this worker knows {', '.join(sorted(OPERATIONS))}, not {name!r}")
+        self.name = name
+
+
+def find_operation(name: str) -> Begin:
+    """Import the function that begins an operation.
+
+    Raises
+    ------
+    UnknownOperation : no such operation.
+    """
+    if name not in OPERATIONS:
+        raise UnknownOperation(name)
+    module, _, function = OPERATIONS[name].partition(":")
+    begin: Begin = getattr(import_module(module), function)
+    return begin

@@ -1,0 +1,88 @@
+"""The operation ``identify``: an equivalent model from sample flights."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from morphcore.export.plots import identification_plots
+from morphcore.identify import Identification, Interrupted, identification_from_document
+from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted
+
+ANGLES = ("phi_rad", "theta_rad", "psi_rad")
+CURVES = ("measured", "rigid", "initial", "identified")
+
+
+class IdentificationWork:
+    """Identification as the runner sees it.
+
+    Parameters
+    ----------
+    run : the library's iterator.
+    """
+
+    def __init__(self, run: Identification) -> None:
+        self._run = run
+
+    def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
+        """Search, generation by generation."""
+        try:
+            for step in self._run.steps(checkpoint=checkpoint, stop=stop):
+                progress = {
+                    "fraction": step.fraction,
+                    "generation": step.generation,
+                    "best_cost": step.best_cost,
+                    "flights": step.flights,
+                    "phase": step.phase,
+                    "message": step.message,
+                }
+                yield Step(progress=progress, checkpoint=step.checkpoint)
+        except Interrupted:
+            raise WorkInterrupted from None
+
+    def outcome(self, checkpoint: bytes) -> Outcome:
+        """Give the identified model with its plots and curves."""
+        result = self._run.result(checkpoint)
+        document: Document = result.to_document()
+        curves = result.curves()
+        artifacts = {
+            "result.json": json.dumps(document, indent=1).encode(),
+            **identification_plots(document, curves),
+            **curve_tables(curves),
+        }
+        return Outcome(document=document, artifacts=artifacts)
+
+    def best_so_far(self, checkpoint: bytes) -> Outcome:
+        """Give the best model found so far, without plots: drawing them takes seconds."""
+        document: Document = self._run.result(checkpoint).to_document()
+        return Outcome(document=document, artifacts={"result.json": json.dumps(document, indent=1).encode()})
+
+
+def begin(request: Document, threads: int) -> IdentificationWork:
+    """Check the request and prepare the search.
+
+    Raises
+    ------
+    morphcore.errors.MorphError : the request cannot be flown.
+    """
+    return IdentificationWork(identification_from_document(request, threads=threads))
+
+
+def curve_tables(curves: Document) -> dict[str, bytes]:
+    """Write each sample's time histories as CSV: time (s) and the Euler angles (rad) of every model flown."""
+    return {f"curves_{sample['name']}.csv": _table(sample) for sample in curves["samples"]}
+
+
+def _table(sample: dict[str, Any]) -> bytes:
+    columns = {"time_s": sample["time_s"]}
+    for curve in CURVES:
+        for angle in ANGLES:
+            columns[f"{curve}_{angle}"] = sample[curve][angle]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue().encode()
