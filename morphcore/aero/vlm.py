@@ -1,0 +1,301 @@
+"""Vortex-ring lattice of any number of surfaces in general position: influence, circulation, forces.
+
+The lattice takes ring corners, control points and local air velocities as they come, deformed or not; it
+knows nothing of links, beams or hinges. Conventions: all vectors in B (forward, right, down); *flow* is the
+velocity of the air relative to the structure without what the lattice itself induces, m/s (for a body at rest
+in a head wind V it is (-V, 0, 0)); the circulation of a ring (m^2/s) is positive where it lifts, toward -z of
+the wing, on both sides.
+
+Source: Katz & Plotkin (2001), chapter 12; forces on all bound edges by the law of Kutta and Joukowski with
+the local velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from morphcore.aero.kernels.influence import ring_influence
+from morphcore.errors import InvalidInput, UnsupportedRegime
+from morphcore.geometry.aircraft import MACH_LIMIT
+from morphcore.geometry.lattice import SurfaceLattice
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Core radius as a fraction of the panel chord (2.5 per cent of the chord at four rows). Control points lie
+# half a panel chord from their bound vortex: Vatistas's factor there is 1 - (0.1 / 0.5)^4 / 2, so it moves
+# the self-influence by less than 1e-3, while a leg that strikes a control point induces no more than
+# gamma / (2.8 pi core).
+VORTEX_CORE = 0.1
+
+
+@dataclass(frozen=True)
+class RingTable:
+    """Which edge belongs to which rings and panels: all of a lattice that deformation leaves alone.
+
+    Corners, rings and edges of all surfaces are numbered through: surface by surface; within one, corners
+    ``i * (spanwise + 1) + j``, rings and panels ``i * spanwise + j`` (row i from the leading edge, strip j
+    from the root); edges first the rings' fronts (i, j) from root to tip, then the chordwise ones (i, j),
+    front to aft.
+
+    Attributes (c corners, r rings, e bound edges, l wake legs, s surfaces)
+    ----------
+    edge_start, edge_end : (e,) corners of each bound edge.
+    edge_plus, edge_minus : (e,) the ring whose circulation runs along the edge and the one against it; -1:
+        none.
+    edge_panel : (e, 2) the panels that carry the edge's force in equal parts (one panel twice at root, tip,
+        fronts).
+    leg_start, leg_plus, leg_minus : (l,) trailing-edge corner and rings of each wake leg.
+    edge_panel_chord, leg_panel_chord : (e,), (l,) mean panel chord of the surface, m; the core is referred to
+        it.
+    ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
+    panel_surface, panel_row, panel_strip : (r,) surface, row and strip (within the surface) of each panel.
+    panel_side : (r,) +1 on right surfaces, -1 on left ones.
+    corners : number c of corners.
+    """
+
+    edge_start: IntArray
+    edge_end: IntArray
+    edge_plus: IntArray
+    edge_minus: IntArray
+    edge_panel: IntArray
+    leg_start: IntArray
+    leg_plus: IntArray
+    leg_minus: IntArray
+    edge_panel_chord: Array
+    leg_panel_chord: Array
+    ring_corner: IntArray
+    panel_surface: IntArray
+    panel_row: IntArray
+    panel_strip: IntArray
+    panel_side: Array
+    corners: int
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @property
+    def rings(self) -> int:
+        """Number of rings."""
+        return int(self.panel_surface.size)
+
+    @property
+    def edges(self) -> int:
+        """Number of bound edges."""
+        return int(self.edge_start.size)
+
+
+@dataclass(frozen=True)
+class EdgeForces:
+    """Forces of the air on the bound edges and on the panels.
+
+    Attributes (e edges, r panels)
+    ----------
+    points_B : (e, 3) midpoints of the edges, m. force_B : (e, 3) N.
+    panel_force_B : (r, 3) N, every edge's force in equal parts on the panels it borders.
+    panel_moment_B : (r, 3) N m, moment of that share about the origin of B.
+    """
+
+    points_B: Array
+    force_B: Array
+    panel_force_B: Array
+    panel_moment_B: Array
+
+
+def ring_table(lattices: Sequence[SurfaceLattice]) -> RingTable:
+    """Number the corners, rings and edges of some surfaces through."""
+    parts: list[dict[str, NDArray[Any]]] = []
+    corner, ring = 0, 0
+    for index, lattice in enumerate(lattices):
+        parts.append(_surface_table(lattice, index, corner, ring))
+        corner += (lattice.chordwise + 1) * (lattice.spanwise + 1)
+        ring += lattice.rings
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return RingTable(**joined, corners=corner)
+
+
+def influence(
+    points_B: ArrayLike,
+    corners_B: ArrayLike,
+    table: RingTable,
+    wake_direction_B: ArrayLike,
+    core: float = VORTEX_CORE,
+    mach: float = 0.0,
+) -> Array:
+    """Velocity that every ring of unit circulation, with its straight wake, induces at every point.
+
+    Parameters
+    ----------
+    points_B : (p, 3) m. corners_B : (c, 3) ring corners in the order of the table, m.
+    wake_direction_B : (3,) direction of the free stream, from nose to tail; any length.
+    core : core radius as a fraction of each surface's panel chord, above 0.
+    mach : of the free stream. Goethert's rule: the geometry is stretched along the free stream by 1 / beta,
+        beta^2 = 1 - mach^2, and the velocity along it by 1 / beta.
+
+    Returns
+    -------
+    velocity_B : (3, r, p), 1/m; the point index is the contiguous one.
+
+    Raises
+    ------
+    UnsupportedRegime : the Mach number is beyond 0.7.
+    InvalidInput : the core is not above 0.
+    """
+    if core <= 0.0:
+        raise InvalidInput(f"the vortex core is {core:g}, not above 0", hint="leave it out for the default")
+    u_B = np.asarray(wake_direction_B, dtype=np.float64)
+    u_B = u_B / np.sqrt(u_B @ u_B)
+    stretch = 1.0 / _beta(mach)
+    points = np.array(points_B, dtype=np.float64).reshape(-1, 3)
+    corners = np.array(corners_B, dtype=np.float64).reshape(-1, 3)
+    if corners.shape[0] != table.corners:
+        raise InvalidInput(f"{corners.shape[0]} corners, but the lattice has {table.corners}")
+    if stretch > 1.0:
+        points += (stretch - 1.0) * (points @ u_B)[:, None] * u_B
+        corners += (stretch - 1.0) * (corners @ u_B)[:, None] * u_B
+    out = np.empty((3, table.rings, points.shape[0]))
+    ring_influence(
+        np.ascontiguousarray(points.T),
+        corners,
+        table.edge_start,
+        table.edge_end,
+        table.edge_plus,
+        table.edge_minus,
+        core * table.edge_panel_chord,
+        table.leg_start,
+        table.leg_plus,
+        table.leg_minus,
+        core * table.leg_panel_chord,
+        u_B,
+        np.empty((3, points.shape[0])),
+        out,
+    )
+    if stretch > 1.0:
+        along = np.einsum("a,arp->rp", u_B, out)
+        out += (stretch - 1.0) * u_B[:, None, None] * along
+    return out
+
+
+def panel_normals(corners_B: ArrayLike, table: RingTable) -> Array:
+    """Unit normals (r, 3) of the rings in B, on the lifting side (-z of a wing), across the diagonals."""
+    corners = np.asarray(corners_B, dtype=np.float64).reshape(-1, 3)
+    root_front, tip_front, root_aft, tip_aft = corners[table.ring_corner.T]
+    # this sense is up on a right wing; on a left one strips run the other way
+    normal = table.panel_side[:, None] * np.cross(tip_front - root_aft, root_front - tip_aft)
+    return np.asarray(normal / np.sqrt(np.sum(normal**2, axis=1))[:, None])
+
+
+def solve_circulation(velocity_B: Array, normals_B: Array, flow_B: Array) -> Array:
+    """Circulations (r,) in m^2/s for which no air passes through the control points.
+
+    Parameters
+    ----------
+    velocity_B : (3, r, r) of ``influence`` at the control points.
+    normals_B : (r, 3) unit normals there; their sense does not matter.
+    flow_B : (r, 3) air velocity relative to the structure there, m/s.
+    """
+    matrix = np.einsum("pa,arp->pr", normals_B, velocity_B)
+    return np.asarray(np.linalg.solve(matrix, -np.sum(normals_B * flow_B, axis=1)))
+
+
+def edge_midpoints(corners_B: ArrayLike, table: RingTable) -> Array:
+    """Midpoints (e, 3) of the bound edges, m."""
+    corners = np.asarray(corners_B, dtype=np.float64).reshape(-1, 3)
+    return np.asarray(0.5 * (corners[table.edge_start] + corners[table.edge_end]))
+
+
+def edge_circulation(circulation: Array, table: RingTable) -> Array:
+    """Net circulation (e,) along every bound edge from the circulations (r,) of the rings, m^2/s."""
+    padded = np.append(circulation, 0.0)  # index -1: no ring
+    return np.asarray(padded[table.edge_plus] - padded[table.edge_minus])
+
+
+def edge_forces(
+    corners_B: ArrayLike,
+    table: RingTable,
+    circulation: Array,
+    flow_B: Array,
+    velocity_B: Array,
+    density: float,
+) -> EdgeForces:
+    """Force of the air on all bound edges: density * gamma * velocity x edge (Kutta and Joukowski).
+
+    The trailing edge carries none: wake and last ring cancel there.
+
+    Parameters
+    ----------
+    corners_B : (c, 3) ring corners, m. circulation : (r,) m^2/s. density : kg/m^3.
+    flow_B : (e, 3) air velocity relative to the structure at the edges' midpoints, m/s.
+    velocity_B : (3, r, e) of ``influence`` at the midpoints.
+    """
+    corners = np.asarray(corners_B, dtype=np.float64).reshape(-1, 3)
+    edge_B = corners[table.edge_end] - corners[table.edge_start]
+    points_B = edge_midpoints(corners, table)
+    local_B = flow_B + np.einsum("are,r->ea", velocity_B, circulation)
+    force_B = density * edge_circulation(circulation, table)[:, None] * np.cross(local_B, edge_B)
+    moment_B = np.cross(points_B, force_B)
+    panel_force_B = np.zeros((table.rings, 3))
+    panel_moment_B = np.zeros((table.rings, 3))
+    for side in range(2):
+        np.add.at(panel_force_B, table.edge_panel[:, side], 0.5 * force_B)
+        np.add.at(panel_moment_B, table.edge_panel[:, side], 0.5 * moment_B)
+    return EdgeForces(points_B, force_B, panel_force_B, panel_moment_B)
+
+
+def _beta(mach: float) -> float:
+    if not 0.0 <= mach <= MACH_LIMIT:
+        raise UnsupportedRegime(
+            f"Mach {mach:.2f} is outside 0..{MACH_LIMIT}, where linear compressibility holds",
+            pointer="/flight/mach",
+            hint="lower the airspeed, or leave mach out for incompressible flow",
+        )
+    return float(np.sqrt(1.0 - mach**2))
+
+
+def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) -> dict[str, NDArray[Any]]:
+    """The part of a RingTable that one surface contributes; ``corner`` and ``ring`` are its first numbers."""
+    rows, strips = lattice.chordwise, lattice.spanwise
+    corners = corner + np.arange((rows + 1) * (strips + 1)).reshape(rows + 1, strips + 1)
+    rings = ring + np.arange(rows * strips).reshape(rows, strips)
+    bordered = np.full((rows + 1, strips + 2), -1)
+    bordered[1:, 1:-1] = rings
+    # a ring runs along its front to the tip, aft along its tip side, and back;
+    # bordered[i + 1, j + 1] is ring (i, j), framed by -1 for "no ring"
+    front, ahead = bordered[1:, 1:-1], bordered[:-1, 1:-1]
+    inboard, outboard = bordered[1:, :-1], bordered[1:, 1:]
+    plus = np.concatenate([front.ravel(), inboard.ravel()])
+    minus = np.concatenate([ahead.ravel(), outboard.ravel()])
+    leg_plus, leg_minus = inboard[-1], outboard[-1]
+    bordering = np.stack([inboard.ravel(), outboard.ravel()], axis=1)
+    bordering = np.where(bordering < 0, bordering[:, ::-1], bordering)
+    if lattice.span_sign < 0:  # its strips run to the left: lifting circulation runs from tip to root
+        plus, minus = minus, plus
+        leg_plus, leg_minus = leg_minus, leg_plus
+    start = np.concatenate([corners[:-1, :-1].ravel(), corners[:-1].ravel()])
+    end = np.concatenate([corners[:-1, 1:].ravel(), corners[1:].ravel()])
+    quarters = (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
+    row, strip = np.divmod(np.arange(rows * strips), strips)
+    return {
+        "edge_start": start,
+        "edge_end": end,
+        "edge_plus": plus,
+        "edge_minus": minus,
+        "edge_panel": np.concatenate([np.repeat(rings.reshape(-1, 1), 2, axis=1), bordering]),
+        "leg_start": corners[-1],
+        "leg_plus": leg_plus,
+        "leg_minus": leg_minus,
+        "edge_panel_chord": np.full(start.size, lattice.panel_chord_m),
+        "leg_panel_chord": np.full(strips + 1, lattice.panel_chord_m),
+        "ring_corner": np.stack([quarter.ravel() for quarter in quarters], axis=1),
+        "panel_surface": np.full(rows * strips, index),
+        "panel_row": row,
+        "panel_strip": strip,
+        "panel_side": np.full(rows * strips, lattice.span_sign),
+    }
