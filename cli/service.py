@@ -85,15 +85,11 @@ class Service:
                     return
             time.sleep(poll_s)
 
-    def save_artifacts(self, job_id: str, folder: Path) -> list[Path]:
-        """Download every artifact of a job into a folder."""
-        folder.mkdir(parents=True, exist_ok=True)
-        saved = []
-        for item in self._document("GET", f"/jobs/{job_id}/artifacts")["items"]:
-            target = folder / Path(item["name"]).name
-            target.write_bytes(self._request("GET", f"/jobs/{job_id}/artifacts/{item['name']}").content)
-            saved.append(target)
-        return saved
+    def artifacts(self, job_id: str) -> dict[str, bytes]:
+        """Give every file that a job left behind, by name."""
+        items = self._document("GET", f"/jobs/{job_id}/artifacts")["items"]
+        names = [str(item["name"]) for item in items]
+        return {name: self._request("GET", f"/jobs/{job_id}/artifacts/{name}").content for name in names}
 
     def _document(self, method: str, path: str, **kwargs: Any) -> Document:
         document: Document = self._request(method, path, **kwargs).json()

@@ -1,0 +1,180 @@
+"""What the user sees: tables, progress, errors. Progress and errors go to stderr, answers to stdout."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, ParamSpec, TypeVar
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from cli.exits import CommandError, Exit
+
+Document = Mapping[str, Any]
+P = ParamSpec("P")
+R = TypeVar("R")
+
+STATUS_COLOURS = {
+    "queued": "yellow",
+    "running": "cyan",
+    "cancelling": "yellow",
+    "succeeded": "green",
+    "failed": "red",
+    "cancelled": "magenta",
+    "expired": "red",
+}
+
+
+def stdout() -> Console:
+    """Give the console for answers."""
+    return Console(highlight=False)
+
+
+def stderr() -> Console:
+    """Give the console for progress and errors."""
+    return Console(stderr=True, highlight=False)
+
+
+def print_json(document: object) -> None:
+    """Print a document for machines."""
+    sys.stdout.write(json.dumps(document, indent=1) + "\n")
+
+
+def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
+    """Print a command's error as a sentence (JSON with ``--json``) and exit with its code."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except CommandError as error:
+            if kwargs.get("as_json"):
+                sys.stderr.write(json.dumps(error.to_document()) + "\n")
+            else:
+                console = stderr()
+                where = f"{error.pointer}: " if error.pointer else ""
+                console.print(f"error: {where}{error.message}", style="red", markup=False)
+                if error.hint:
+                    console.print(f"       {error.hint}", markup=False)
+            raise typer.Exit(int(error.code)) from None
+
+    return wrapped
+
+
+class Meter:
+    """A progress bar fed with a job's progress documents."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task = progress.add_task("waiting", total=1.0, detail="")
+
+    def show(self, progress: Document | None, status: str = "running") -> None:
+        """Show one progress document."""
+        if progress is None:
+            self._progress.update(self._task, description=status)
+            return
+        self._progress.update(
+            self._task,
+            completed=float(progress.get("fraction") or 0.0),
+            description=str(progress.get("phase") or status),
+            detail=_detail(progress),
+        )
+
+
+@contextmanager
+def meter() -> Iterator[Meter]:
+    """Show a progress bar on stderr while the block runs."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description:<10}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[detail]}"),
+    )
+    with Progress(*columns, console=stderr(), transient=True) as progress:
+        yield Meter(progress)
+
+
+def fit_table(result: Document) -> Table:
+    """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
+    table = Table(title="Fit per sample (J in rad², RMS in mrad)")
+    for name in ("sample", "role"):
+        table.add_column(name)
+    for name in ("J rigid", "J initial", "J identified", "identified / rigid", "φ", "θ", "ψ"):
+        table.add_column(name, justify="right")
+    for row in result["fit"]:
+        rms = row["rms_rad"]
+        table.add_row(
+            str(row["sample"]),
+            str(row["role"]).replace("_", " "),
+            *(_short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
+            _short(row["J_identified"] / row["J_rigid"] if row["J_rigid"] else None),
+            *(_short(1e3 * rms[angle]) for angle in ("phi", "theta", "psi")),
+        )
+    return table
+
+
+def model_table(result: Document) -> Table:
+    """Show the identified joints, root to tip: stiffness (N m/rad) and damping (N m s/rad)."""
+    model = result["model"]
+    table = Table(title=f"Equivalent model, {model['links_per_wing']} links per wing")
+    table.add_column("joint")
+    for name in ("k flap", "k torsion", "k lag", "damping"):
+        table.add_column(name, justify="right")
+    damping = model["damping_nms_rad"]
+    for joint, stiffness in enumerate(model["stiffness_nm_rad"]):
+        own = damping[joint] if joint < len(damping) else damping[-1] if damping else None
+        shown = " ".join(_short(value) for value in own) if isinstance(own, Sequence) else _short(own)
+        table.add_row(str(joint + 1), *(_short(value) for value in stiffness), shown)
+    return table
+
+
+def jobs_table(jobs: Sequence[Document]) -> Table:
+    """Show jobs, one a line."""
+    table = Table()
+    for name in ("job", "operation", "status", "progress", "attempt", "created"):
+        table.add_column(name)
+    for job in jobs:
+        progress = job.get("progress") or {}
+        fraction = progress.get("fraction")
+        status = str(job["status"])
+        table.add_row(
+            str(job["id"]),
+            str(job.get("operation", "")),
+            f"[{STATUS_COLOURS.get(status, 'white')}]{status}[/]",
+            "" if fraction is None else f"{100.0 * fraction:.0f} % {_detail(progress)}",
+            str(job.get("attempt", "")),
+            str(job.get("created_at", "")),
+        )
+    return table
+
+
+def exit_for(status: str) -> Exit:
+    """Give the exit code that a job's final status means."""
+    return {"succeeded": Exit.OK, "cancelled": Exit.STOPPED, "expired": Exit.STOPPED}.get(status, Exit.FAILED)
+
+
+def _detail(progress: Document) -> str:
+    parts = []
+    if progress.get("best_cost") is not None:
+        parts.append(f"cost {_short(progress['best_cost'])}")
+    if progress.get("flights"):
+        parts.append(f"{progress['flights']:,} flights")
+    if progress.get("flights_per_s"):
+        parts.append(f"{progress['flights_per_s']:,.0f}/s")
+    if progress.get("eta_s") is not None:
+        parts.append(f"{progress['eta_s']:.0f} s left")
+    if not parts and progress.get("message"):
+        parts.append(str(progress["message"]))
+    return ", ".join(parts)
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"
