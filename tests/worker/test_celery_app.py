@@ -1,0 +1,34 @@
+"""The queue's settings, each with its reason."""
+
+from __future__ import annotations
+
+from app.settings import load_settings
+from worker.celery_app import QUEUE, REAP, RUN_JOB, make_app
+
+
+def test_messages_are_hints() -> None:
+    """Messages are acknowledged early, fetched one at a time, and leave no result behind."""
+    conf = make_app(load_settings()).conf
+    assert conf.task_acks_late is False
+    assert conf.worker_prefetch_multiplier == 1
+    assert conf.worker_disable_prefetch is True
+    assert conf.task_ignore_result is True
+    assert conf.result_backend is None
+
+
+def test_the_reaper_runs_often_enough() -> None:
+    """Lease, one round of the reaper and loading kernels fit into 90 s after a worker's death."""
+    settings = load_settings()
+    schedule = make_app(settings).conf.beat_schedule["reap"]
+    assert schedule["task"] == REAP
+    assert settings.lease_s + schedule["schedule"] <= 75.0
+    assert schedule["options"]["expires"] <= schedule["schedule"], (
+        "rounds that nobody made are not caught up with"
+    )
+
+
+def test_app_and_worker_agree_on_names() -> None:
+    """The API publishes the task that the worker knows, on the queue that it listens to."""
+    from app.jobs import queue
+
+    assert (queue.TASK_NAME, queue.QUEUE_NAME) == (RUN_JOB, QUEUE)

@@ -1,0 +1,77 @@
+"""Threads and kernels of a worker process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from worker import shutdown
+from worker.numerics import Kernels, prepare_environment, share_cores
+
+
+@pytest.mark.parametrize(
+    ("cores", "concurrency", "threads"), [(8, 1, 8), (8, 3, 2), (2, 4, 1), (1, 1, 1), (7, 2, 3)]
+)
+def test_concurrent_jobs_share_the_cores(cores: int, concurrency: int, threads: int) -> None:
+    """Threads times jobs never exceed the cores, unless there are more jobs than cores: then each has one."""
+    assert share_cores(concurrency, cores=cores) == threads
+
+
+def test_thread_counts_are_fixed_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The environment that children inherit holds the thread count and a layer that survives a fork."""
+    for name in ("NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    prepare_environment(3)
+    assert os.environ["NUMBA_NUM_THREADS"] == "3"
+    assert os.environ["NUMBA_THREADING_LAYER"] == "workqueue"
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+
+
+def test_kernels_warm_up_once() -> None:
+    """However often a process asks, the kernels are made ready once."""
+    calls: list[int] = []
+    kernels = Kernels(calls.append, threads=2)
+    kernels.start()
+    assert kernels.wait(lambda: False)
+    assert kernels.wait(lambda: False)
+    assert calls == [2]
+
+
+def test_waiting_for_kernels_can_be_stopped() -> None:
+    """A wait for the compiler ends when it is told to."""
+    release = threading.Event()
+    kernels = Kernels(lambda _threads: release.wait(10.0), threads=1)
+    assert not kernels.wait(lambda: True, poll_s=0.01)
+    release.set()
+
+
+def test_a_failing_warm_up_does_not_block() -> None:
+    """When the kernels cannot be made ready, the job itself meets the trouble and reports it."""
+
+    def broken(_threads: int) -> None:
+        raise OSError("no cache directory")
+
+    assert Kernels(broken, threads=1).wait(lambda: False)
+
+
+def test_the_parent_process_loads_no_compiler(root: Path) -> None:
+    """The pool's parent imports the whole worker without numba: its forks stay sound."""
+    program = "import sys, worker.celery_app, worker.tasks; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], cwd=root, check=False).returncode == 0
+
+
+def test_children_learn_of_the_shutdown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The parent's announcement reaches whoever inherits its environment, and is forgotten afterwards."""
+    monkeypatch.delenv(shutdown.VARIABLE, raising=False)
+    assert not shutdown.announced()
+    shutdown.arm()
+    assert not shutdown.announced()
+    shutdown.announce()
+    assert shutdown.announced()
+    shutdown.disarm()
+    assert not shutdown.announced()
