@@ -1,9 +1,9 @@
 """Velocity induced by straight vortices, regularised by a core.
 
-Both laws are written without the difference of nearly equal numbers that the textbook form (Katz & Plotkin
-2001, equation 10.115) suffers from on the vortex's extension. There the true velocity vanishes, while
-rounding noise divided by the squared distance from the line does not, and a lattice written so blows up
-whenever a control point comes into line with an edge or a trailing leg.
+Both laws are written without the difference of nearly equal numbers of the textbook form (Katz & Plotkin
+2001, equation 10.115), which on the vortex's extension, where the true velocity vanishes, divides rounding
+noise by the squared distance from the line and ends in 0/0. On a straight wing every edge lies in line with
+its neighbours.
 
 The core is Vatistas's (Vatistas, Kozel & Mih 1991, n = 2): a factor h^2 / sqrt(h^4 + core^4), with h the
 distance from the vortex's *line*, so that a vortex cut in two induces what the whole one does.
@@ -49,7 +49,7 @@ def segment_velocity(ax, ay, az, ex, ey, ez, core4):
 
 @inlined
 def leg_velocity(ax, ay, az, ux, uy, uz, core4):
-    """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along ``u`` from P + a, at P.
+    """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along u from P + a, at P.
 
     ``u`` is a unit vector. Circulation is right-handed about ``u``; arguments as in ``segment_velocity``.
     """
