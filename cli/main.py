@@ -1,8 +1,8 @@
 """The ``morphid`` command. Every command imports what it needs when it runs, so `jobs ls` loads no numba.
 
 Exit codes: 0 done; 1 the job failed; 2 wrong usage; 3 an input is missing or refused; 4 the job was
-cancelled or ran out of time (a partial result may be there); 5 no service answers; 6 this machine lacks a port, a
-program or a writable directory; 130 Ctrl-C.
+cancelled or ran out of time (a partial result may be there); 5 no service answers; 6 this machine lacks
+a port, a program or a writable directory; 130 Ctrl-C.
 """
 
 from __future__ import annotations

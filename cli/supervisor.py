@@ -211,11 +211,15 @@ class Supervisor:
     def watch(self) -> None:
         """Tend the children until the end is requested."""
         while not self._stopping:
-            for child in self.children.values():
-                event = child.tend()
-                if event is not None:
-                    self._report(event)
+            self.tend()
             self._sleep(POLL_S)
+
+    def tend(self) -> None:
+        """Look after each child once."""
+        for child in self.children.values():
+            event = child.tend()
+            if event is not None:
+                self._report(event)
 
     def stop(self) -> None:
         """End all children, the last started first."""
