@@ -138,7 +138,16 @@ def sample_document(path: Path, role: str) -> Document:
 
     _must_exist(path)
     trajectory = load_trajectory(path)
-    return {**trajectory.to_document(), "name": path.stem, "role": role}
+    return {
+        "name": path.stem,
+        "role": role,
+        "time_s": trajectory.time_s.tolist(),
+        "sweep_left_rad": trajectory.sweep_left.tolist(),
+        "sweep_right_rad": trajectory.sweep_right.tolist(),
+        "phi_rad": trajectory.phi.tolist(),
+        "theta_rad": trajectory.theta.tolist(),
+        "psi_rad": trajectory.psi.tolist(),
+    }
 
 
 def read_json(path: Path) -> Any:
