@@ -137,8 +137,7 @@ def gust_velocity(gust: CosineGust, airspeed: float, times: Array) -> Array:
 
 
 def turbulence_scales(turbulence: DrydenTurbulence, altitude_m: float) -> tuple[Array, Array]:
-    """Standard deviations (m/s) and lengths (m) of the u, v, w turbulence, (3,) each, at an altitude above
-    ground.
+    """Standard deviations (m/s) and lengths (m) of u, v, w, (3,) each, at an altitude above ground.
 
     MIL-F-8785C, section 3.7.2 (high) and 3.7.3.4 (low altitude).
     """
@@ -192,7 +191,7 @@ def _covariance(step: Array) -> Array:
 
 
 def _factor(covariance: Array) -> Array:
-    """Lower Cholesky factors (..., 2, 2), for tiny steps too, where rounding may turn the last pivot negative."""
+    """Lower Cholesky factors (..., 2, 2), for tiny steps too, where rounding can spoil the last pivot."""
     l11 = np.sqrt(covariance[..., 0, 0])
     l21 = covariance[..., 0, 1] / l11
     l22 = np.sqrt(np.maximum(covariance[..., 1, 1] - l21**2, 0.0))

@@ -27,10 +27,10 @@ from morphcore.geometry.lattice import SurfaceLattice
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Core radius as a fraction of the panel chord (2.5 per cent of the chord at four rows). Control points lie
-# half a panel chord from their bound vortex: Vatistas's factor there is 1 - (0.1 / 0.5)^4 / 2, so it moves
-# the self-influence by less than 1e-3, while a leg that strikes a control point induces no more than
-# gamma / (2.8 pi core).
+# Core radius as a fraction of the smaller side of a panel (2.5 per cent of the chord at four rows). Control
+# points lie half a panel from their own ring's edges: Vatistas's factor there is 1 - (0.1 / 0.5)^4 / 2, so it
+# moves the self-influence by less than 1e-3, while a leg that strikes a control point induces no more than
+# gamma / (2 sqrt(2) pi core).
 VORTEX_CORE = 0.1
 
 
@@ -51,8 +51,7 @@ class RingTable:
     edge_panel : (e, 2) the panels that carry the edge's force in equal parts (one panel twice at root, tip,
         fronts).
     leg_start, leg_plus, leg_minus : (l,) trailing-edge corner and rings of each wake leg.
-    edge_panel_chord, leg_panel_chord : (e,), (l,) mean panel chord of the surface, m; the core is referred to
-        it.
+    edge_panel_size, leg_panel_size : (e,), (l,) smaller side of the surface's panels, m, for the core.
     ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
     panel_surface, panel_row, panel_strip : (r,) surface, row and strip (within the surface) of each panel.
     panel_side : (r,) +1 on right surfaces, -1 on left ones.
@@ -67,8 +66,8 @@ class RingTable:
     leg_start: IntArray
     leg_plus: IntArray
     leg_minus: IntArray
-    edge_panel_chord: Array
-    leg_panel_chord: Array
+    edge_panel_size: Array
+    leg_panel_size: Array
     ring_corner: IntArray
     panel_surface: IntArray
     panel_row: IntArray
@@ -135,7 +134,7 @@ def influence(
     ----------
     points_B : (p, 3) m. corners_B : (c, 3) ring corners in the order of the table, m.
     wake_direction_B : (3,) direction of the free stream, from nose to tail; any length.
-    core : core radius as a fraction of each surface's panel chord, above 0.
+    core : core radius as a fraction of the smaller side of each surface's panels, above 0.
     mach : of the free stream. Goethert's rule: the geometry is stretched along the free stream by 1 / beta,
         beta^2 = 1 - mach^2, and the velocity along it by 1 / beta.
 
@@ -168,11 +167,11 @@ def influence(
         table.edge_end,
         table.edge_plus,
         table.edge_minus,
-        core * table.edge_panel_chord,
+        core * table.edge_panel_size,
         table.leg_start,
         table.leg_plus,
         table.leg_minus,
-        core * table.leg_panel_chord,
+        core * table.leg_panel_size,
         u_B,
         np.empty((3, points.shape[0])),
         out,
@@ -291,8 +290,8 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
         "leg_start": corners[-1],
         "leg_plus": leg_plus,
         "leg_minus": leg_minus,
-        "edge_panel_chord": np.full(start.size, lattice.panel_chord_m),
-        "leg_panel_chord": np.full(strips + 1, lattice.panel_chord_m),
+        "edge_panel_size": np.full(start.size, lattice.panel_size_m),
+        "leg_panel_size": np.full(strips + 1, lattice.panel_size_m),
         "ring_corner": np.stack([quarter.ravel() for quarter in quarters], axis=1),
         "panel_surface": np.full(rows * strips, index),
         "panel_row": row,

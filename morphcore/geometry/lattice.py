@@ -75,9 +75,9 @@ class SurfaceLattice:
         return float(self.panel_area_m2.sum())
 
     @property
-    def panel_chord_m(self) -> float:
-        """Mean chord of a panel, the length to which the vortex core is referred."""
-        return float(self.strip_chord_m.mean()) / self.chordwise
+    def panel_size_m(self) -> float:
+        """Smaller of a panel's mean chord and width: the length to which the vortex core is referred."""
+        return min(float(self.strip_chord_m.mean()) / self.chordwise, float(self.strip_edges_m[1]))
 
 
 def surface_lattice(

@@ -1,0 +1,49 @@
+"""Vortex lattices of single surfaces and their place on the aircraft."""
+
+import numpy as np
+import pytest
+
+from morphcore.geometry.aircraft import load_aircraft
+from morphcore.geometry.lattice import surface_lattice, surface_pose
+from tests.aero.planforms import EXAMPLES, straight_wings
+
+
+def test_panels_tile_the_planform():
+    """Panel areas add up to the planform and equal the areas of the quadrilaterals between the corners."""
+    right, left = straight_wings(2.0, 0.5, 0.2).surfaces
+    for surface in (right, left):
+        lattice = surface_lattice(surface, 3, 7)
+        assert lattice.area_m2 == pytest.approx(surface.area_m2, rel=1e-14)
+        diagonal = lattice.panel_corners_W[1:, 1:] - lattice.panel_corners_W[:-1, :-1]
+        other = lattice.panel_corners_W[1:, :-1] - lattice.panel_corners_W[:-1, 1:]
+        area = 0.5 * np.abs(np.cross(diagonal, other)[..., 2])
+        np.testing.assert_allclose(area, lattice.panel_area_m2, rtol=1e-13)
+
+
+def test_rings_start_at_a_quarter_and_end_at_the_trailing_edge():
+    """Ring fronts lie at a quarter panel chord, control points at three quarters, the aft edge at 1."""
+    lattice = surface_lattice(straight_wings(3.0, 0.3, 0.3).surfaces[0], 4, 10)
+    fronts, controls = np.array([0.25, 1.25, 2.25, 3.25, 4.0]), np.array([0.75, 1.75, 2.75, 3.75])
+    np.testing.assert_allclose(lattice.ring_corners_W[:, 0, 0], 0.15 - 0.075 * fronts, atol=1e-15)
+    np.testing.assert_allclose(lattice.control_points_W[:, 0, 0], 0.15 - 0.075 * controls, atol=1e-15)
+    np.testing.assert_allclose(lattice.control_points_W[0, :, 1], 0.15 + 0.3 * np.arange(10), rtol=1e-14)
+    np.testing.assert_array_equal(lattice.ring_corners_W[-1], lattice.panel_corners_W[-1])
+
+
+def test_left_is_the_mirror_of_right():
+    """The left lattice is the right one mirrored in the x-z plane, its pose at the same hinge angle too."""
+    right, left = load_aircraft(EXAMPLES / "aircraft.json").surfaces
+    mirror = np.array([1.0, -1.0, 1.0])
+    points = []
+    for surface in (right, left):
+        R_BW, r_B = surface_pose(surface, 0.7)
+        points.append(surface_lattice(surface).ring_corners_W @ R_BW.T + r_B)
+    np.testing.assert_array_equal(points[0] * mirror, points[1])
+
+
+def test_positive_sweep_moves_the_tip_aft():
+    """A swept tip lies sin(sweep) spans behind its root; the root stays on the hinge."""
+    right, _ = load_aircraft(EXAMPLES / "aircraft.json").surfaces
+    R_BW, r_B = surface_pose(right, 0.5)
+    np.testing.assert_array_equal(r_B, right.position_m)
+    np.testing.assert_allclose(R_BW @ [0, 3, 0], (-3 * np.sin(0.5), 3 * np.cos(0.5), 0), rtol=1e-15)

@@ -1,0 +1,111 @@
+"""The laws of straight vortices, against quadrature of Biot and Savart."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from morphcore.aero.kernels.vortex import leg_velocity, segment_velocity
+from morphcore.jit import kernel
+
+TINY_CORE = 1e-9  # of a metre: no core at the distances of these tests
+
+
+@kernel
+def _segment(a, e, core4):  # the inlined laws are called from kernels only
+    return segment_velocity(a[0], a[1], a[2], e[0], e[1], e[2], core4)
+
+
+@kernel
+def _leg(a, u, core4):
+    return leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core4)
+
+
+def segment(start, end, point, core=TINY_CORE):
+    """Velocity at a point of a segment of unit circulation."""
+    start, end, point = (np.asarray(v, dtype=float) for v in (start, end, point))
+    return np.array(_segment(start - point, end - start, core**4))
+
+
+def leg(start, direction, point, core=TINY_CORE):
+    """Velocity at a point of a semi-infinite vortex of unit circulation."""
+    start, direction, point = (np.asarray(v, dtype=float) for v in (start, direction, point))
+    return np.array(_leg(start - point, direction / np.linalg.norm(direction), core**4))
+
+
+def biot_savart(start, end, point):
+    """Quadrature of (1 / 4 pi) dl x r / |r|^3 along the segment."""
+    start, end, point = (np.asarray(v, dtype=float) for v in (start, end, point))
+
+    def integrand(s, axis):
+        r = point - start - s * (end - start)
+        return np.cross(end - start, r)[axis] / np.linalg.norm(r) ** 3 / (4 * np.pi)
+
+    return np.array([quad(integrand, 0, 1, args=(axis,), epsabs=1e-13, epsrel=1e-12)[0] for axis in range(3)])
+
+
+POINTS = [(0.3, 0.2, -0.1), (2.5, 0.4, 0.3), (-1.0, 0.2, 0.5), (0.9, -0.3, 0.05), (40.0, 30.0, 20.0)]
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_segment_follows_biot_savart(point):
+    """A segment induces what quadrature of Biot and Savart gives, beside it, beyond its ends, far away."""
+    start, end = (0.1, -0.2, 0.3), (1.2, 0.4, -0.1)
+    expected = biot_savart(start, end, point)
+    # quadrature to 1e-12 of the largest component
+    np.testing.assert_allclose(
+        segment(start, end, point), expected, rtol=0, atol=1e-10 * np.abs(expected).max()
+    )
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_leg_is_a_long_segment(point):
+    """A semi-infinite vortex is the limit of long segments: the rest beyond 1e7 m is below 1e-14 1/m."""
+    start, direction = np.array((0.1, -0.2, 0.3)), np.array((-0.9, 0.1, -0.4))
+    far = start + 1e7 * direction / np.linalg.norm(direction)
+    expected = segment(start, far, point)
+    np.testing.assert_allclose(leg(start, direction, point), expected, rtol=1e-9, atol=1e-13)
+
+
+def test_law_of_the_infinite_vortex():
+    """Two opposite legs from one point make the plane vortex 1 / (2 pi h), right-handed."""
+    point = np.array((0.0, 0.25, 0.0))
+    whole = leg((0, 0, 0), (1, 0, 0), point) - leg((0, 0, 0), (-1, 0, 0), point)
+    np.testing.assert_allclose(whole, (0, 0, 1 / (2 * np.pi * 0.25)), rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("core", [TINY_CORE, 0.05])
+@pytest.mark.parametrize("point", [(0.5, 0.01, 0.0), (0.3, 0.0, 0.2), (2.0, 0.02, 0.01), (-0.1, 0.001, 0.0)])
+def test_cut_vortex_induces_what_the_whole_does(core, point):
+    """With or without core, a segment or a leg cut in two induces what the whole one does."""
+    a, b, c = (0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (1.0, 0.0, 0.0)
+    parts = segment(a, b, point, core) + segment(b, c, point, core)
+    np.testing.assert_allclose(parts, segment(a, c, point, core), rtol=1e-11, atol=1e-15)
+    parts = segment(a, c, point, core) + leg(c, (1, 0, 0), point, core)
+    np.testing.assert_allclose(parts, leg(a, (1, 0, 0), point, core), rtol=1e-11, atol=1e-15)
+
+
+def test_core_spares_the_distance_and_bounds_the_middle():
+    """The core changes the velocity by (core/h)^4 / 2 far out; the peak is 1 / (2 sqrt(2) pi core)."""
+    core, ends = 0.0075, ((0.0, -50.0, 0.0), (0.0, 50.0, 0.0))
+    speed = [np.linalg.norm(segment(*ends, (h, 0, 0), core)) for h in (0.0375, 0.1)]
+    plane = [1 / (2 * np.pi * h) for h in (0.0375, 0.1)]
+    assert 0.5 * (core / 0.0375) ** 4 == pytest.approx(1 - speed[0] / plane[0], rel=0.01)
+    assert 1 - speed[0] / plane[0] < 1e-3
+    assert 1 - speed[1] / plane[1] < 2e-5
+    near = [np.linalg.norm(segment(*ends, (h, 0.3, 0), core)) for h in np.geomspace(1e-6, 1.0, 400)]
+    assert max(near) <= 1.0001 / (2 * np.pi * core * np.sqrt(2))
+    assert max(near) > 0.99 / (2 * np.pi * core * np.sqrt(2))
+
+
+@pytest.mark.parametrize("point", [(0, 0, 0), (1, 0, 0), (0.5, 0, 0), (2, 0, 0), (-3, 0, 0)])
+def test_nothing_on_the_line(point):
+    """On its own line, ends and middle included, a vortex induces exactly nothing."""
+    assert not segment((0, 0, 0), (1, 0, 0), point, 0.01).any()
+    assert not leg((0, 0, 0), (1, 0, 0), point, 0.01).any()
+
+
+def test_no_cancellation_on_the_extension():
+    """Ahead of a leg, nearly in line with it, the velocity is h / (8 pi d^2) to ten digits."""
+    h, d = 1e-7, 0.2
+    speed = leg((0, 0, 0), (1, 0, 0), (-d, h, 0), core=1e-12)[2]
+    assert speed == pytest.approx(h / (8 * np.pi * d**2), rel=1e-10)
