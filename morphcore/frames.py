@@ -1,7 +1,7 @@
 """Rotations between frames: quaternions inside, Euler angles (z-y-x) at the doors.
 
-``R_NB`` takes components in B (body, forward-right-down) to components in N (north-east-down): ``v_N = R_NB @ v_B``.
-Quaternions are ``(w, x, y, z)`` and describe ``R_NB``. All functions broadcast over leading axes.
+``R_NB`` takes components in B (body, forward-right-down) to components in N (north-east-down): ``v_N = R_NB @
+v_B``. Quaternions are ``(w, x, y, z)`` and describe ``R_NB``. All functions broadcast over leading axes.
 Source: Stevens, Lewis & Johnson (2016), section 1.3 and 1.8.
 """
 
@@ -51,7 +51,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 
 
 def axis_rotation(axis: int, angle: float) -> Array:
-    """Rotation by ``angle`` (rad, right-handed) about coordinate axis 0, 1 or 2: child components to parent's."""
+    """Rotation by ``angle`` (rad, right-handed) about axis 0, 1 or 2: child components to parent's."""
     c, s = np.cos(angle), np.sin(angle)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     rotation = np.eye(3)

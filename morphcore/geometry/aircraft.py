@@ -25,7 +25,8 @@ MACH_LIMIT = 0.7  # beyond, Prandtl-Glauert's linear compressibility does not ho
 class Fuselage:
     """A rigid body without aerodynamic force.
 
-    ``centre_of_mass_B`` in m from the reference point; ``inertia_B`` (3, 3) in kg m^2 about the centre of mass.
+    ``centre_of_mass_B`` in m from the reference point; ``inertia_B`` (3, 3) in kg m^2 about the centre of
+    mass.
     """
 
     mass_kg: float
@@ -49,7 +50,7 @@ class Aircraft:
 
 @dataclass(frozen=True)
 class Start:
-    """A measured start: angle of attack (rad), constant force (N) and moment (N m) in B at the reference point."""
+    """A measured start: angle of attack (rad), constant force (N) and moment (N m) in B at its origin."""
 
     alpha_rad: float
     force_B: Array
@@ -58,7 +59,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Flight:
-    """The flight condition. ``mach`` is None for incompressible flow. ``wind_N`` is the air's velocity in N, m/s."""
+    """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s."""
 
     airspeed_m_s: float
     air_density_kg_m3: float
@@ -80,7 +81,7 @@ def load_aircraft(path: str | Path) -> Aircraft:
 
 
 def load_flight(path: str | Path) -> Flight:
-    """Read a flight condition from its JSON file. Raises InvalidInput with a pointer to the field at fault."""
+    """Read a flight condition from its JSON file. Raises InvalidInput that points to the field at fault."""
     return flight_from_document(_read_json(path))
 
 
@@ -143,7 +144,9 @@ def _read_json(path: str | Path) -> dict[str, Any]:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InvalidInput(f"{path} does not exist", hint="check the path") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InvalidInput(f"{path} cannot be read: {error.strerror}", hint="check the path") from None
+    except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of absurd numbers
         raise InvalidInput(f"{path} is not JSON: {error}", hint="see examples/aircraft.json") from None
     if not isinstance(document, dict):
         raise InvalidInput(f"{path} holds no JSON object", hint="see examples/aircraft.json")
@@ -151,14 +154,15 @@ def _read_json(path: str | Path) -> dict[str, Any]:
 
 
 def _fuselage(fields: Fields) -> Fuselage:
-    fields.text("shape", default="box")
+    fields.choice("shape", ("box",), default="box")
     centre = fields.vector("centre_of_mass_m", default=(0.0, 0.0, 0.0))
     if fields.has("mass_kg"):
         mass = fields.number("mass_kg", above=0.0, most=1e7)
         inertia = fields.matrix3("inertia_kg_m2")
-        if np.linalg.eigvalsh(inertia).min() <= 0:
+        least, middle, most = np.linalg.eigvalsh(inertia)
+        if least <= 0 or most > (least + middle) * (1 + 1e-9):
             raise InvalidInput(
-                "the inertia is not positive definite",
+                "no rigid body has this inertia: a principal moment is negative or above the others' sum",
                 pointer=f"{fields.pointer}/inertia_kg_m2",
                 hint="give the inertia about the centre of mass, products with their sign",
             )
@@ -178,7 +182,9 @@ def _surface(fields: Fields) -> Surface:
     tip = fields.optional_number("tip_chord_m", above=0.0, most=50.0) or root
     if root is None or tip is None:
         raise InvalidInput(
-            "no chord is given", pointer=f"{fields.pointer}/chord_m", hint="give chord_m, or root_chord_m and tip_chord_m"
+            "no chord is given",
+            pointer=f"{fields.pointer}/chord_m",
+            hint="give chord_m, or root_chord_m and tip_chord_m",
         )
     hinge = _hinge(fields.child("hinge")) if fields.has("hinge") else None
     position = fields.vector("position_m", default=hinge.position_m if hinge else None)
@@ -209,7 +215,9 @@ def _hinge(fields: Fields) -> Hinge:
     axis = fields.choice("axis", ("x", "y", "z"))
     fields.done()
     if low >= high:
-        raise InvalidInput("min_rad is not below max_rad", pointer=f"{fields.pointer}/min_rad", hint="swap them")
+        raise InvalidInput(
+            "min_rad is not below max_rad", pointer=f"{fields.pointer}/min_rad", hint="swap them"
+        )
     return Hinge((float(x), float(y), float(z)), axis, low, high)  # type: ignore[arg-type]
 
 
@@ -226,6 +234,12 @@ def _material(fields: Fields) -> Material:
 
 def _given_section(fields: Fields) -> GivenSection:
     ix, iy, iz = fields.vector("inertia_per_length_kg_m")
+    if min(ix, iz) < 0 or iy <= 0:
+        raise InvalidInput(
+            "inertia_per_length_kg_m has a negative entry, or none about the span",
+            pointer=f"{fields.pointer}/inertia_per_length_kg_m",
+            hint="give the moments about the section's centre of mass: chord axis, span axis, normal",
+        )
     section = GivenSection(
         ei_flap_n_m2=fields.number("ei_flap_n_m2", above=0.0),
         ei_lag_n_m2=fields.number("ei_lag_n_m2", above=0.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import reprlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -51,14 +52,14 @@ class Fields:
             raise self._error(name, f"{name} is not a string of 1 to 200 characters", "give a short name")
         return value
 
-    def choice(self, name: str, allowed: Sequence[str]) -> str:
+    def choice(self, name: str, allowed: Sequence[str], default: Any = _MISSING) -> str:
         """One of the allowed strings."""
-        value = self.raw(name)
+        value = self.raw(name, default)
         if value not in allowed:
-            raise self._error(name, f"{name} is {value!r}", f"use one of {', '.join(allowed)}")
+            raise self._error(name, f"{name} is {reprlib.repr(value)}", f"use one of {', '.join(allowed)}")
         return str(value)
 
-    def flag(self, name: str, default: bool) -> bool:
+    def flag(self, name: str, *, default: bool) -> bool:
         """A boolean."""
         value = self.raw(name, default)
         if not isinstance(value, bool):
@@ -87,8 +88,10 @@ class Fields:
         return self._checked(name, self._document[name], least, most, above)
 
     def _checked(self, name: str, value: Any, least: float, most: float, above: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self._error(name, f"{name} is {value!r}, not a finite number", "give a finite number in SI units")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
+            raise self._error(
+                name, f"{name} is {reprlib.repr(value)}, not a finite number", "give a number in SI units"
+            )
         if value <= above:
             raise self._error(name, f"{name} is {value:g}", f"it must be greater than {above:g}")
         if not least <= value <= most:
@@ -99,21 +102,21 @@ class Fields:
         """An integer with least <= value <= most."""
         value = self.raw(name, default)
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise self._error(name, f"{name} is {value!r}", f"give a whole number in {least}..{most}")
+            raise self._error(
+                name, f"{name} is {reprlib.repr(value)}", f"give a whole number in {least}..{most}"
+            )
         return value
 
     def series(self, name: str) -> Array:
         """A list of finite numbers as a read-only vector."""
-        value = self.raw(name)
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array([])
+        array = _floats(self.raw(name))
         if array.ndim != 1 or array.size == 0:
             raise self._error(name, f"{name} is not a list of numbers", "give a list of finite numbers")
         bad = np.flatnonzero(~np.isfinite(array))
         if bad.size:
-            raise self._error(f"{name}/{bad[0]}", f"{name} holds {array[bad[0]]} at row {bad[0]}", "remove or repair it")
+            raise self._error(
+                f"{name}/{bad[0]}", f"{name} holds {array[bad[0]]} at row {bad[0]}", "remove or repair it"
+            )
         array.setflags(write=False)
         return array
 
@@ -133,10 +136,7 @@ class Fields:
         return matrix
 
     def _shaped(self, name: str, value: Any, shape: tuple[int, ...], hint: str) -> Array:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array([])
+        array = _floats(value)
         if array.shape != shape or not np.all(np.isfinite(array)):
             raise self._error(name, f"{name} does not hold {shape} finite numbers", hint)
         array.setflags(write=False)
@@ -162,5 +162,28 @@ class Fields:
         for name in self._document:
             if name not in self._known:
                 near = difflib.get_close_matches(name, self._known, n=1)
-                hint = f"did you mean {near[0]}?" if near else f"known fields: {', '.join(sorted(self._known))}"
-                raise self._error(name, f"{name} is not a known field", hint)
+                hint = (
+                    f"did you mean {near[0]}?" if near else f"known fields: {', '.join(sorted(self._known))}"
+                )
+                escaped = str(name).replace("~", "~0").replace("/", "~1")  # RFC 6901, section 3
+                raise self._error(escaped, f"{str(name)[:60]} is not a known field", hint)
+
+
+def _finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
+def _floats(value: Any) -> Array:
+    """Nested lists of numbers as an array, nulls as NaN; empty where anything else is in them.
+
+    numpy would read numbers out of strings and truth values.
+    """
+    try:
+        if np.array(value).dtype.kind in "bSU":
+            return np.array([])
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-TORSION_SERIES_TERMS = 20  # odd terms of Saint-Venant's series; the sum is converged to 1e-9
+TORSION_SERIES_TERMS = 60  # odd terms of Saint-Venant's series; the sum is converged to 1e-9
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Material:
 class SectionProperties:
     """Structural properties per unit span at some stations, each of shape (stations,).
 
-    Stiffnesses EI, GJ in N m^2; mass in kg/m; inertia per length in kg m about axes through the section's centre of
-    mass, parallel to the wing axes: x (chord), y (span: torsion), z (normal).
+    Stiffnesses EI, GJ in N m^2; mass in kg/m; inertia per length in kg m about axes through the section's
+    centre of mass, parallel to the wing axes: x (chord), y (span: torsion), z (normal).
     """
 
     ei_flap: Array
@@ -75,7 +75,8 @@ class GivenSection:
 def torsion_constant(width: Array, height: Array) -> Array:
     """Saint-Venant torsion constant of a solid rectangle, m^4, shape of the inputs.
 
-    Timoshenko & Goodier (1970), equation 109.160: J = a b^3 (1/3 - 64 b / (pi^5 a) sum tanh(n pi a / 2 b) / n^5).
+    Timoshenko & Goodier (1970), equation 109.160: J = a b^3 (1/3 - 64 b / (pi^5 a) sum tanh(n pi a / 2 b) /
+    n^5).
     """
     a, b = np.maximum(width, height), np.minimum(width, height)
     n = np.arange(1, 2 * TORSION_SERIES_TERMS, 2)[:, None]

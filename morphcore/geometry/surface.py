@@ -21,8 +21,8 @@ DEFAULT_HINGE_RANGE_RAD = 1.3  # either way from unswept; at more the wing lies 
 class Hinge:
     """A hinge of prescribed motion between fuselage and surface.
 
-    ``axis`` "z" sweeps (positive: tip aft), "x" folds (positive: tip up), "y" sets incidence (positive: nose up), on
-    both sides alike. ``position_m`` is in B from the fuselage reference point.
+    ``axis`` "z" sweeps (positive: tip aft), "x" folds (positive: tip up), "y" sets incidence (positive: nose
+    up), on both sides alike. ``position_m`` is in B from the fuselage reference point.
     """
 
     position_m: tuple[float, float, float]
@@ -40,9 +40,9 @@ class Hinge:
 class Surface:
     """A flat lifting surface: straight mid-chord line along its own y, linear taper.
 
-    Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans +y, the left
-    one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the x (positive forward) of the elastic axis and of
-    the line of centres of mass, from mid-chord.
+    Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
+    +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the x (positive forward) of
+    the elastic axis and of the line of centres of mass, from mid-chord.
     """
 
     name: str

@@ -1,0 +1,82 @@
+"""Lifting surfaces: which way hinges turn, and planform geometry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from morphcore.frames import axis_rotation
+from morphcore.geometry.section import Material
+from morphcore.geometry.surface import Hinge, Surface
+
+WOOD = Material(500.0, 2.1e9, 0.3, 0.004)
+SIDES: tuple[Literal["right", "left"], ...] = ("right", "left")
+
+
+def surface(side: Literal["right", "left"], axis: Literal["x", "y", "z"]) -> Surface:
+    """A tapered surface hinged about one axis."""
+    return Surface(
+        name="wing",
+        side=side,
+        span_m=3.0,
+        root_chord_m=0.4,
+        tip_chord_m=0.2,
+        thickness_m=0.1,
+        material=WOOD,
+        hinge=Hinge((0.0, 0.35, 0.0), axis),
+        position_m=(0.0, 0.35, 0.0),
+        flexible=True,
+    )
+
+
+def turned(wing: Surface, direction: np.ndarray) -> np.ndarray:
+    """A direction of the wing's, in B, after a positive hinge motion."""
+    assert wing.hinge is not None
+    return axis_rotation(wing.hinge.axis_index, 0.3 * wing.rotation_sign) @ direction
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_positive_hinge_motion_goes_the_same_way_on_both_sides(side: Literal["right", "left"]) -> None:
+    """Sweep takes the tip aft (-x), fold takes it up (-z), incidence takes the leading edge up (-z)."""
+    span = np.array([0.0, surface(side, "z").span_sign, 0.0])
+    leading = np.array([1.0, 0.0, 0.0])
+    assert turned(surface(side, "z"), span)[0] < -0.2
+    assert turned(surface(side, "x"), span)[2] < -0.2
+    assert turned(surface(side, "y"), leading)[2] < -0.2
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_sides_are_mirror_images(axis: Literal["x", "y", "z"]) -> None:
+    """Equal hinge motion left and right is symmetric about the plane x-z."""
+    reflect = np.array([1.0, -1.0, 1.0])
+    direction = np.array([0.2, 1.0, 0.1])
+    right = turned(surface("right", axis), direction)
+    left = turned(surface("left", axis), direction * reflect)
+    np.testing.assert_allclose(left, right * reflect, atol=1e-16)
+
+
+def test_a_fixed_surface_has_no_rotation() -> None:
+    """Without a hinge the sign is neutral."""
+    assert replace(surface("left", "z"), hinge=None).rotation_sign == 1.0
+
+
+def test_area_is_the_integral_of_the_chord() -> None:
+    """Area and mean chord against quadrature of the chord along the span."""
+    wing = surface("right", "z")
+    area, _ = quad(lambda y: float(wing.chord_at(y)), 0.0, wing.span_m)
+    assert wing.area_m2 == pytest.approx(area)
+    assert wing.mean_chord_m == pytest.approx(area / wing.span_m)
+    np.testing.assert_allclose(wing.chord_at([0.0, 1.5, 3.0]), [0.4, 0.3, 0.2])
+
+
+def test_sections_follow_the_taper() -> None:
+    """Bending stiffness of a box goes with chord, lag stiffness with its cube; one station, one value."""
+    wing = surface("right", "z")
+    section = wing.section_at([0.0, 3.0])
+    assert section.ei_flap[0] / section.ei_flap[1] == pytest.approx(2.0)
+    assert section.ei_lag[0] / section.ei_lag[1] == pytest.approx(8.0)
+    assert wing.section_at(1.0).mass.shape == (1,)
