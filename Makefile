@@ -12,7 +12,7 @@ UV_INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraint
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-slow faults bench check format clean
+.PHONY: help setup demo serve test test-slow faults bench check openapi format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -62,6 +62,9 @@ check: setup  ## formatting, lint, types, import contracts, OpenAPI document, mi
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python .ci/gates.py
+
+openapi: setup  ## write docs/openapi.json from the code
+	@$(BIN)/python -m app.openapi
 
 format: setup  ## let ruff format and repair
 	@$(BIN)/ruff check --fix-only -q . ; $(BIN)/ruff format .

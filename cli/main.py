@@ -264,7 +264,9 @@ def _print_error(error: dict[str, Any]) -> None:
     where = f"{error['pointer']}: " if error.get("pointer") else ""
     detail = error.get("detail") or error.get("message") or ""
     hint = f" ({error['hint']})" if error.get("hint") else ""
-    stderr().print(f"error {error.get('code', '')}: {where}{detail}{hint}", style="red", markup=False)
+    stderr().print(
+        f"error {error.get('code', '')}: {where}{detail}{hint}", style="red", markup=False, soft_wrap=True
+    )
 
 
 def _flat(figures: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

@@ -59,9 +59,9 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
             else:
                 console = stderr()
                 where = f"{error.pointer}: " if error.pointer else ""
-                console.print(f"error: {where}{error.message}", style="red", markup=False)
+                console.print(f"error: {where}{error.message}", style="red", markup=False, soft_wrap=True)
                 if error.hint:
-                    console.print(f"       {error.hint}", markup=False)
+                    console.print(f"       {error.hint}", markup=False, soft_wrap=True)
             raise typer.Exit(int(error.code)) from None
 
     return wrapped

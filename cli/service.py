@@ -54,8 +54,8 @@ class Service:
         query: dict[str, str | int] = {"limit": limit}
         if status:
             query["status"] = status
-        items: Sequence[Document] = self._document("GET", "/jobs", params=query)["items"]
-        return items
+        found: Sequence[Document] = self._document("GET", "/jobs", params=query)["jobs"]
+        return found
 
     def job(self, job_id: str) -> Document:
         """Give one job."""
@@ -87,8 +87,8 @@ class Service:
 
     def artifacts(self, job_id: str) -> dict[str, bytes]:
         """Give every file that a job left behind, by name."""
-        items = self._document("GET", f"/jobs/{job_id}/artifacts")["items"]
-        names = [str(item["name"]) for item in items]
+        found = self._document("GET", f"/jobs/{job_id}/artifacts")["artifacts"]
+        names = [str(item["name"]) for item in found]
         return {name: self._request("GET", f"/jobs/{job_id}/artifacts/{name}").content for name in names}
 
     def _document(self, method: str, path: str, **kwargs: Any) -> Document:

@@ -84,7 +84,9 @@ def main() -> int:
                 bar.show(seen.get("progress"), seen["status"])
                 job = seen
         if job["status"] != "succeeded":
-            console.print(f"The job {job['status']}: {json.dumps(job.get('error'))}", style="red", markup=False)
+            console.print(
+                f"The job {job['status']}: {json.dumps(job.get('error'))}", style="red", markup=False
+            )
             return 1
         result, files = client.result(job["id"]), client.artifacts(job["id"])
     console.print(fit_table(result))

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.live import LiveService
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -22,3 +25,11 @@ def root() -> Path:
 def examples() -> Path:
     """The example aircraft, flight condition and sample flights."""
     return ROOT / "examples"
+
+
+@pytest.fixture(scope="session")
+def live_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveService]:
+    """One `morphid serve` for the whole run: API, worker and broker as users have them."""
+    service = LiveService(tmp_path_factory.mktemp("live")).start()
+    yield service
+    service.stop()

@@ -57,7 +57,9 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
     Path(folder).mkdir(parents=True, exist_ok=True)
     (Path(folder) / "result.json").write_text(json.dumps(result, indent=1))
     for row in result["fit"]:
-        print(f"{row['sample']:<16} {row['role']:<9} J {row['J_rigid']:.3g} -> {row['J_identified']:.3g} rad^2")
+        print(
+            f"{row['sample']:<16} {row['role']:<9} J {row['J_rigid']:.3g} -> {row['J_identified']:.3g} rad^2"
+        )
     return 0
 
 
