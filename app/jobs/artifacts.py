@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 
 from sqlalchemy import delete, insert
-from sqlalchemy.orm import Session
 
-from app.database import database_time
+from app.database import Session, database_time
 from app.tables import artifacts
 
 ARTIFACT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}")  # a plain file name: no folder, no dot file

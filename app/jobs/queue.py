@@ -85,5 +85,6 @@ class Publisher:
             self._thread = None
 
     def _run(self) -> None:
+        _client(self._broker_url)  # importing Celery takes a while: do it before the first job comes
         while (job_id := self._waiting.get()) is not None:
             publish(job_id, self._broker_url)

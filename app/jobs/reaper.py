@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
-from sqlalchemy.orm import Session
 
-from app.database import database_time
+from app.database import Session, database_time
 from app.documents import Document
 from app.jobs.records import HELD, JobStatus, ReapReport
 from app.jobs.store import transition

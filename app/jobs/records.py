@@ -112,3 +112,12 @@ class Event:
     type: str
     payload: Mapping[str, Any]
     at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class StoredArtifact:
+    """A file that a job left, without its content."""
+
+    name: str
+    media_type: str
+    size_bytes: int

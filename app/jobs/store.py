@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, select, update
-from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Row, Table, case, delete, insert, literal, select, update
 
-from app.database import database_time
+from app.database import Session, database_time
 from app.documents import Document, digest, finite, packed, unpacked
 from app.errors import IdempotencyConflict, JobNotFound
 from app.identifiers import new_identifier
@@ -202,6 +200,17 @@ def create_job(
     return get_job(session, owner, job_id)
 
 
+def _insert_new(session: Session, table: Table) -> Any:
+    """An INSERT that can leave existing rows alone, in the database's own words."""
+    if session.dialect.name == "sqlite":
+        from sqlalchemy.dialects import sqlite
+
+        return sqlite.insert(table)
+    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
+
+    return postgresql.insert(table)
+
+
 def _take_idempotency_key(
     session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
 ) -> Job | None:
@@ -215,9 +224,8 @@ def _take_idempotency_key(
         "job_id": job_id,
         "at": database_time(),
     }
-    dialect = sqlite if session.get_bind().dialect.name == "sqlite" else postgresql
     taken = session.execute(
-        dialect.insert(keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
+        _insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
     ).one_or_none()
     if taken is not None:
         return None

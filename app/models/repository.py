@@ -7,9 +7,8 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Row, insert, select
-from sqlalchemy.orm import Session
 
-from app.database import database_time
+from app.database import Session, database_time
 from app.documents import Document, packed, unpacked
 from app.errors import ModelNotFound
 from app.jobs.records import moment

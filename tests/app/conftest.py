@@ -11,6 +11,7 @@ import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +21,7 @@ UNPRIVILEGED_USER = "nobody"  # Postgres refuses to run as root
 START_S = 20.0
 
 
-def _as_ordinary_user() -> dict[str, object]:
+def _as_ordinary_user() -> dict[str, Any]:
     if os.geteuid() != 0:
         return {}
     account = pwd.getpwnam(UNPRIVILEGED_USER)
@@ -36,7 +37,7 @@ def postgres_server() -> Iterator[str]:
     folder = Path(tempfile.mkdtemp(prefix="morphid-pg-"))
     ordinary = _as_ordinary_user()
     if ordinary:
-        os.chown(folder, int(str(ordinary["user"])), int(str(ordinary["group"])))
+        os.chown(folder, ordinary["user"], ordinary["group"])
     data = folder / "data"
     environment = {"PATH": "/usr/bin:/bin", "TZ": "UTC", "LC_ALL": "C"}
     started = subprocess.run(

@@ -1,0 +1,1 @@
+"""Identification of an equivalent model from sample flights: the request side."""

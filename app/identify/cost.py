@@ -1,0 +1,61 @@
+"""What an identification would cost, before it is run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.identify.schemas import CostEstimate, EquivalentModel, IdentifyRequest, Search
+from app.schemas.samples import InlineSample
+
+# nominal figures, to an order of magnitude: what a request does not say is the solver's choice
+SWARM_PARTICLES = {"pso": 256, "hybrid": 128}
+PAPER_PARTICLES = 2500
+SWARM_GENERATIONS = {"pso": 200, "hybrid": 20}
+POLISH_STARTS = 4
+POLISH_ITERATIONS = 25
+REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
+REFERENCE_LINKS = 3
+
+
+def parameter_count(model: EquivalentModel) -> int:
+    """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections."""
+    joints = model.links_per_wing - 1
+    per_wing = 7 * joints
+    return per_wing * (2 if model.separate_wings else 1) + len(model.aero_coefficients)
+
+
+def _parameter_sets(search: Search, parameters: int) -> int:
+    """Count the parameter sets that a search flies through every training sample."""
+    sets = 0
+    if search.method in SWARM_PARTICLES:
+        particles = search.particles or (
+            PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[search.method]
+        )
+        sets += particles * (search.generations or SWARM_GENERATIONS[search.method])
+    if search.method != "pso":
+        sets += POLISH_STARTS * POLISH_ITERATIONS * (parameters + 1)
+    return sets
+
+
+def estimate(request: IdentifyRequest, samples: Sequence[InlineSample]) -> CostEstimate:
+    """Estimate flights and computing time.
+
+    Parameters
+    ----------
+    samples
+        The samples with their rows.
+    """
+    parameters = parameter_count(request.model)
+    sets = _parameter_sets(request.search, parameters)
+    training = [sample for sample in samples if sample.role == "train"]
+    flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
+    links = request.model.links_per_wing / REFERENCE_LINKS
+    core_s = flight_s / REAL_TIME_FACTOR * max(links, 1.0)
+    return CostEstimate(
+        samples=len(samples),
+        rows=sum(len(sample.time_s) for sample in samples),
+        parameters=parameters,
+        flights=sets * len(training),
+        flight_s=flight_s,
+        core_s=core_s,
+    )

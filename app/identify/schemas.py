@@ -1,0 +1,197 @@
+"""What POST /identify takes and what an identification results in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.fields import Strict
+from app.schemas.flight import EXAMPLE_FLIGHT, Flight
+from app.schemas.samples import EXAMPLE_SAMPLE, Sample
+
+MAX_SAMPLES = 64
+MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
+WEEK_S = 7 * 86_400.0
+
+Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
+Method = Literal["hybrid", "pso", "least_squares"]
+Range = Annotated[
+    list[Annotated[float, Field(ge=-1e15, le=1e15)]],
+    Field(min_length=2, max_length=2, description="[low, high], low below high."),
+]
+
+
+class Lattice(Strict):
+    """Panels of each wing's vortex lattice."""
+
+    chordwise: int = Field(default=4, ge=1, le=8)
+    spanwise: int = Field(default=10, ge=4, le=20)
+
+
+class Bounds(Strict):
+    """Where the search may look; what is left out gets bounds from beam theory around the physical guess."""
+
+    stiffness_nm_rad: Range | None = None
+    damping_nms_rad: Range | None = None
+    division: Range | None = Field(default=None, description="[low, high] of a link's share of the span.")
+    lift_factor: Range | None = None
+    centre_shift_m: Range | None = None
+    profile_drag: Range | None = None
+    lag_s: Range | None = None
+
+
+class EquivalentModel(Strict):
+    """The model whose parameters are sought: wings of rigid links with gimbal joints."""
+
+    links_per_wing: int = Field(default=3, ge=1, le=8)
+    separate_wings: bool = Field(
+        default=False, description="Left and right wings get parameters of their own."
+    )
+    aero_coefficients: list[Correction] = Field(
+        default=["lift_factor", "centre_shift_m", "profile_drag", "lag_s"],
+        max_length=4,
+        description="Aerodynamic corrections that are sought; the others keep their neutral values.",
+    )
+    bounds: Bounds | None = None
+    lattice: Lattice = Lattice()
+    step_s: Annotated[float, Field(ge=0.0005, le=0.01)] | None = Field(
+        default=None, description="Time step; the solver's own choice when left out."
+    )
+    start: Literal["trim", "given"] = Field(
+        default="trim", description="Trim each model by itself, or start from `flight.start`."
+    )
+
+
+class Search(Strict):
+    """How the parameters are sought; what is left out depends on the method."""
+
+    method: Method = "hybrid"
+    particles: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    generations: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
+        default=None, description="Pull to a particle's best."
+    )
+    c2: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
+        default=None, description="Pull to the swarm's best."
+    )
+    inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
+    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")
+    max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
+        default=None, description="Time budget of the search; the best so far is the result."
+    )
+    preset: Literal["paper"] | None = Field(
+        default=None, description="`paper`: 2500 particles, c1 = c2 = 1, as published."
+    )
+
+
+EXAMPLE_REQUEST: dict[str, Any] = {
+    "aircraft": EXAMPLE_AIRCRAFT,
+    "flight": EXAMPLE_FLIGHT,
+    "samples": [EXAMPLE_SAMPLE],
+    "model": {"links_per_wing": 3},
+    "search": {"method": "hybrid", "seed": 1},
+}
+
+
+class IdentifyRequest(Strict):
+    """Aircraft, flight condition and samples; model and search have good defaults."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
+
+    aircraft: Aircraft
+    flight: Flight
+    samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
+    model: EquivalentModel = EquivalentModel()
+    search: Search = Search()
+
+
+class CostEstimate(BaseModel):
+    """What an identification would take, to an order of magnitude."""
+
+    samples: int
+    rows: int
+    parameters: int = Field(description="Unknowns of the search.")
+    flights: int = Field(description="Flights to be flown: parameter sets times samples.")
+    flight_s: float = Field(description="Simulated time of all those flights.")
+    core_s: float = Field(description="Computing time on one core.")
+
+
+class IdentifyValidation(BaseModel):
+    """The request is valid."""
+
+    valid: Literal[True] = True
+    operation: Literal["identify"] = "identify"
+    cost: CostEstimate
+
+
+class Angles(BaseModel):
+    """One number per Euler angle."""
+
+    phi: float | None
+    theta: float | None
+    psi: float | None
+
+
+class SampleFit(BaseModel):
+    """How well one sample is met: J is the sum of squared angle errors, rad^2."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sample: str
+    role: str
+    J_rigid: float | None
+    J_initial: float | None
+    J_identified: float | None
+    rms_rad: Angles
+    max_abs_rad: Angles
+
+
+class AeroCorrections(BaseModel):
+    """Identified aerodynamic corrections."""
+
+    model_config = ConfigDict(extra="allow")
+
+    lift_factor: float
+    centre_shift_m: float
+    profile_drag: float
+    lag_s: float
+
+
+class IdentifiedParameters(BaseModel):
+    """The identified equivalent model."""
+
+    model_config = ConfigDict(extra="allow")
+
+    links_per_wing: int
+    division: list[Any] = Field(description="Share of the span of each link.")
+    stiffness_nm_rad: list[Any] = Field(description="Per joint [flap, torsion, lag].")
+    damping_nms_rad: list[Any] = Field(description="Per joint [flap, torsion, lag].")
+    aero: AeroCorrections
+
+
+class SearchReport(BaseModel):
+    """How the search went."""
+
+    model_config = ConfigDict(extra="allow")
+
+    method: str
+    seed: int
+    flights: int
+    generations: int
+    wall_s: float
+    history: list[dict[str, Any]]
+
+
+class IdentifyResult(BaseModel):
+    """Result of an identification."""
+
+    model_config = ConfigDict(extra="allow")
+
+    model: IdentifiedParameters
+    fit: list[SampleFit]
+    search: SearchReport
+    uncertainty: dict[str, Any] | None = None
+    cost: dict[str, Any] | None = None
+    partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")

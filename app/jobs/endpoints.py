@@ -1,0 +1,211 @@
+"""Endpoints of jobs."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi.responses import JSONResponse, StreamingResponse
+
+from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
+from app.http.context import OwnerDep, ServiceDep
+from app.http.prefer import PreferHeader, wait_seconds
+from app.http.problems import documented
+from app.identify.schemas import IdentifyResult
+from app.jobs import repository, service, store
+from app.jobs.artifacts import media_type
+from app.jobs.event_stream import stream_events, wait_for_end
+from app.jobs.records import JobStatus
+from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
+
+router = APIRouter(tags=["jobs"])
+
+JobId = Annotated[str, Path(pattern=r"^[A-Za-z0-9_]{1,64}$", examples=[EXAMPLE_ID])]
+# scripts in a plot or report never run with the service's rights
+ARTIFACT_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "private, max-age=60",
+}
+EVENT_STREAM: dict[int | str, dict[str, Any]] = {
+    200: {
+        "model": JobEventPage,
+        "description": "Events: a stream (`text/event-stream`), or a page (`Accept: application/json`).",
+        "content": {
+            "text/event-stream": {
+                "schema": {"type": "string"},
+                "example": 'id: 3\nevent: progress\ndata: {"fraction":0.25,"generation":5,"seq":3}\n\n',
+            }
+        },
+    },
+    204: {"description": "The job has ended and every event was seen: do not connect again."},
+}
+
+
+@router.get("/jobs", operation_id="list_jobs", summary="List jobs", responses=documented(InvalidRequest))
+def list_jobs(
+    app: ServiceDep,
+    owner: OwnerDep,
+    cursor: Annotated[
+        str | None, Query(pattern=r"^[A-Za-z0-9_]{1,64}$", description="From `next_cursor`.")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
+    operation: Annotated[Operation | None, Query()] = None,
+) -> JobPage:
+    """Your jobs, newest first, a page at a time."""
+    with app.database.read() as session:
+        return service.page(
+            session,
+            owner,
+            cursor=cursor,
+            limit=limit,
+            statuses=[item.value for item in status or []],
+            operation=operation,
+        )
+
+
+@router.get(
+    "/jobs/{job_id}",
+    operation_id="get_job",
+    summary="Look at a job",
+    responses=documented(InvalidRequest, JobNotFound),
+)
+async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: PreferHeader = None) -> Job:
+    """Status, progress, times and error of a job; with `Prefer: wait=n` it answers when the job has ended."""
+    wait_s = wait_seconds(prefer, app.settings.max_wait_s)
+    return Job.of(await wait_for_end(app, owner, job_id, wait_s))
+
+
+@router.get(
+    "/jobs/{job_id}/events",
+    operation_id="get_job_events",
+    summary="Follow a job",
+    response_class=JSONResponse,
+    response_model=JobEventPage,
+    responses={**EVENT_STREAM, **documented(InvalidRequest, JobNotFound)},
+)
+async def get_job_events(
+    request: Request,
+    app: ServiceDep,
+    owner: OwnerDep,
+    job_id: JobId,
+    after: Annotated[int, Query(ge=0, le=2**31 - 1, description="Only events after this number.")] = 0,
+    last_event_id: Annotated[
+        str | None,
+        Header(alias="Last-Event-ID", pattern=r"^\d{1,9}$", description="The same, as browsers send it."),
+    ] = None,
+) -> Response:
+    """Every event of the job from the beginning (or after a number), then those that come.
+
+    The stream ends with the job. Comment lines come between as signs of life.
+    """
+    seen = max(after, int(last_event_id or 0))
+
+    def read() -> JobEventPage:
+        with app.database.read() as session:
+            return service.event_page(session, owner, job_id, seen)
+
+    page = await asyncio.to_thread(read)
+    accepted = request.headers.get("accept", "")
+    if "application/json" in accepted and "text/event-stream" not in accepted:
+        return JSONResponse(page.model_dump(mode="json"))
+    if page.finished and not page.events:
+        return Response(status_code=204)
+    return StreamingResponse(
+        stream_events(app, owner, job_id, seen),
+        media_type="text/event-stream",
+        headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"},
+    )
+
+
+@router.get(
+    "/jobs/{job_id}/result",
+    operation_id="get_job_result",
+    summary="Get the result of a job",
+    response_model=IdentifyResult,
+    responses=documented(InvalidRequest, JobNotFound, ResultNotReady),
+)
+def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
+    """Return the result; of a cancelled or expired job the best so far, marked `"partial": true`."""
+    with app.database.read() as session:
+        text = service.result(session, owner, job_id)
+    return Response(text, media_type="application/json")
+
+
+@router.get(
+    "/jobs/{job_id}/artifacts",
+    operation_id="list_job_artifacts",
+    summary="List the files of a job",
+    responses=documented(InvalidRequest, JobNotFound),
+)
+def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> ArtifactList:
+    """Plots, curves and the result as files."""
+    with app.database.read() as session:
+        found = repository.list_artifacts(session, owner, job_id)
+    return ArtifactList(
+        artifacts=[
+            Artifact(
+                name=item.name,
+                media_type=item.media_type,
+                size_bytes=item.size_bytes,
+                href=f"/jobs/{job_id}/artifacts/{item.name}",
+            )
+            for item in found
+        ]
+    )
+
+
+@router.get(
+    "/jobs/{job_id}/artifacts/{name}",
+    operation_id="get_job_artifact",
+    summary="Get a file of a job",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The file.",
+            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+        },
+        **documented(InvalidRequest, ArtifactNotFound),
+    },
+)
+def get_job_artifact(
+    app: ServiceDep,
+    owner: OwnerDep,
+    job_id: JobId,
+    name: Annotated[str, Path(min_length=1, max_length=200, examples=["convergence.svg"])],
+) -> Response:
+    """Return one file, with its own media type."""
+    with app.database.read() as session:
+        _, data = repository.artifact_data(session, owner, job_id, name)
+    return Response(data, media_type=media_type(name), headers=ARTIFACT_HEADERS)
+
+
+@router.post(
+    "/jobs/{job_id}/cancel",
+    operation_id="cancel_job",
+    summary="Cancel a job",
+    responses=documented(InvalidRequest, JobNotFound),
+)
+def cancel_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Job:
+    """Cancel a job in any state.
+
+    A queued job ends at once; a running one within two seconds, and its best so far is a partial result; a
+    finished one stays as it is.
+    """
+    with app.database.write() as session:
+        return Job.of(store.request_cancel(session, owner, job_id))
+
+
+@router.delete(
+    "/jobs/{job_id}",
+    operation_id="delete_job",
+    summary="Delete a finished job",
+    status_code=204,
+    responses=documented(InvalidRequest, JobNotFound, JobNotFinished),
+)
+def delete_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> None:
+    """Delete a finished job with its events, result and files; its identified model stays."""
+    with app.database.write() as session:
+        repository.delete_job(session, owner, job_id)

@@ -1,0 +1,63 @@
+"""Server-sent events of a job: every row of its history once, then what comes, with signs of life between."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+from app.documents import json_bytes
+from app.errors import JobNotFound
+from app.http.context import Service
+from app.jobs import service as jobs
+from app.jobs.records import Job
+from app.jobs.schemas import JobEvent, JobEventPage
+from app.jobs.store import get_job
+
+KEEP_ALIVE = b": keep-alive\n\n"
+RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection asks again
+
+
+def formatted(event: JobEvent) -> bytes:
+    """Format one event as the HTML standard's event stream wants it."""
+    data = {**event.payload, "seq": event.seq, "at": event.at.isoformat()}
+    return f"id: {event.seq}\nevent: {event.type}\ndata: {json_bytes(data).decode()}\n\n".encode()
+
+
+async def stream_events(service: Service, owner: str, job_id: str, after: int) -> AsyncIterator[bytes]:
+    """Stream the events after number `after` until the job has ended, is deleted, or the service stops."""
+
+    def read() -> JobEventPage | None:
+        try:
+            with service.database.read() as session:
+                return jobs.event_page(session, owner, job_id, after)
+        except JobNotFound:
+            return None
+
+    yield RETRY
+    with service.watcher.watch(job_id) as subscription:
+        while (page := await asyncio.to_thread(read)) is not None:
+            for event in page.events:
+                yield formatted(event)
+            after = page.last_seq
+            if page.finished or service.watcher.closed:
+                return
+            if not page.events and not await subscription.wait(after, service.settings.keep_alive_s):
+                yield KEEP_ALIVE
+
+
+async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: float) -> Job:
+    """Wait until a job has ended, at most `timeout_s`, and return it as it is then."""
+
+    def read() -> Job:
+        with service.database.read() as session:
+            return get_job(session, owner, job_id)
+
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + timeout_s
+    with service.watcher.watch(job_id) as subscription:
+        while True:
+            job = await asyncio.to_thread(read)
+            left = deadline - loop.time()
+            if job.finished or left <= 0.0 or service.watcher.closed:
+                return job
+            await subscription.wait(job.event_seq, left)

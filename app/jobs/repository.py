@@ -1,0 +1,120 @@
+"""SQL of jobs as their owner sees them; every read is filtered by owner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sqlalchemy import delete, select
+
+from app.database import Session
+from app.documents import unpacked_json
+from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
+from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
+from app.jobs.store import JOB_COLUMNS, get_job, job_from_row
+from app.tables import artifacts, idempotency_keys, job_events, job_results, jobs
+
+
+def list_jobs(
+    session: Session,
+    owner: str,
+    *,
+    before: str | None,
+    limit: int,
+    statuses: Sequence[str] = (),
+    operation: str | None = None,
+) -> list[Job]:
+    """Newest jobs first, older than the id `before` when given."""
+    query = select(*JOB_COLUMNS).where(jobs.c.owner == owner).order_by(jobs.c.id.desc()).limit(limit)
+    if before is not None:
+        query = query.where(jobs.c.id < before)
+    if statuses:
+        query = query.where(jobs.c.status.in_(statuses))
+    if operation is not None:
+        query = query.where(jobs.c.operation == operation)
+    return [job_from_row(row) for row in session.execute(query)]
+
+
+def events_after(session: Session, owner: str, job_id: str, seq: int, limit: int) -> list[Event]:
+    """Events of a job after number `seq`, oldest first; empty for a job that is not the owner's."""
+    rows = session.execute(
+        select(job_events.c.seq, job_events.c.type, job_events.c.payload, job_events.c.at)
+        .join(jobs, jobs.c.id == job_events.c.job_id)
+        .where(jobs.c.owner == owner, job_events.c.job_id == job_id, job_events.c.seq > seq)
+        .order_by(job_events.c.seq)
+        .limit(limit)
+    )
+    return [Event(row.seq, row.type, row.payload, moment(row.at)) for row in rows]
+
+
+def result_json(session: Session, owner: str, job_id: str) -> bytes | None:
+    """Return the JSON text of a job's result, None while there is none.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    """
+    row = session.execute(
+        select(job_results.c.document)
+        .select_from(jobs)
+        .outerjoin(job_results, job_results.c.job_id == jobs.c.id)
+        .where(jobs.c.id == job_id, jobs.c.owner == owner)
+    ).one_or_none()
+    if row is None:
+        raise JobNotFound(job_id)
+    return None if row.document is None else unpacked_json(row.document)
+
+
+def list_artifacts(session: Session, owner: str, job_id: str) -> list[StoredArtifact]:
+    """Files of a job, by name.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    """
+    get_job(session, owner, job_id)
+    rows = session.execute(
+        select(artifacts.c.name, artifacts.c.media_type, artifacts.c.size_bytes)
+        .where(artifacts.c.job_id == job_id)
+        .order_by(artifacts.c.name)
+    )
+    return [StoredArtifact(row.name, row.media_type, row.size_bytes) for row in rows]
+
+
+def artifact_data(session: Session, owner: str, job_id: str, name: str) -> tuple[str, bytes]:
+    """Return media type and content of one file.
+
+    Raises
+    ------
+    ArtifactNotFound
+        When the job left no such file, or is not the owner's.
+    """
+    row = session.execute(
+        select(artifacts.c.media_type, artifacts.c.data)
+        .join(jobs, jobs.c.id == artifacts.c.job_id)
+        .where(jobs.c.id == job_id, jobs.c.owner == owner, artifacts.c.name == name)
+    ).one_or_none()
+    if row is None:
+        raise ArtifactNotFound(job_id, name)
+    return row.media_type, bytes(row.data)
+
+
+def delete_job(session: Session, owner: str, job_id: str) -> None:
+    """Delete a finished job with its events, result and files; its model stays.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    JobNotFinished
+        When it has not ended.
+    """
+    deleted = session.execute(
+        delete(jobs)
+        .where(jobs.c.id == job_id, jobs.c.owner == owner, jobs.c.status.in_(FINISHED))
+        .returning(jobs.c.id)
+    ).one_or_none()
+    if deleted is None:
+        raise JobNotFinished(job_id, get_job(session, owner, job_id).status.value)
+    session.execute(delete(idempotency_keys).where(idempotency_keys.c.job_id == job_id))

@@ -1,0 +1,170 @@
+"""Jobs on the wire."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.jobs.records import Job as StoredJob
+from app.jobs.records import JobStatus
+
+EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
+Operation = Literal["identify"]
+
+
+class Progress(BaseModel):
+    """How far a running job is."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    fraction: float | None = Field(default=None, description="0 to 1.")
+    phase: str | None = Field(default=None, examples=["swarm"])
+    message: str | None = None
+    generation: int | None = None
+    best_cost: float | None = Field(default=None, description="Sum of squared angle errors so far, rad^2.")
+    flights: int | None = Field(default=None, description="Flights flown so far.")
+    flights_per_s: float | None = None
+    eta_s: float | None = Field(default=None, description="Estimated time to the end.")
+
+
+class JobError(BaseModel):
+    """Why a job did not succeed."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    code: str = Field(
+        description="Stable, for programs.", examples=["worker_lost", "diverged", "invalid_input"]
+    )
+    detail: str
+    pointer: str = ""
+    hint: str = ""
+
+
+class SampleSummary(BaseModel):
+    """A sample of the request without its rows."""
+
+    name: str
+    role: str
+    rows: int
+
+
+class RequestSummary(BaseModel):
+    """The small facts of a job's request."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    aircraft: str | None = None
+    links_per_wing: int | None = None
+    method: str | None = None
+    samples: list[SampleSummary] = []
+
+
+class JobLinks(BaseModel):
+    """Where the parts of a job are."""
+
+    self: str
+    events: str
+    result: str
+    artifacts: str
+    cancel: str
+
+
+class Job(BaseModel):
+    """A piece of long work."""
+
+    id: str = Field(examples=[EXAMPLE_ID])
+    operation: str = Field(examples=["identify"])
+    status: JobStatus = Field(
+        description="`succeeded`, `failed`, `cancelled` and `expired` are final; `cancelling` winds down."
+    )
+    progress: Progress | None
+    error: JobError | None
+    partial: bool = Field(description="The result is the best so far of a job that did not run to its end.")
+    attempt: int = Field(
+        description="How often a worker took the job up; more than one after a worker was lost."
+    )
+    max_attempts: int
+    priority: int
+    request: RequestSummary
+    model_id: str | None = Field(
+        description="The identified model, once there is one: GET /models/{model_id}."
+    )
+    last_event: int = Field(description="Number of the newest event.")
+    created_at: datetime
+    started_at: datetime | None
+    updated_at: datetime
+    finished_at: datetime | None
+    deadline_at: datetime | None
+    links: JobLinks
+
+    @classmethod
+    def of(cls, job: StoredJob) -> Job:
+        """Show a stored job."""
+        at = f"/jobs/{job.id}"
+        return cls(
+            id=job.id,
+            operation=job.operation,
+            status=job.status,
+            progress=None if job.progress is None else Progress.model_validate(job.progress),
+            error=None if job.error is None else JobError.model_validate(job.error),
+            partial=job.partial,
+            attempt=job.attempt,
+            max_attempts=job.max_attempts,
+            priority=job.priority,
+            request=RequestSummary.model_validate(job.summary),
+            model_id=job.model_id,
+            last_event=job.event_seq,
+            created_at=job.created_at,
+            started_at=job.started_at,
+            updated_at=job.updated_at,
+            finished_at=job.finished_at,
+            deadline_at=job.deadline_at,
+            links=JobLinks(
+                self=at,
+                events=f"{at}/events",
+                result=f"{at}/result",
+                artifacts=f"{at}/artifacts",
+                cancel=f"{at}/cancel",
+            ),
+        )
+
+
+class JobPage(BaseModel):
+    """Jobs, newest first."""
+
+    jobs: list[Job]
+    next_cursor: str | None = Field(description="Pass as `cursor` to get the next page; null on the last.")
+
+
+class JobEvent(BaseModel):
+    """One event of a job's history."""
+
+    seq: int = Field(description="Counts up by one from 1.")
+    type: str = Field(description="`queued`, `started`, `progress`, `requeued`, ... or the final status.")
+    payload: dict[str, Any]
+    at: datetime
+
+
+class JobEventPage(BaseModel):
+    """Events, oldest first."""
+
+    events: list[JobEvent]
+    last_seq: int = Field(description="Pass as `after` to go on from here.")
+    finished: bool = Field(description="There will be no more events after these.")
+
+
+class Artifact(BaseModel):
+    """A file that a job left."""
+
+    name: str = Field(examples=["attitude_rate_0.5.svg"])
+    media_type: str = Field(examples=["image/svg+xml"])
+    size_bytes: int
+    href: str
+
+
+class ArtifactList(BaseModel):
+    """The files of a job."""
+
+    artifacts: list[Artifact]

@@ -1,0 +1,118 @@
+"""The API process: ``uvicorn --factory app.main:create_app`` (or ``app.main:app``)."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import threading
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from types import FrameType
+from typing import Any
+
+from fastapi import FastAPI
+
+from app.database import Database, upgrade
+from app.health.endpoints import router as health
+from app.http.body_limit import BodyLimit
+from app.http.context import Service
+from app.http.problems import install_problem_handlers
+from app.identify.endpoints import router as identify
+from app.jobs.endpoints import router as jobs
+from app.jobs.queue import Publisher
+from app.jobs.watch import JobWatcher
+from app.models.endpoints import router as models
+from app.openapi import openapi_document
+from app.settings import Settings, load_settings
+from app.trajectories.endpoints import router as trajectories
+from app.version import VERSION
+from app.web.endpoints import mount_static
+from app.web.endpoints import router as web
+
+
+def routed_app() -> FastAPI:
+    """Return the application with its routes, without settings, database or broker."""
+    app = FastAPI(title="MorphID", version=VERSION, docs_url=None, redoc_url=None)
+    for router in (identify, jobs, trajectories, models, health, web):
+        app.include_router(router)
+    mount_static(app)
+    app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]  # FastAPI's documented way
+    return app
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """Build the service; database and messages are opened when it starts.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Those of the environment when left out.
+    """
+    chosen = settings or load_settings()
+    app = routed_app()
+    app.router.lifespan_context = _lifespan(chosen)
+    install_problem_handlers(app, known_fields=lambda: _request_fields(app))
+    app.add_middleware(BodyLimit, max_bytes=chosen.max_body_bytes)
+    return app
+
+
+def _request_fields(app: FastAPI) -> list[str]:
+    """Names of all documented fields, to guess what a misspelt one meant."""
+    names: set[str] = set()
+    for schema in openapi_document(app)["components"]["schemas"].values():
+        names.update(schema.get("properties", {}))
+    return sorted(names)
+
+
+def _lifespan(settings: Settings) -> Any:
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        await asyncio.to_thread(upgrade, settings.database_url)
+        database = Database(settings.database_url)
+        publisher = Publisher(settings.broker_url)
+        watcher = JobWatcher(database, settings.event_poll_s)
+        app.state.service = Service(settings, database, publisher, watcher)
+        publisher.start()
+        watcher.start()
+        try:
+            with _streams_end_with_the_process(watcher):
+                yield
+        finally:
+            await watcher.stop()
+            await asyncio.to_thread(publisher.stop)
+            database.dispose()
+
+    return lifespan
+
+
+@contextmanager
+def _streams_end_with_the_process(watcher: JobWatcher) -> Iterator[None]:
+    """End event streams on SIGTERM and SIGINT: the server waits for open answers before it stops."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    loop = asyncio.get_running_loop()
+    former = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        loop.call_soon_threadsafe(watcher.close)
+        handler = former[signal.Signals(number)]
+        if callable(handler):
+            handler(number, frame)
+
+    for number, handler in former.items():
+        if callable(handler):  # leave the defaults alone: something else then ends the process
+            signal.signal(number, on_signal)
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            if callable(handler):
+                signal.signal(number, handler)
+
+
+def __getattr__(name: str) -> Any:
+    """Build ``app.main:app`` when a server asks for it, not on import."""
+    if name == "app":
+        return create_app()
+    raise AttributeError(name)

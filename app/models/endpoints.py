@@ -1,0 +1,48 @@
+"""Endpoints of identified models."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query
+
+from app.errors import InvalidRequest, ModelNotFound
+from app.http.context import OwnerDep, ServiceDep
+from app.http.problems import documented
+from app.models import service
+from app.models.schemas import IdentifiedModel, ModelPage
+
+router = APIRouter(tags=["models"])
+
+ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
+
+
+@router.get(
+    "/models",
+    operation_id="list_models",
+    summary="List identified models",
+    responses=documented(InvalidRequest),
+)
+def list_models(
+    app: ServiceDep,
+    owner: OwnerDep,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> ModelPage:
+    """Your identified models, newest first."""
+    with app.database.read() as session:
+        return service.page(session, owner, cursor=cursor, limit=limit)
+
+
+@router.get(
+    "/models/{model_id}",
+    operation_id="get_model",
+    summary="Get an identified model",
+    responses=documented(InvalidRequest, ModelNotFound),
+)
+def get_model(
+    app: ServiceDep, owner: OwnerDep, model_id: Annotated[str, Path(pattern=ID_PATTERN)]
+) -> IdentifiedModel:
+    """Return parameters, fit, aircraft and flight of one model."""
+    with app.database.read() as session:
+        return service.get(session, owner, model_id)

@@ -1,0 +1,37 @@
+"""Identified models on the wire."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from app.identify.schemas import IdentifiedParameters, SampleFit
+
+
+class ModelSummary(BaseModel):
+    """An identified model without its parameters."""
+
+    id: str = Field(examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"])
+    name: str
+    links_per_wing: int | None
+    job_id: str | None = Field(description="The job that identified it, null when that was deleted.")
+    created_at: datetime
+
+
+class ModelPage(BaseModel):
+    """Models, newest first."""
+
+    models: list[ModelSummary]
+    next_cursor: str | None = Field(description="Pass as `cursor` to get the next page; null on the last.")
+
+
+class IdentifiedModel(ModelSummary):
+    """An identified model with all that is needed to fly it."""
+
+    model: IdentifiedParameters
+    fit: list[SampleFit]
+    aircraft: dict[str, Any]
+    flight: dict[str, Any]
+    options: dict[str, Any] = Field(description="The `model` part of the request: lattice, step, start.")

@@ -1,0 +1,87 @@
+"""The OpenAPI document: what FastAPI makes of the routes, made exact. ``python -m app.openapi`` writes it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from app.http.problems import MEDIA_TYPE
+from app.trajectories.endpoints import FORM_SCHEMA
+from app.trajectories.schemas import TrajectoryUpload
+from app.version import VERSION
+
+DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
+PROBLEM = "#/components/schemas/Problem"
+DESCRIPTION = """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
+
+Long work is a job: the POST answers `202` with a job at once; follow it by `GET /jobs/{id}`
+(`Prefer: wait=30`), by its events, or on the page at `/`. Units are SI and radians, and stand in the names of
+the fields. Every error is a problem document (RFC 9457) with a stable `code`, a `pointer` to the field and a
+`hint`.
+"""
+TAGS = [
+    {"name": "identify", "description": "From sample flights to an equivalent model."},
+    {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
+    {"name": "trajectories", "description": "Sample flights as files."},
+    {"name": "models", "description": "Identified models."},
+    {"name": "health", "description": "For machines."},
+]
+
+
+def openapi_document(app: FastAPI) -> dict[str, Any]:
+    """Return the document of `app`, made once."""
+    if app.openapi_schema is None:
+        document = get_openapi(
+            title="MorphID",
+            version=VERSION,
+            summary="Equivalent models of sweep-morphing aircraft from sample flights",
+            description=DESCRIPTION,
+            routes=app.routes,
+            tags=TAGS,
+            license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
+        )
+        _name_problem_media_type(document)
+        _add_upload_schemas(document)
+        app.openapi_schema = document
+    return app.openapi_schema
+
+
+def _name_problem_media_type(document: dict[str, Any]) -> None:
+    """Errors are ``application/problem+json``, not ``application/json``."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for response in operation["responses"].values():
+                content = response.get("content", {})
+                plain = content.get("application/json", {}).get("schema", {})
+                if plain.get("$ref") == PROBLEM:
+                    response["content"] = {MEDIA_TYPE: content["application/json"]}
+
+
+def _add_upload_schemas(document: dict[str, Any]) -> None:
+    """Add the two bodies of POST /trajectories, which FastAPI does not see."""
+    schemas = document["components"]["schemas"]
+    schemas["TrajectoryFile"] = FORM_SCHEMA
+    schemas["TrajectoryUpload"] = TrajectoryUpload.model_json_schema(
+        ref_template="#/components/schemas/{model}"
+    )
+
+
+def document_text() -> str:
+    """Return the document as it is committed."""
+    from app.main import routed_app
+
+    document = openapi_document(routed_app())
+    # the version comes from the installation; the committed document must not change by it
+    document["info"]["version"] = "1"
+    return json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True) + "\n"
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCUMENT
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(document_text(), encoding="utf-8")

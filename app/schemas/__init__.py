@@ -1,0 +1,1 @@
+"""Documents that clients send, shared by several features."""

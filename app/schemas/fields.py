@@ -1,0 +1,39 @@
+"""Bounded, strict building blocks of the request documents: no NaN, no infinity, no unknown field."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, FailFast, Field
+
+SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
+MAX_ROWS = 100_000  # of one sample: 1000 s at 10 ms
+MIN_ROWS = 4  # a shape-preserving spline through fewer is guesswork
+
+
+class Strict(BaseModel):
+    """Base of everything a client sends: a misspelt field is an error, text is not a number."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0.0, le=1000.0)]
+Angle = Annotated[float, Field(ge=-3.2, le=3.2)]
+Vector3 = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
+Position = Annotated[list[Annotated[float, Field(ge=-1000.0, le=1000.0)]], Field(min_length=3, max_length=3)]
+SampleName = Annotated[str, Field(pattern=SAMPLE_NAME_PATTERN)]
+Text = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_]+$")]
+
+# FailFast: one bad row is named, not a hundred thousand
+TimeSeries = Annotated[
+    list[Annotated[float, Field(ge=-1e6, le=1e6)]],
+    FailFast(),
+    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+]
+AngleSeries = Annotated[
+    list[Annotated[float, Field(ge=-1e3, le=1e3)]],
+    FailFast(),
+    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+]

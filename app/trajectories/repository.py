@@ -1,0 +1,70 @@
+"""SQL of uploaded trajectories; every read is filtered by owner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import insert, select
+
+from app.database import Session, database_time
+from app.documents import packed, unpacked
+from app.errors import TrajectoryNotFound
+from app.identifiers import new_identifier
+from app.jobs.records import moment
+from app.tables import trajectories
+
+Columns = dict[str, list[float]]
+
+
+@dataclass(frozen=True, slots=True)
+class StoredTrajectory:
+    """One uploaded flight without its rows."""
+
+    id: str
+    name: str
+    rows: int
+    duration_s: float
+    created_at: datetime
+
+
+def insert_trajectory(session: Session, owner: str, name: str, columns: Columns) -> StoredTrajectory:
+    """Store a flight whose columns were checked."""
+    time_s = columns["time_s"]
+    row = session.execute(
+        insert(trajectories)
+        .values(
+            id=new_identifier("traj"),
+            owner=owner,
+            name=name,
+            rows=len(time_s),
+            duration_s=time_s[-1] - time_s[0],
+            document=packed(columns),
+            created_at=database_time(),
+        )
+        .returning(
+            trajectories.c.id,
+            trajectories.c.name,
+            trajectories.c.rows,
+            trajectories.c.duration_s,
+            trajectories.c.created_at,
+        )
+    ).one()
+    return StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+
+
+def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, Columns]:
+    """Read one flight with its rows.
+
+    Raises
+    ------
+    TrajectoryNotFound
+        When `owner` has no such trajectory.
+    """
+    row = session.execute(
+        select(trajectories).where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
+    ).one_or_none()
+    if row is None:
+        raise TrajectoryNotFound(trajectory_id)
+    summary = StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+    return summary, unpacked(row.document)

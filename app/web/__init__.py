@@ -1,0 +1,1 @@
+"""The web page of the service: static files, no build step, nothing from other hosts."""
