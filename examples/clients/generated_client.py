@@ -1,6 +1,6 @@
 """Identify a model with a client generated from the service's OpenAPI document (made on first use).
 
-Usage: generated_client.py [URL] [FOLDER]. The generated package is not committed; `generate_client.sh` makes it.
+Usage: generated_client.py [URL] [FOLDER]. The package itself is not committed; see generate_client.sh.
 """
 
 from __future__ import annotations
