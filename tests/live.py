@@ -41,8 +41,12 @@ class LiveService:
             stdout=subprocess.PIPE,
             text=True,
         )
-        ready = self.next_event()
-        assert ready["event"] == "ready", ready
+        try:
+            ready = self.next_event()
+            assert ready["event"] == "ready", f"{ready}\n{self.logs()}"
+        except BaseException:
+            self.stop()
+            raise
         self.url, self.children = ready["url"], ready["children"]
         return self
 

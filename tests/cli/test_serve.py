@@ -87,8 +87,8 @@ def test_a_dead_child_is_restarted_and_ctrl_c_ends_all(tmp_path: Path) -> None:
 def test_the_api_starts_in_two_seconds(tmp_path: Path) -> None:
     """The API process answers within two seconds of its start.
 
-    Counted in its own computing time, with half as much again allowed: test machines are shared, and two threads on
-    one core slow each other down.
+    Counted in its own computing time, with half as much again allowed: two busy threads on one core slow
+    each other down.
     """
     port = free_port(0)
     command = [sys.executable, "-m", "uvicorn", "app.main:create_app", "--factory", "--port", str(port)]

@@ -1,0 +1,62 @@
+"""House rules that import-linter's contracts cannot say."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGES = ("app", "worker", "morphcore", "cli")
+KERNELS_MAY_IMPORT = {"__future__", "math", "numpy", "numba", "typing", "collections.abc"}
+WORKER_MAY_KNOW = ("app.jobs.", "app.settings", "app.database", "app.errors")
+BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
+MOST_LINES = 500  # 400 is the aim; a little over is better than a file torn apart
+MOST_KERNEL_LINES = 600  # the passes of one algorithm stay together
+
+
+def sources(root: Path, package: str) -> Iterator[Path]:
+    """Give a package's Python files."""
+    yield from (path for path in (root / package).rglob("*.py") if "__pycache__" not in path.parts)
+
+
+def imported(path: Path) -> set[str]:
+    """Give the modules that a file imports, wherever in it."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+def test_kernels_stay_in_their_cellars(root: Path) -> None:
+    """Compiled kernels import numpy, math, the one decorator, status codes and other kernels, no more."""
+    for path in sources(root, "morphcore"):
+        if "kernels" not in path.parts:
+            continue
+        foreign = {
+            name
+            for name in imported(path) - KERNELS_MAY_IMPORT
+            if name not in {"morphcore.jit", "morphcore.status"} and ".kernels" not in name
+        }
+        assert foreign == set(), path
+
+
+def test_the_worker_knows_only_the_store(root: Path) -> None:
+    """Of the app, the worker knows the job store, its database and the settings."""
+    for path in sources(root, "worker"):
+        known = {name for name in imported(path) if name == "app" or name.startswith("app.")}
+        assert {name for name in known if not name.startswith(WORKER_MAY_KNOW)} == set(), path
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_files_are_small_and_well_named(root: Path, package: str) -> None:
+    """One algorithm, one file that can be read in one sitting, and a name that says what is in it."""
+    for path in sources(root, package):
+        assert path.stem not in BANNED_NAMES, path
+        lines = len(path.read_text().splitlines())
+        most = MOST_KERNEL_LINES if "kernels" in path.parts else MOST_LINES
+        assert lines <= most, f"{path}: {lines} lines"
