@@ -87,8 +87,8 @@ def test_induced_drag_is_that_of_the_trefftz_plane(sweep_deg):
     """The drag on the bound edges is the energy left in the wake, whatever the sweep (Munk's theorem).
 
     The wake's energy from two-dimensional vortices far behind, sampled at mid strip like the lattice. Unswept
-    they agree but for terms in alpha^2 (1e-4) and the core; swept, midpoints sample the mutual influence of the
-    bound vortices unevenly at the kink and the tips: 4 per cent at 10 strips a side, 2 at 40, 1.5 at 80.
+    they agree but for terms in alpha^2 (1e-4) and the core; swept, midpoints sample the influence of the
+    bound vortices unevenly at kink and tips: 4 per cent at 10 strips a side, 2 at 40, 1.5 at 80.
     """
     strips, semi_span, area = 40, 3.0, 1.8
     wing = lattice(straight_wings(semi_span, 0.3, 0.3), (4, strips), sheared(sweep_deg * DEGREE))
