@@ -14,25 +14,24 @@ With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the sa
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 
-F = TypeVar("F", bound=Callable[..., Any])
 
 FAST_MATH = {"contract", "reassoc", "arcp", "nsz"}
 
 
-def kernel(function: F) -> F:
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a numeric kernel: arrays in, ``out`` last, no allocation, no exceptions."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True)(function)  # type: ignore[no-any-return]
+    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True)(function)
 
 
-def parallel_kernel(function: F) -> F:
+def parallel_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile the one kind of kernel that spreads blocks of lanes over threads with ``prange``."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True, parallel=True)(function)  # type: ignore[no-any-return]
+    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True, parallel=True)(function)
 
 
-def inlined(function: F) -> F:
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a short scalar function that is pasted into the kernels that call it."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, inline="always")(function)  # type: ignore[no-any-return]
+    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, inline="always")(function)

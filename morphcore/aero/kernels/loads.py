@@ -1,0 +1,168 @@
+"""Air loads on chains of flat links from a reduced lattice operator shared by all lanes.
+
+The lattice is fixed on the undeformed surface; its strips ride on the links. A strip that spans a joint
+belongs to both links by the fractions of its width (``overlap``), so that loads are continuous in the
+division lengths. The operator maps the normal velocity of the strips (two inputs each: at the link axis, and
+its slope along the chord) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
+follow (see aero/operator.py for their derivation):
+
+    0  g = Gamma dy       circulation at the trailing edge times strip width, m^3/s
+    1  S = sum Gamma_i A_i              vortex moment of the strip's rings, m^4/s
+    2  X = sum Gamma_i A_i x_i          its chordwise moment, m^5/s
+    3  w_x   induced normal velocity weighted by the bound spanwise circulation, m/s
+    4  w_y   the same for the chordwise edges, m/s
+
+Everything is in link axes; velocities are those of the structure relative to the air at rest.
+"""
+
+from __future__ import annotations
+
+import math
+
+from morphcore.jit import kernel
+from morphcore.lanes import LANES, not_in_lanes
+
+OUTPUTS = 5
+AERO_ROWS = 3  # lift factor, centre shift (m, forward), lag time (s)
+# Wagner's function by R. T. Jones (1940): 1 - A1 exp(-b1 s) - A2 exp(-b2 s), s in semichords travelled
+JONES_A1, JONES_B1 = 0.165, 0.0455
+JONES_A2, JONES_B2 = 0.335, 0.3
+JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
+# columns of the table of surfaces
+LINK0, LINKS, STRIP0, STRIPS, PAIR0 = 0, 1, 2, 3, 4
+
+
+@kernel
+def lagged_motion(twist, slow, fast, aero, effective):
+    """What the circulation answers to: (v_z, omega_x, omega_y) of a link after Jones' lag, times the lift factor."""
+    if not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast) or not_in_lanes(aero):
+        return
+    if not_in_lanes(effective):
+        return
+    now = 1.0 - JONES_A1 - JONES_A2
+    for l in range(LANES):
+        lift = aero[0, l]
+        effective[0, l] = lift * (now * twist[5, l] + JONES_A1 * slow[0, l] + JONES_A2 * fast[0, l])
+        effective[1, l] = lift * (now * twist[0, l] + JONES_A1 * slow[1, l] + JONES_A2 * fast[1, l])
+        effective[2, l] = lift * (now * twist[1, l] + JONES_A1 * slow[2, l] + JONES_A2 * fast[2, l])
+
+
+@kernel
+def strip_inputs(surface, ranges, overlap, effective, inputs):
+    """Normal velocity of each strip of one surface at the link axis and its slope along x: rows 2 j and 2 j + 1."""
+    if not_in_lanes(overlap) or not_in_lanes(effective) or not_in_lanes(inputs):
+        return
+    strip0, strips = surface[STRIP0], surface[STRIPS]
+    for j in range(2 * strip0, 2 * (strip0 + strips)):
+        row = inputs[j]
+        for l in range(LANES):
+            row[l] = 0.0
+    for k in range(surface[LINKS]):
+        link = surface[LINK0] + k
+        motion = effective[3 * link : 3 * link + 3]
+        for j in range(ranges[link, 0], ranges[link, 1]):
+            pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
+            part = overlap[pair : pair + 2]
+            out = inputs[2 * (strip0 + j) : 2 * (strip0 + j) + 2]
+            for l in range(LANES):
+                weight = part[0, l]
+                out[0, l] += weight * (motion[0, l] + part[1, l] * motion[1, l])
+                out[1, l] -= weight * motion[2, l]
+
+
+@kernel
+def lane_product(matrix, inputs, outputs):
+    """outputs = matrix @ inputs, (rows, columns) x (columns, LANES); rows a multiple of 8, columns of 4."""
+    if not_in_lanes(inputs) or not_in_lanes(outputs):
+        return
+    rows, columns = matrix.shape
+    for o in range(0, rows, 8):
+        y = outputs[o : o + 8]
+        m = matrix[o : o + 8]
+        for r in range(8):
+            for l in range(LANES):
+                y[r, l] = 0.0
+        for i in range(0, columns, 4):
+            x = inputs[i : i + 4]
+            a0, b0, c0, d0 = m[0, i], m[0, i + 1], m[0, i + 2], m[0, i + 3]
+            a1, b1, c1, d1 = m[1, i], m[1, i + 1], m[1, i + 2], m[1, i + 3]
+            a2, b2, c2, d2 = m[2, i], m[2, i + 1], m[2, i + 2], m[2, i + 3]
+            a3, b3, c3, d3 = m[3, i], m[3, i + 1], m[3, i + 2], m[3, i + 3]
+            a4, b4, c4, d4 = m[4, i], m[4, i + 1], m[4, i + 2], m[4, i + 3]
+            a5, b5, c5, d5 = m[5, i], m[5, i + 1], m[5, i + 2], m[5, i + 3]
+            a6, b6, c6, d6 = m[6, i], m[6, i + 1], m[6, i + 2], m[6, i + 3]
+            a7, b7, c7, d7 = m[7, i], m[7, i + 1], m[7, i + 2], m[7, i + 3]
+            for l in range(LANES):
+                p, q, s, t = x[0, l], x[1, l], x[2, l], x[3, l]
+                y[0, l] += a0 * p + b0 * q + c0 * s + d0 * t
+                y[1, l] += a1 * p + b1 * q + c1 * s + d1 * t
+                y[2, l] += a2 * p + b2 * q + c2 * s + d2 * t
+                y[3, l] += a3 * p + b3 * q + c3 * s + d3 * t
+                y[4, l] += a4 * p + b4 * q + c4 * s + d4 * t
+                y[5, l] += a5 * p + b5 * q + c5 * s + d5 * t
+                y[6, l] += a6 * p + b6 * q + c6 * s + d6 * t
+                y[7, l] += a7 * p + b7 * q + c7 * s + d7 * t
+
+
+@kernel
+def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench):
+    """Wrench (6 rows) of the air on link ``k`` of a surface: Kutta-Joukowski on its share of the strips, and drag.
+
+    ``strips`` (n, 2): trailing edge x and circulation centre x of each strip from the link axis, m. ``sums``:
+    13 scratch rows. Profile drag is quadratic in the velocity at the link's centre of drag area.
+    """
+    if not_in_lanes(overlap) or not_in_lanes(outputs) or not_in_lanes(link) or not_in_lanes(twist):
+        return
+    if not_in_lanes(aero) or not_in_lanes(sums) or not_in_lanes(wrench):
+        return
+    for i in range(13):
+        row = sums[i]
+        for l in range(LANES):
+            row[l] = 0.0
+    number = surface[LINK0] + k
+    for j in range(ranges[number, 0], ranges[number, 1]):
+        pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
+        part = overlap[pair : pair + 2]
+        strip = surface[STRIP0] + j
+        out = outputs[OUTPUTS * strip : OUTPUTS * strip + OUTPUTS]
+        edge, centre = strips[strip, 0], strips[strip, 1]
+        for l in range(LANES):
+            weight, y = part[0, l], part[1, l]
+            g = weight * out[0, l]
+            moment = weight * out[1, l]
+            sums[0, l] += g
+            sums[1, l] += g * y
+            sums[2, l] += g * y * y
+            sums[3, l] += g * edge
+            sums[4, l] += g * edge * y
+            sums[5, l] += moment
+            sums[6, l] += moment * y
+            sums[7, l] += weight * out[2, l]
+            sums[8, l] += g * centre
+            sums[9, l] += g * centre * y
+            sums[10, l] += g * out[3, l]
+            sums[11, l] += g * y * out[3, l]
+            sums[12, l] += g * out[4, l]
+    for l in range(LANES):
+        wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
+        ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
+        g0, g1, g2 = sums[0, l], sums[1, l], sums[2, l]
+        lift = ux * g0 - wz * g1
+        fz = -density * lift
+        fx = density * (uz * g0 + wx * g1 - wy * sums[8, l] - sums[10, l])
+        fy = density * (sums[5, l] * wx - sums[12, l])
+        mx = -density * (sums[5, l] * uy + sums[7, l] * wz + ux * g1 - wz * g2)
+        my = density * (sums[5, l] * ux - sums[6, l] * wz + ux * sums[3, l] - wz * sums[4, l])
+        mz = -density * (uz * g1 + wx * g2 - wy * sums[9, l] - sums[11, l])
+        my -= aero[1, l] * fz
+        mz += aero[1, l] * fy
+        y = link[9, l]
+        vx, vy, vz = ux - wz * y, uy, uz + wx * y
+        drag = -0.5 * density * link[8, l] * math.sqrt(vx * vx + vy * vy + vz * vz)
+        dx, dy, dz = drag * vx, drag * vy, drag * vz
+        wrench[0, l] = mx + y * dz
+        wrench[1, l] = my
+        wrench[2, l] = mz - y * dx
+        wrench[3, l] = fx + dx
+        wrench[4, l] = fy + dy
+        wrench[5, l] = fz + dz

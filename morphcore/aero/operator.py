@@ -1,0 +1,167 @@
+r"""The lattice of a whole aircraft, reduced to what the links feel of it.
+
+With the lattice frozen on the undeformed surfaces (at their hinge angles) and its wake along a fixed direction, the
+circulations are linear in the normal velocity of the structure, and on a flat link that velocity is
+``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the strips to five numbers for each
+strip (the rows that aero/kernels/loads.py lists), from which the forces on all bound edges follow.
+
+Kutta-Joukowski on a ring of circulation G in the flow U = induced velocity - velocity of the structure:
+
+- In a flow that a rigid motion makes, a *closed* ring feels no net force but the moment rho G A (n x U). Only the rings of
+  the trailing edge are open there (wake and last edge cancel), which leaves the force rho G_te U x l at the trailing edge.
+  Hence normal force and moments from ``g = G_te dy``, ``S = sum G_i A_i`` and ``X = sum G_i A_i x_i``.
+- The normal velocity on the edges gives the forces in the plane of the surface. They are products of circulation and induced
+  velocity, both distributed along the chord; here the induced velocity of a strip is averaged with the chordwise
+  distribution of the circulation in uniform incidence, which is exact there and of second order elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.aero.kernels.loads import OUTPUTS
+from morphcore.aero.vlm import RingTable, influence, ring_table
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
+
+Array = NDArray[np.float64]
+
+ROW_MULTIPLE, COLUMN_MULTIPLE = 8, 4  # the lane product runs over tiles of this size
+BODY_AFT = (-1.0, 0.0, 0.0)  # direction of the frozen wake in B: the free stream at zero incidence
+
+
+@dataclass(frozen=True)
+class AircraftLattice:
+    """The undeformed lattices of all surfaces and their numbering."""
+
+    aircraft: Aircraft
+    lattices: tuple[SurfaceLattice, ...]
+    table: RingTable
+    strip0: tuple[int, ...]
+    strips: int
+
+    @property
+    def operator_shape(self) -> tuple[int, int]:
+        """Rows and columns of the operator, padded to whole tiles."""
+        return (
+            -(-OUTPUTS * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
+            -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
+        )
+
+    @property
+    def strip_width_m(self) -> Array:
+        """(strips,) widths of all strips."""
+        return np.concatenate([np.diff(lattice.strip_edges_m) for lattice in self.lattices])
+
+    @property
+    def strip_chord_m(self) -> Array:
+        """(strips,) chords at mid strip."""
+        return np.concatenate([lattice.strip_chord_m for lattice in self.lattices])
+
+
+@dataclass(frozen=True)
+class LatticeOperator:
+    """One reduced operator.
+
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 2): x of the trailing edge and of the centre of
+    circulation of each strip from the link axis (the elastic axis), m.
+    """
+
+    matrix: Array
+    strips: Array
+
+
+def aircraft_lattice(aircraft: Aircraft, chordwise: int, spanwise: int) -> AircraftLattice:
+    """Lattices of ``chordwise`` x ``spanwise`` panels on every surface."""
+    lattices = tuple(surface_lattice(surface, chordwise, spanwise) for surface in aircraft.surfaces)
+    strip0 = tuple(int(n) for n in np.cumsum([0] + [lattice.spanwise for lattice in lattices[:-1]]))
+    return AircraftLattice(aircraft, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices))
+
+
+def lattice_operator(
+    lattice: AircraftLattice,
+    hinge_rad: Sequence[float],
+    *,
+    mach: float = 0.0,
+    wake_direction_B: Sequence[float] = BODY_AFT,
+) -> LatticeOperator:
+    """The reduced operator for given hinge angles (one per surface, rad; ignored where there is no hinge)."""
+    surfaces = lattice.aircraft.surfaces
+    poses = [surface_pose(s, angle) for s, angle in zip(surfaces, hinge_rad, strict=True)]
+    corners, controls, fronts, sides, normals = [], [], [], [], []
+    for (R_BW, r_B), part in zip(poses, lattice.lattices, strict=True):
+        ring = part.ring_corners_W @ R_BW.T + r_B
+        corners.append(ring.reshape(-1, 3))
+        controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
+        fronts.append((0.5 * (ring[:-1, :-1] + ring[:-1, 1:])).reshape(-1, 3))
+        sides.append((0.5 * (ring[:-1] + ring[1:])).reshape(-1, 3))
+        normals.append(R_BW[:, 2])
+    groups = (controls, fronts, sides)
+    points = np.concatenate([part for group in groups for part in group])
+    velocity = influence(points, np.concatenate(corners), lattice.table, wake_direction_B, mach=mach)
+    normal = np.concatenate(
+        [np.repeat(n[None, :], part.shape[0], axis=0) for group in groups for n, part in zip(normals, group, strict=True)]
+    )
+    induced = np.einsum("pa,arp->pr", normal, velocity)  # normal velocity, (points, rings)
+    rings = lattice.table.rings
+    circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
+    downwash = induced[rings:] @ circulation
+    return _reduced(lattice, circulation, downwash)
+
+
+def _boundary(lattice: AircraftLattice) -> Array:
+    """Normal velocity at the control points (rings, inputs) from D0 and D1 of every strip."""
+    out = np.zeros((lattice.table.rings, 2 * lattice.strips))
+    ring = 0
+    for surface, part, strip0 in zip(lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True):
+        x = part.control_points_W[..., 0] - surface.elastic_axis_offset_m
+        for i in range(part.chordwise):
+            for j in range(part.spanwise):
+                out[ring, 2 * (strip0 + j)] = 1.0
+                out[ring, 2 * (strip0 + j) + 1] = x[i, j]
+                ring += 1
+    return out
+
+
+def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> LatticeOperator:
+    rows, columns = lattice.operator_shape
+    matrix = np.zeros((rows, columns))
+    strips = np.zeros((lattice.strips, 2))
+    uniform = circulation[:, ::2].sum(axis=1)  # every strip at the same incidence
+    inputs = circulation.shape[1]
+    ring = 0
+    side0 = lattice.table.rings
+    for surface, part, strip0 in zip(lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True):
+        shape = (part.chordwise, part.spanwise)
+        count = part.rings
+        side_count = part.chordwise * (part.spanwise + 1)
+        gamma = circulation[ring : ring + count].reshape(*shape, inputs)
+        reference = uniform[ring : ring + count].reshape(shape)
+        front = downwash[ring : ring + count].reshape(*shape, inputs)
+        side = downwash[side0 : side0 + side_count].reshape(part.chordwise, part.spanwise + 1, inputs)
+        ring, side0 = ring + count, side0 + side_count
+
+        corners = part.ring_corners_W - np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+        width = np.diff(part.strip_edges_m)
+        edge_x = corners[..., 0]
+        middle_x = 0.5 * (edge_x[:, 1:] + edge_x[:, :-1])
+        area = (middle_x[:-1] - middle_x[1:]) * width  # of the rings, trapezia between straight strip edges
+        centre_x = 0.5 * (middle_x[:-1] + middle_x[1:])
+        length = 0.5 * (edge_x[:-1, 1:] + edge_x[:-1, :-1] - edge_x[1:, 1:] - edge_x[1:, :-1])
+        bound = np.diff(reference, axis=0, prepend=0.0) / reference[-1]
+        chordwise_share = reference / reference[-1]
+
+        row = OUTPUTS * strip0 + OUTPUTS * np.arange(part.spanwise)
+        matrix[row, :inputs] = gamma[-1] * width[:, None]
+        matrix[row + 1, :inputs] = np.einsum("ijn,ij->jn", gamma, area)
+        matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, area * centre_x)
+        matrix[row + 3, :inputs] = np.einsum("ijn,ij->jn", front, bound)
+        jump = part.span_sign * np.diff(side, axis=1)
+        matrix[row + 4, :inputs] = np.einsum("ijn,ij->jn", jump, chordwise_share * length) / width[:, None]
+        strips[strip0 : strip0 + part.spanwise, 0] = middle_x[-1]
+        strips[strip0 : strip0 + part.spanwise, 1] = np.sum(bound * middle_x[:-1], axis=0)
+    return LatticeOperator(matrix, strips)

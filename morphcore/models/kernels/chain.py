@@ -1,0 +1,277 @@
+"""Accelerations of the equivalent model's tree: a fuselage with chains of links on hinges, over lanes.
+
+This file fixes how a lane's state, constants and scratch are laid out in rows, and strings the passes together: twists from
+root to tips, air loads, articulated inertias from tips to root, accelerations from root to tips.
+"""
+
+from __future__ import annotations
+
+from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
+from morphcore.jit import kernel
+from morphcore.multibody.kernels.aba import (
+    JOINT_ROWS,
+    LINK_ROWS,
+    accumulate,
+    add_bias,
+    add_link,
+    carry_through_gimbal,
+    carry_through_hinge,
+    eliminate_gimbal,
+    gimbal_acceleration,
+    gimbal_twist,
+    hinge_acceleration,
+    hinge_twist,
+    solve_base,
+)
+from morphcore.lanes import LANES, not_in_lanes
+
+# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates, lag states
+OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
+# rows of a lane's constants: force and moment in B, then aero (3), links, stiffness, damping, overlap
+FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 9
+# rows of the scratch block before the per-link and per-joint ones
+S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
+S_INERTIA, S_CARRIED, S_FACTOR, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 87, 100, 103, 106
+PER_LINK = 6 + 6 + 6 + 6 + 3  # twist, wrench, bias of a first link, acceleration, effective motion
+PER_COORDINATE = 3  # joint force, added diagonal, joint acceleration
+# indices of the shared numbers
+DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
+
+
+def scratch_rows(links: int, coordinates: int) -> int:
+    """Rows of a block's scratch for a tree of so many links and free coordinates."""
+    return S_FREE + PER_LINK * links + PER_COORDINATE * coordinates + JOINT_ROWS * coordinates // 3
+
+
+@kernel
+def body_axes(state, wind, gravity, scratch):
+    """Fill the scratch block with the twist relative to the air, and wind and gravity in B."""
+    if not_in_lanes(state) or not_in_lanes(scratch):
+        return
+    wn, we, wd = wind[0], wind[1], wind[2]
+    for l in range(LANES):
+        a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
+        nx, ny, nz = a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)
+        ex, ey, ez = 2.0 * (b * c + a * d), a * a - b * b + c * c - d * d, 2.0 * (c * d - a * b)
+        dx, dy, dz = 2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a - b * b - c * c + d * d
+        ax, ay, az = nx * wn + ex * we + dx * wd, ny * wn + ey * we + dy * wd, nz * wn + ez * we + dz * wd
+        scratch[0, l], scratch[1, l], scratch[2, l] = state[4, l], state[5, l], state[6, l]
+        scratch[3, l], scratch[4, l], scratch[5, l] = state[7, l] - ax, state[8, l] - ay, state[9, l] - az
+        scratch[100, l], scratch[101, l], scratch[102, l] = ax, ay, az
+        scratch[103, l], scratch[104, l], scratch[105, l] = gravity * dx, gravity * dy, gravity * dz
+
+
+@kernel
+def start_base(constants, twist, shared, inertia, force):
+    """Fuselage inertia, its bias force v x* I v, less the constant force and moment."""
+    if not_in_lanes(constants) or not_in_lanes(twist) or not_in_lanes(inertia) or not_in_lanes(force):
+        return
+    for i in range(21):
+        value = shared[FUSELAGE + i]
+        row = inertia[i]
+        for l in range(LANES):
+            row[l] = value
+    for i in range(6):
+        row = force[i]
+        for l in range(LANES):
+            row[l] = 0.0
+    add_bias(inertia, twist, force)  # momentum of the fuselage
+    for l in range(LANES):
+        hx, hy, hz = force[0, l], force[1, l], force[2, l]
+        gx, gy, gz = force[3, l], force[4, l], force[5, l]
+        wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
+        ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
+        force[0, l] = wy * hz - wz * hy + uy * gz - uz * gy - constants[3, l]
+        force[1, l] = wz * hx - wx * hz + uz * gx - ux * gz - constants[4, l]
+        force[2, l] = wx * hy - wy * hx + ux * gy - uy * gx - constants[5, l]
+        force[3, l] = wy * gz - wz * gy - constants[0, l]
+        force[4, l] = wz * gx - wx * gz - constants[1, l]
+        force[5, l] = wx * gy - wy * gx - constants[2, l]
+
+
+@kernel
+def clear(block):
+    """Zero some rows."""
+    if not_in_lanes(block):
+        return
+    for i in range(block.shape[0]):
+        for l in range(LANES):
+            block[i, l] = 0.0
+
+
+@kernel
+def accelerations(surfaces, ranges, shared, strips, hinges, operator, wind, constants, state, scratch, inputs, outputs):
+    """Base and joint accelerations of a block for joint forces and added diagonal found in the scratch block.
+
+    Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint accelerations and
+    the links' twists in theirs.
+    """
+    links = ranges.shape[0]
+    joints = links - surfaces.shape[0]
+    coordinates = 3 * joints
+    w_twist = S_FREE
+    w_wrench = w_twist + 6 * links
+    w_bias = w_wrench + 6 * links
+    w_acceleration = w_bias + 6 * links
+    w_effective = w_acceleration + 6 * links
+    w_tau = w_effective + 3 * links
+    w_added = w_tau + coordinates
+    w_joint_acceleration = w_added + coordinates
+    w_joint = w_joint_acceleration + coordinates
+    s_q = JOINTS
+    s_v = s_q + coordinates
+    s_slow = s_v + coordinates
+    s_fast = s_slow + 3 * links
+    c_overlap = LINKS_C + LINK_ROWS * links + 2 * coordinates
+    overlap = constants[c_overlap:]
+    aero = constants[AERO_C : AERO_C + 3]
+    density = shared[DENSITY]
+
+    body_axes(state, wind, shared[GRAVITY], scratch)
+    base_twist = scratch[S_TWIST : S_TWIST + 6]
+
+    # root -> tips: twists
+    joint_number = 0
+    for s in range(surfaces.shape[0]):
+        for k in range(surfaces[s, LINKS]):
+            link = surfaces[s, LINK0] + k
+            twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
+            if k == 0:
+                hinge_twist(base_twist, hinges[s], twist, scratch[w_bias + 6 * link : w_bias + 6 * link + 6])
+            else:
+                c = 3 * joint_number
+                gimbal_twist(
+                    scratch[w_twist + 6 * link - 6 : w_twist + 6 * link],
+                    constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                    state[s_q + c : s_q + c + 3],
+                    state[s_v + c : s_v + c + 3],
+                    scratch[w_joint + JOINT_ROWS * joint_number : w_joint + JOINT_ROWS * (joint_number + 1)],
+                    twist,
+                )
+                joint_number += 1
+            lagged_motion(
+                twist,
+                state[s_slow + 3 * link : s_slow + 3 * link + 3],
+                state[s_fast + 3 * link : s_fast + 3 * link + 3],
+                aero,
+                scratch[w_effective + 3 * link : w_effective + 3 * link + 3],
+            )
+
+    # air loads
+    effective = scratch[w_effective : w_effective + 3 * links]
+    for s in range(surfaces.shape[0]):
+        strip_inputs(surfaces[s], ranges, overlap, effective, inputs)
+    lane_product(operator, inputs, outputs)
+    for s in range(surfaces.shape[0]):
+        for k in range(surfaces[s, LINKS]):
+            link = surfaces[s, LINK0] + k
+            link_wrench(
+                surfaces[s], k, ranges, strips, overlap, outputs,
+                constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
+                aero, density,
+                scratch[S_SUMS : S_SUMS + 13],
+                scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
+            )  # fmt: skip
+
+    articulate(
+        surfaces, shared, hinges, constants, scratch, links, coordinates,
+    )  # fmt: skip
+
+
+@kernel
+def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates):
+    """Accelerations from twists, wrenches and joint forces that the scratch block holds: the articulated-body pass."""
+    w_twist = S_FREE
+    w_wrench = w_twist + 6 * links
+    w_bias = w_wrench + 6 * links
+    w_acceleration = w_bias + 6 * links
+    w_tau = w_acceleration + 6 * links + 3 * links
+    w_added = w_tau + coordinates
+    w_joint_acceleration = w_added + coordinates
+    w_joint = w_joint_acceleration + coordinates
+    base_inertia = scratch[S_BASE_INERTIA : S_BASE_INERTIA + 21]
+    base_force = scratch[S_BASE_FORCE : S_BASE_FORCE + 6]
+    base_acceleration = scratch[S_BASE_ACCELERATION : S_BASE_ACCELERATION + 6]
+    inertia = scratch[S_INERTIA : S_INERTIA + 21]
+    carried = scratch[S_CARRIED : S_CARRIED + 6]
+    start_base(constants, scratch[S_TWIST : S_TWIST + 6], shared, base_inertia, base_force)
+
+    # tips -> root: articulated inertia and bias force
+    last_joint = coordinates // 3
+    for s in range(surfaces.shape[0] - 1, -1, -1):
+        clear(scratch[S_INERTIA : S_CARRIED + 6])
+        for k in range(surfaces[s, LINKS] - 1, -1, -1):
+            link = surfaces[s, LINK0] + k
+            rows = constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS]
+            add_link(
+                rows,
+                scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
+                scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
+                inertia,
+                carried,
+            )
+            if k == 0:
+                add_bias(inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
+                carry_through_hinge(hinges[s], inertia, carried)
+                accumulate(inertia, carried, base_inertia, base_force)
+            else:
+                last_joint -= 1
+                c = 3 * last_joint
+                joint = scratch[w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)]
+                add_bias(inertia, joint[11:17], carried)
+                eliminate_gimbal(
+                    scratch[w_tau + c : w_tau + c + 3], scratch[w_added + c : w_added + c + 3], joint, inertia, carried
+                )
+                carry_through_gimbal(rows, joint, inertia, carried)
+    solve_base(base_inertia, base_force, scratch[S_FACTOR : S_FACTOR + 21], base_acceleration)
+
+    # root -> tips: accelerations
+    joint_number = 0
+    for s in range(surfaces.shape[0]):
+        for k in range(surfaces[s, LINKS]):
+            link = surfaces[s, LINK0] + k
+            own = scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6]
+            if k == 0:
+                bias = scratch[w_bias + 6 * link : w_bias + 6 * link + 6]
+                hinge_acceleration(base_acceleration, hinges[s], bias, own)
+            else:
+                c = 3 * joint_number
+                gimbal_acceleration(
+                    scratch[w_acceleration + 6 * link - 6 : w_acceleration + 6 * link],
+                    constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                    scratch[w_joint + JOINT_ROWS * joint_number : w_joint + JOINT_ROWS * (joint_number + 1)],
+                    own,
+                    scratch[w_joint_acceleration + c : w_joint_acceleration + c + 3],
+                )
+                joint_number += 1
+
+
+@kernel
+def base_rates(state, scratch, rates):
+    """Rates of attitude, body velocities and position from the spatial acceleration in the scratch block."""
+    if not_in_lanes(state) or not_in_lanes(scratch) or not_in_lanes(rates):
+        return
+    for l in range(LANES):
+        a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
+        p, q, r = state[4, l], state[5, l], state[6, l]
+        u, v, w = state[7, l], state[8, l], state[9, l]
+        rates[0, l] = -0.5 * (b * p + c * q + d * r)
+        rates[1, l] = 0.5 * (a * p + c * r - d * q)
+        rates[2, l] = 0.5 * (a * q + d * p - b * r)
+        rates[3, l] = 0.5 * (a * r + b * q - c * p)
+        rates[4, l], rates[5, l], rates[6, l] = scratch[6, l], scratch[7, l], scratch[8, l]
+        # the pass ran in axes that move with the wind: v' = a + g - omega x wind, Galileo's shift
+        wx, wy, wz = scratch[100, l], scratch[101, l], scratch[102, l]
+        rates[7, l] = scratch[9, l] + scratch[103, l] - (q * wz - r * wy)
+        rates[8, l] = scratch[10, l] + scratch[104, l] - (r * wx - p * wz)
+        rates[9, l] = scratch[11, l] + scratch[105, l] - (p * wy - q * wx)
+        rates[10, l] = (
+            (a * a + b * b - c * c - d * d) * u + 2.0 * (b * c - a * d) * v + 2.0 * (b * d + a * c) * w
+        )
+        rates[11, l] = (
+            2.0 * (b * c + a * d) * u + (a * a - b * b + c * c - d * d) * v + 2.0 * (c * d - a * b) * w
+        )
+        rates[12, l] = (
+            2.0 * (b * d - a * c) * u + 2.0 * (c * d + a * b) * v + (a * a - b * b - c * c + d * d) * w
+        )

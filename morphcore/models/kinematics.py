@@ -1,0 +1,70 @@
+"""Where the links are: for the static start, for tip positions and for the fresh lattice."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.models.links import link_edges
+from morphcore.multibody.kernels.aba import H_ORIGIN
+
+Array = NDArray[np.float64]
+
+
+def gimbal_rotation(angles: Array) -> Array:
+    """Rotation (..., 3, 3) from link to parent components for gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(lag)."""
+    (s1, s2, s3), (c1, c2, c3) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
+    rows = [
+        [c2 * c3, -c2 * s3, s2],
+        [c1 * s3 + s1 * s2 * c3, c1 * c3 - s1 * s2 * s3, -s1 * c2],
+        [s1 * s3 - c1 * s2 * c3, s1 * c3 + c1 * s2 * s3, c1 * c2],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def link_poses(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array) -> tuple[Array, Array]:
+    """Poses of all links for particles p.
+
+    Parameters
+    ----------
+    hinges : (s, HINGE_ROWS) of one instant. q_joint : (p, coordinates) rad.
+
+    Returns
+    -------
+    R_BL : (p, links, 3, 3) link to body components. r_B : (p, links, 3) link origins in B, m.
+    """
+    particles = q_joint.shape[0]
+    R_BL = np.empty((particles, model.links, 3, 3))
+    r_B = np.empty((particles, model.links, 3))
+    joint, wing = 0, 0
+    for s, surface in enumerate(model.aircraft.surfaces):
+        first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
+        R_BL[:, first] = hinges[s, :9].reshape(3, 3)
+        r_B[:, first] = hinges[s, H_ORIGIN:]
+        if surface.flexible:
+            edges = link_edges(batch.division[:, min(wing, batch.division.shape[1] - 1)], surface.span_m)
+            wing += 1
+            lengths = surface.span_sign * np.diff(edges, axis=1)
+        for k in range(1, count):
+            link = first + k
+            parent = R_BL[:, link - 1]
+            r_B[:, link] = r_B[:, link - 1] + parent[:, :, 1] * lengths[:, k - 1, None]
+            R_BL[:, link] = parent @ gimbal_rotation(q_joint[:, 3 * joint : 3 * joint + 3])
+            joint += 1
+    return R_BL, r_B
+
+
+def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array) -> Array:
+    """Tips of the elastic axes (p, s, 3) in B relative to each surface's root, m."""
+    R_BL, r_B = link_poses(model, batch, hinges, q_joint)
+    tips = np.empty((q_joint.shape[0], len(model.aircraft.surfaces), 3))
+    wing = 0
+    for s, surface in enumerate(model.aircraft.surfaces):
+        last = int(model.surfaces[s, 0] + model.surfaces[s, 1]) - 1
+        length = np.full(q_joint.shape[0], surface.span_m)
+        if surface.flexible:
+            length = surface.span_m * batch.division[:, min(wing, batch.division.shape[1] - 1), -1]
+            wing += 1
+        tips[:, s] = r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
+    return tips

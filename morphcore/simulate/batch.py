@@ -1,0 +1,142 @@
+"""Flights of many parameter sets over one plan, in chunks that return to Python well within a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
+from morphcore.models.kernels.chain import JOINTS, scratch_rows
+from morphcore.lanes import LANES
+from morphcore.simulate.kernels.batch import fly, rates_of_blocks
+from morphcore.simulate.plan import FlightPlan
+
+Array = NDArray[np.float64]
+Stop = Callable[[], bool]
+
+CHUNK_BLOCK_STEPS = 6_000  # block steps per chunk and thread: about a fifth of a second
+LONGEST_CHUNK = 64  # steps: bounds the memory of the interpolated operators
+BLOCKS_PER_GROUP = 8  # their states stay in the second-level cache while the operator of a step is shared
+
+
+class Interrupted(Exception):
+    """The caller's ``stop`` said so between two chunks."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """States after some steps of all flights.
+
+    first : index of the first recorded grid time. rows : (k, r, p) the first r rows of the state.
+    """
+
+    first: int
+    rows: Array
+
+
+def shared_numbers(model: ChainModel) -> Array:
+    """Density, gravity and the fuselage's spatial inertia (21 elements) for the kernels."""
+    fuselage = model.aircraft.fuselage
+    x, y, z = fuselage.centre_of_mass_B
+    m = fuselage.mass_kg
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    inertia = fuselage.inertia_B + m * cross @ cross.T
+    upper = np.triu_indices(3)
+    return np.concatenate(
+        [
+            [model.flight.air_density_kg_m3, model.flight.gravity_m_s2],
+            inertia[upper],
+            (m * cross).ravel(),
+            (m * np.eye(3))[upper],
+        ]
+    )
+
+
+def initial_state(
+    model: ChainModel,
+    *,
+    quaternion: Array,
+    omega_B: Array,
+    velocity_B: Array,
+    q_joint: Array,
+    lag_motion: Array,
+    position_N: Array | None = None,
+) -> Array:
+    """State rows (p, state_rows) with resting joints.
+
+    quaternion (p, 4), omega_B, velocity_B, position_N (p, 3), q_joint (p, coordinates); ``lag_motion`` (p, links, 3): the
+    motion (v_z, omega_x, omega_y) of each link that the circulation has settled to.
+    """
+    particles = quaternion.shape[0]
+    lag = lag_motion.reshape(particles, -1)
+    position = np.zeros((particles, 3)) if position_N is None else position_N
+    return np.concatenate(
+        [quaternion, omega_B, velocity_B, position, q_joint, np.zeros_like(q_joint), lag, lag], axis=1
+    )
+
+
+def fly_batch(
+    model: ChainModel,
+    plan: FlightPlan,
+    constants: LaneConstants,
+    state: Array,
+    *,
+    record_rows: int = JOINTS,
+    stop: Stop | None = None,
+) -> Iterator[Chunk]:
+    """Fly all parameter sets through a plan.
+
+    Parameters
+    ----------
+    state : (p, state_rows) at the grid's start. record_rows : how many rows of the state to report.
+    stop : asked before every chunk; True raises Interrupted.
+
+    Yields
+    ------
+    Chunks in order of time, the initial state first (as a chunk of one row).
+    """
+    particles = state.shape[0]
+    blocks = to_lanes(state)
+    count = blocks.shape[0]
+    threads = numba.get_num_threads()
+    groups = max(-(-count // BLOCKS_PER_GROUP), min(count, threads))
+    rows, columns = model.lattice.operator_shape
+    work = np.zeros((groups, 3, model.state_rows, LANES))
+    scratch = np.zeros((groups, scratch_rows(model.links, model.coordinates), LANES))
+    inputs, outputs = np.zeros((groups, columns, LANES)), np.zeros((groups, rows, LANES))
+    shared = shared_numbers(model)
+    relative_chord = model.relative_chord
+    yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
+    length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
+    for first in range(0, plan.grid.steps, length):
+        if stop is not None and stop():
+            raise Interrupted
+        last = min(first + length, plan.grid.steps)
+        operators, strips = plan.table.between(first, last + 1)
+        record = np.empty((last - first, record_rows, count, LANES))
+        fly(
+            model.surfaces, constants.ranges, shared, relative_chord, strips, plan.hinges[first : last + 1], operators,
+            plan.wind_N[first : last + 1], constants.rows, plan.grid.step_s, blocks, work, scratch, inputs, outputs,
+            record,
+        )  # fmt: skip
+        yield Chunk(first + 1, record.reshape(last - first, record_rows, -1)[..., :particles])
+
+
+def state_rates(model: ChainModel, plan: FlightPlan, row: int, constants: LaneConstants, state: Array) -> Array:
+    """Time derivative (p, state_rows) of the states (p, state_rows) at one grid time of a plan."""
+    blocks = to_lanes(state)
+    count = blocks.shape[0]
+    rows, columns = model.lattice.operator_shape
+    operators, strips = plan.table.between(row, row + 1)
+    rates = np.empty_like(blocks)
+    rates_of_blocks(
+        model.surfaces, constants.ranges, shared_numbers(model), model.relative_chord, strips,
+        plan.hinges[row : row + 1], operators, plan.wind_N[row : row + 1], constants.rows,
+        np.zeros((model.state_rows, LANES)), blocks, np.zeros((count, scratch_rows(model.links, model.coordinates), LANES)),
+        np.zeros((count, columns, LANES)), np.zeros((count, rows, LANES)), rates,
+    )  # fmt: skip
+    return from_lanes(rates, state.shape[0])

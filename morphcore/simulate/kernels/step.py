@@ -1,0 +1,227 @@
+"""One time step of a block of lanes: a two-stage W-method, implicit in joint stiffness, joint damping and lag.
+
+The method is ROS2 of Verwer, Spee, Blom & Hundsdorfer (1999, SIAM J. Sci. Comput. 20, equation 2.1):
+
+    (I - gamma h A) k1 = F(t, u)
+    (I - gamma h A) k2 = F(t + h, u + h k1) - 2 k1
+    u' = u + h (3/2 k1 + 1/2 k2)
+
+which is of second order for *any* matrix A, and L-stable with gamma = 1 - 1/sqrt(2) where A is exact. Here A holds the
+diagonal joint stiffness K and damping C and the lag's time constants, with the mass matrix of the stage: then the
+implicit equations are the articulated-body pass with gamma h C + (gamma h)^2 K added to the joint-space diagonal. (Taking
+the stage's own mass matrix instead of the first one's changes the step by O(h^3), so the order stays two.) For the second
+stage the unknown is y = k2 + 2 k1, which turns M k1 into the diagonal product 2 (gamma h C + (gamma h)^2 K) k1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from morphcore.aero.kernels.loads import JONES_B1, JONES_B2, JONES_MEAN_LAG
+from morphcore.jit import kernel
+from morphcore.models.kernels.chain import (
+    AERO_C,
+    JOINTS,
+    LINKS_C,
+    PER_LINK,
+    S_FREE,
+    accelerations,
+    base_rates,
+    clear,
+)
+from morphcore.multibody.kernels.aba import LINK_ROWS
+from morphcore.lanes import LANES, not_in_lanes
+
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+SHORTEST_LAG_S = 1e-9  # added to the lag times: a lag of zero is then quasi-steady, not a division by zero
+
+
+@kernel
+def joint_forces(stiffness, damping, q, v, step, tau, added):
+    """First stage: tau = -K (q + gamma h v) - C v and the added diagonal gamma h C + (gamma h)^2 K."""
+    if not_in_lanes(stiffness) or not_in_lanes(damping) or not_in_lanes(q) or not_in_lanes(v):
+        return
+    if not_in_lanes(tau) or not_in_lanes(added):
+        return
+    g = GAMMA * step
+    for i in range(q.shape[0]):
+        for l in range(LANES):
+            k, c = stiffness[i, l], damping[i, l]
+            added[i, l] = g * (c + g * k)
+            tau[i, l] = -k * (q[i, l] + g * v[i, l]) - c * v[i, l]
+
+
+@kernel
+def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step, tau, added):
+    """Second stage: tau for y = k2 + 2 k1 (see the module's head); ``angle_rate`` and ``acceleration`` are k1's."""
+    if not_in_lanes(stiffness) or not_in_lanes(damping) or not_in_lanes(q) or not_in_lanes(v):
+        return
+    if not_in_lanes(angle_rate) or not_in_lanes(acceleration) or not_in_lanes(tau) or not_in_lanes(added):
+        return
+    g = GAMMA * step
+    for i in range(q.shape[0]):
+        for l in range(LANES):
+            k, c = stiffness[i, l], damping[i, l]
+            added[i, l] = g * (c + g * k)
+            remainder = v[i, l] - 2.0 * angle_rate[i, l]
+            tau[i, l] = (
+                -k * (q[i, l] + g * remainder) - c * v[i, l] + 2.0 * added[i, l] * acceleration[i, l]
+            )
+
+
+@kernel
+def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate):
+    """Rates of joint angles and velocities of a stage; ``first``, ``second``: k1's, subtracted twice (zero in stage 1)."""
+    if not_in_lanes(v) or not_in_lanes(acceleration) or not_in_lanes(first) or not_in_lanes(second):
+        return
+    if not_in_lanes(angle_rate) or not_in_lanes(velocity_rate):
+        return
+    g = GAMMA * step
+    for i in range(v.shape[0]):
+        for l in range(LANES):
+            rate = acceleration[i, l] - 2.0 * second[i, l]
+            velocity_rate[i, l] = rate
+            angle_rate[i, l] = v[i, l] - 2.0 * first[i, l] + g * rate
+
+
+@kernel
+def lag_rates(twist, aero, lag, state, first, step, relative_chord, semichords, rates):
+    """Rates of one lag state of a link (3 rows): (motion - x) / T, implicit; T = lag time x share of this exponential."""
+    if not_in_lanes(twist) or not_in_lanes(aero) or not_in_lanes(state) or not_in_lanes(first):
+        return
+    if not_in_lanes(rates):
+        return
+    share = relative_chord * semichords / JONES_MEAN_LAG
+    g = GAMMA * step
+    for l in range(LANES):
+        inverse = 1.0 / (aero[2, l] * share + lag)
+        weight = 1.0 / (1.0 + g * inverse)
+        rates[0, l] = ((twist[5, l] - state[0, l]) * inverse - 2.0 * first[0, l]) * weight
+        rates[1, l] = ((twist[0, l] - state[1, l]) * inverse - 2.0 * first[1, l]) * weight
+        rates[2, l] = ((twist[1, l] - state[2, l]) * inverse - 2.0 * first[2, l]) * weight
+
+
+@kernel
+def advance(state, first, step, out):
+    """out = state + h k1."""
+    if not_in_lanes(state) or not_in_lanes(first) or not_in_lanes(out):
+        return
+    for i in range(state.shape[0]):
+        for l in range(LANES):
+            out[i, l] = state[i, l] + step * first[i, l]
+
+
+@kernel
+def finish(state, first, second, step):
+    """state += h (3/2 k1 + 1/2 k2), with the attitude quaternion made unit again."""
+    if not_in_lanes(state) or not_in_lanes(first) or not_in_lanes(second):
+        return
+    for i in range(state.shape[0]):
+        for l in range(LANES):
+            state[i, l] += step * (1.5 * first[i, l] + 0.5 * second[i, l])
+    for l in range(LANES):
+        a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
+        scale = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
+        state[0, l], state[1, l], state[2, l], state[3, l] = a * scale, b * scale, c * scale, d * scale
+
+
+@kernel
+def stage(
+    surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, first, step, rates,
+    scratch, inputs, outputs,
+):  # fmt: skip
+    """Rates k of one stage of the W-method; ``first`` is zero in stage 1 and k1 in stage 2."""
+    links = ranges.shape[0]
+    coordinates = 3 * (links - surfaces.shape[0])
+    w_tau = S_FREE + PER_LINK * links
+    w_added = w_tau + coordinates
+    w_joint_acceleration = w_added + coordinates
+    s_q = JOINTS
+    s_v = s_q + coordinates
+    s_slow = s_v + coordinates
+    s_fast = s_slow + 3 * links
+    accelerations(
+        surfaces, ranges, shared, strips, hinges, operator, wind, constants, state, scratch, inputs, outputs
+    )
+    base_rates(state, scratch, rates)
+    for i in range(JOINTS):
+        k1, k2 = first[i], rates[i]
+        for l in range(LANES):
+            k2[l] -= 2.0 * k1[l]
+    joint_rates(
+        state[s_v:s_slow], scratch[w_joint_acceleration : w_joint_acceleration + coordinates], step,
+        first[s_q:s_v], first[s_v:s_slow], rates[s_q:s_v], rates[s_v:s_slow],
+    )  # fmt: skip
+    aero = constants[AERO_C : AERO_C + 3]
+    for link in range(links):
+        twist = scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6]
+        slow, fast = s_slow + 3 * link, s_fast + 3 * link
+        lag_rates(
+            twist, aero, SHORTEST_LAG_S, state[slow : slow + 3], first[slow : slow + 3], step,
+            relative_chord[link], 1.0 / JONES_B1, rates[slow : slow + 3],
+        )  # fmt: skip
+        lag_rates(
+            twist, aero, SHORTEST_LAG_S, state[fast : fast + 3], first[fast : fast + 3], step,
+            relative_chord[link], 1.0 / JONES_B2, rates[fast : fast + 3],
+        )  # fmt: skip
+
+
+@kernel
+def step_block(
+    surfaces, ranges, shared, strips, relative_chord, hinges, operators, wind, constants, state, step,
+    first, second, middle, scratch, inputs, outputs,
+):  # fmt: skip
+    """Advance one block by one step. ``strips``, ``hinges``, ``operators``, ``wind``: at its begin [0] and end [1]."""
+    links = ranges.shape[0]
+    coordinates = 3 * (links - surfaces.shape[0])
+    w_tau = S_FREE + PER_LINK * links
+    w_added = w_tau + coordinates
+    s_q = JOINTS
+    s_v = s_q + coordinates
+    s_slow = s_v + coordinates
+    c_stiffness = LINKS_C + LINK_ROWS * links
+    stiffness = constants[c_stiffness : c_stiffness + coordinates]
+    damping = constants[c_stiffness + coordinates : c_stiffness + 2 * coordinates]
+    tau, added = scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates]
+
+    joint_forces(stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
+    clear(second)
+    stage(
+        surfaces, ranges, shared, strips[0], relative_chord, hinges[0], operators[0], wind[0], constants, state,
+        second, step, first, scratch, inputs, outputs,
+    )  # fmt: skip
+    advance(state, first, step, middle)
+    second_joint_forces(
+        stiffness, damping, middle[s_q:s_v], middle[s_v:s_slow], first[s_q:s_v], first[s_v:s_slow], step, tau, added
+    )
+    stage(
+        surfaces, ranges, shared, strips[1], relative_chord, hinges[1], operators[1], wind[1], constants, middle,
+        first, step, second, scratch, inputs, outputs,
+    )  # fmt: skip
+    finish(state, first, second, step)
+
+
+@kernel
+def instant_rates(
+    surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, zero, scratch,
+    inputs, outputs, rates,
+):  # fmt: skip
+    """Time derivative of a block's state: a stage of a step of no length. ``zero``: as many zero rows as the state."""
+    links = ranges.shape[0]
+    coordinates = 3 * (links - surfaces.shape[0])
+    w_tau = S_FREE + PER_LINK * links
+    w_added = w_tau + coordinates
+    s_q = JOINTS
+    s_v = s_q + coordinates
+    s_slow = s_v + coordinates
+    c_stiffness = LINKS_C + LINK_ROWS * links
+    joint_forces(
+        constants[c_stiffness : c_stiffness + coordinates],
+        constants[c_stiffness + coordinates : c_stiffness + 2 * coordinates],
+        state[s_q:s_v], state[s_v:s_slow], 0.0,
+        scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
+    )  # fmt: skip
+    stage(
+        surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, zero, 0.0,
+        rates, scratch, inputs, outputs,
+    )  # fmt: skip

@@ -1,0 +1,167 @@
+"""What all flights of one sample share: the time grid, hinge motion, wind and the lattice along the morph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from morphcore.aero.operator import LatticeOperator, lattice_operator
+from morphcore.frames import axis_rotation
+from morphcore.geometry.lattice import surface_pose
+from morphcore.geometry.surface import Surface
+from morphcore.models.equivalent import ChainModel
+from morphcore.multibody.kernels.aba import H_ACCELERATION, H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.simulate.schedule import Schedule
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.005  # holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
+NODE_SPACING_RAD = 0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
+
+
+@dataclass(frozen=True)
+class TimeGrid:
+    """Equal steps of ``step_s`` from ``start_s``; rows ``at`` of the grid are the output times, or None if they differ."""
+
+    start_s: float
+    step_s: float
+    steps: int
+    at: NDArray[np.int64] | None
+
+    @property
+    def times_s(self) -> Array:
+        """(steps + 1,) times."""
+        return self.start_s + self.step_s * np.arange(self.steps + 1)
+
+
+def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
+    """A grid that hits evenly spaced output times exactly; other output times need interpolation (``at`` is None)."""
+    times = np.asarray(output_s, dtype=np.float64)
+    spacing = (times[-1] - times[0]) / (times.size - 1)
+    if np.allclose(np.diff(times), spacing, rtol=1e-6, atol=1e-9):
+        substeps = int(np.ceil(spacing / longest_step_s - 1e-9))
+        steps = substeps * (times.size - 1)
+        return TimeGrid(float(times[0]), spacing / substeps, steps, np.arange(times.size) * substeps)
+    steps = int(np.ceil((times[-1] - times[0]) / longest_step_s - 1e-9))
+    return TimeGrid(float(times[0]), float(times[-1] - times[0]) / steps, steps, None)
+
+
+@dataclass(frozen=True)
+class OperatorTable:
+    """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
+
+    matrices : (nodes, rows, columns); strips : (nodes, strips, 2); position : (steps + 1,) of each grid time among the
+    nodes, in node spacings.
+    """
+
+    matrices: Array
+    strips: Array
+    position: Array
+
+    def between(self, first: int, last: int) -> tuple[Array, Array]:
+        """Operators (k, rows, columns) and strips (k, strips, 2) at the grid times first..last - 1."""
+        nodes = self.matrices.shape[0]
+        position = self.position[first:last]
+        if nodes == 1:
+            shape = (position.size, *self.matrices.shape[1:])
+            strips = np.broadcast_to(self.strips[0], (position.size, *self.strips.shape[1:]))
+            return np.ascontiguousarray(np.broadcast_to(self.matrices[0], shape)), np.ascontiguousarray(strips)
+        base = np.clip(np.floor(position).astype(np.int64) - 1, 0, nodes - 4)
+        s = position - base
+        weight = np.zeros((position.size, nodes))
+        rows = np.arange(position.size)
+        for i in range(4):  # Lagrange's cubic through four neighbours
+            others = [j for j in range(4) if j != i]
+            weight[rows, base + i] = np.prod([(s - j) / (i - j) for j in others], axis=0)
+        low, high = int(base.min()), int(base.max()) + 4
+        local = weight[:, low:high]
+        matrices = np.tensordot(local, self.matrices[low:high], axes=1)
+        return matrices, np.tensordot(local, self.strips[low:high], axes=1)
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """Everything about a flight that does not depend on the parameters.
+
+    hinges : (steps + 1, s, HINGE_ROWS); angles : (steps + 1, s) rad; wind_N : (steps + 1, 3) m/s.
+    """
+
+    grid: TimeGrid
+    angles: Array
+    hinges: Array
+    wind_N: Array
+    table: OperatorTable
+
+
+def flight_plan(
+    model: ChainModel,
+    schedules: Sequence[Schedule],
+    grid: TimeGrid,
+    *,
+    air_velocity_N: Callable[[Array], Array] | None = None,
+    node_spacing_rad: float = NODE_SPACING_RAD,
+) -> FlightPlan:
+    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at)."""
+    times = grid.times_s
+    motions = [schedule.motion(times) for schedule in schedules]
+    hinges = np.stack(
+        [
+            _hinge_rows(surface, motion.angle, motion.rate, motion.acceleration)
+            for surface, motion in zip(model.aircraft.surfaces, motions, strict=True)
+        ],
+        axis=1,
+    )
+    angles = np.stack([motion.angle for motion in motions], axis=1)
+    hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
+    wind_N = np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
+    return FlightPlan(grid, angles, hinges, wind_N, _operator_table(model, angles * hinged, node_spacing_rad))
+
+
+def _hinge_rows(surface: Surface, angle: Array, rate: Array, acceleration: Array) -> Array:
+    """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/aba.py."""
+    rows = np.zeros((angle.size, HINGE_ROWS))
+    axis_offset = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+    root = np.array(surface.position_m)
+    if surface.hinge is None:
+        rows[:, :9] = np.eye(3).ravel()
+        rows[:, H_ORIGIN:] = root + axis_offset
+        return rows
+    sign, axis = surface.rotation_sign, surface.hinge.axis_index
+    pivot = np.array(surface.hinge.position_m)
+    # cached by angle: a held hinge repeats one rotation
+    R_BW = np.stack([axis_rotation(axis, sign * value) for value in angle])
+    arm_W = root - pivot + axis_offset  # from the hinge axis to the first link's origin, constant in W
+    direction = sign * np.eye(3)[axis]
+    rows[:, :9] = R_BW.reshape(-1, 9)
+    rows[:, H_SUBSPACE : H_SUBSPACE + 3] = direction
+    rows[:, H_SUBSPACE + 3 : H_SUBSPACE + 6] = np.cross(direction, arm_W)
+    rows[:, H_RATE] = rate
+    rows[:, H_ACCELERATION] = acceleration
+    rows[:, H_ORIGIN:] = pivot + R_BW @ arm_W
+    return rows
+
+
+def _operator_table(model: ChainModel, angles: Array, spacing: float) -> OperatorTable:
+    mach = model.flight.mach or 0.0
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angles, axis=0)).max(axis=1))])
+
+    def operator(row: Array) -> LatticeOperator:
+        return lattice_operator(model.lattice, tuple(row), mach=mach)
+
+    if travelled[-1] < 1e-9:
+        operators = [operator(angles[0])]
+        position = np.zeros(travelled.size)
+    else:
+        count = max(4, int(np.ceil(travelled[-1] / spacing)) + 1)
+        nodes = np.linspace(0.0, travelled[-1], count)
+        # strictly rising abscissae for the inverse: a held shape has the same path length for many times
+        moving = np.concatenate([[True], np.diff(travelled) > 0])
+        rows = np.stack([np.interp(nodes, travelled[moving], column[moving]) for column in angles.T], axis=1)
+        operators = [operator(row) for row in rows]
+        position = travelled / nodes[1]
+    return OperatorTable(
+        np.stack([item.matrix for item in operators]), np.stack([item.strips for item in operators]), position
+    )

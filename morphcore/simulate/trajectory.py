@@ -1,0 +1,162 @@
+"""Sample flights: measured sweep histories and attitudes over time."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.fields import Fields
+
+Array = NDArray[np.float64]
+Role = Literal["train", "held_out"]
+
+MOST_ROWS = 200_000
+COLUMNS = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
+DEGREE = np.pi / 180.0
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One flight: ``time_s`` (k,) rising; hinge angles and Euler angles (k,) in rad; other columns in ``extra``."""
+
+    name: str
+    time_s: Array
+    sweep_left: Array
+    sweep_right: Array
+    phi: Array
+    theta: Array
+    psi: Array
+    role: Role = "train"
+    weight: float = 1.0
+    extra: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def euler(self) -> Array:
+        """(k, 3) roll, pitch, yaw in rad."""
+        return np.stack([self.phi, self.theta, self.psi], axis=1)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last row."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    def sweep(self, side: str) -> Array:
+        """The hinge angle history of a side."""
+        return self.sweep_left if side == "left" else self.sweep_right
+
+
+def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
+    """Read a CSV file with the columns t, sweep_left, sweep_right, phi, theta, psi.
+
+    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns land in ``extra`` as they are.
+
+    Raises
+    ------
+    InvalidInput : a column is missing or holds something that is not a finite number, or time does not rise.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            reader = csv.reader(stream)
+            header = [name.strip() for name in next(reader, [])]
+            rows = [row for row in reader if row]
+    except FileNotFoundError:
+        raise InvalidInput(f"{path} does not exist", hint="check the path") from None
+    if not rows:
+        raise InvalidInput(f"{path} holds no rows", hint="give a CSV file with a header and at least three rows")
+    try:
+        table = np.array(rows, dtype=np.float64)
+    except ValueError as error:
+        raise InvalidInput(f"{path}: {error}", hint="every cell must be a number, every row as long as the header") from None
+    if table.shape[1] != len(header):
+        raise InvalidInput(f"{path}: rows and header differ in length", hint="repair the header")
+    values, extra = {}, {}
+    for name, column in zip(header, table.T, strict=True):
+        standard, factor = _standard_column(name)
+        if standard in COLUMNS and standard not in values:
+            values[standard] = column * factor
+        else:
+            extra[name] = column
+    missing = [name for name in COLUMNS if name not in values]
+    if missing:
+        raise InvalidInput(f"{path} has no column {', '.join(missing)}", hint=f"give the columns {', '.join(COLUMNS)}")
+    return checked(
+        Trajectory(
+            name=path.stem,
+            time_s=values["t"],
+            sweep_left=values["sweep_left"],
+            sweep_right=values["sweep_right"],
+            phi=values["phi"],
+            theta=values["theta"],
+            psi=values["psi"],
+            role=role,
+            extra=extra,
+        ),
+        pointer=f"/{path.name}",
+    )
+
+
+def trajectory_from_document(document: dict[str, Any], pointer: str) -> Trajectory:
+    """A sample written inline in JSON (names and units as in the HTTP API)."""
+    fields = Fields(document, pointer)
+    role = fields.choice("role", ("train", "held_out")) if fields.has("role") else "train"
+    trajectory = Trajectory(
+        name=fields.text("name"),
+        time_s=fields.series("time_s"),
+        sweep_left=fields.series("sweep_left_rad"),
+        sweep_right=fields.series("sweep_right_rad"),
+        phi=fields.series("phi_rad"),
+        theta=fields.series("theta_rad"),
+        psi=fields.series("psi_rad"),
+        role=role,  # type: ignore[arg-type]
+        weight=fields.number("weight", default=1.0, least=0.0, most=1e6),
+    )
+    fields.done()
+    return checked(trajectory, pointer)
+
+
+def checked(trajectory: Trajectory, pointer: str) -> Trajectory:
+    """The trajectory, if it makes sense; else InvalidInput."""
+    rows = trajectory.time_s.size
+    if not 3 <= rows <= MOST_ROWS:
+        raise InvalidInput(f"{rows} rows", pointer=f"{pointer}/time_s", hint=f"give 3 to {MOST_ROWS} rows")
+    for name in ("sweep_left", "sweep_right", "phi", "theta", "psi"):
+        column = getattr(trajectory, name)
+        if column.size != rows:
+            raise InvalidInput(
+                f"{name} has {column.size} rows, time has {rows}", pointer=f"{pointer}/{name}_rad", hint="give equal lengths"
+            )
+    for name in ("time_s", "sweep_left", "sweep_right", "phi", "theta", "psi"):
+        bad = np.flatnonzero(~np.isfinite(getattr(trajectory, name)))
+        if bad.size:
+            raise InvalidInput(
+                f"{name} is not finite at row {bad[0]}", pointer=f"{pointer}/{name}/{bad[0]}", hint="remove or repair the row"
+            )
+    falls = np.flatnonzero(np.diff(trajectory.time_s) <= 0)
+    if falls.size:
+        raise InvalidInput(
+            f"time does not rise at row {falls[0] + 1}",
+            pointer=f"{pointer}/time_s/{falls[0] + 1}",
+            hint="sort the rows by time and drop doubles",
+        )
+    for value in vars(trajectory).values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    return trajectory
+
+
+def _standard_column(name: str) -> tuple[str, float]:
+    """The standard name of a CSV column and the factor to SI units."""
+    match = re.fullmatch(r"(.+?)_(deg|rad|s|ms)", name)
+    if match is None:
+        return ("t" if name == "time" else name), 1.0
+    base, unit = match.groups()
+    base = "t" if base == "time" else base
+    return base, {"deg": DEGREE, "rad": 1.0, "s": 1.0, "ms": 1e-3}[unit]

@@ -1,0 +1,173 @@
+"""Trim: straight level flight with the wings in static aeroelastic equilibrium, for many parameter sets at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput, TrimNotFound
+from morphcore.frames import quaternion_from_euler
+from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, from_lanes, lane_constants, to_lanes
+from morphcore.models.kernels.chain import FORCE_C, JOINTS, OMEGA
+from morphcore.models.kinematics import link_poses
+from morphcore.simulate.batch import initial_state, state_rates
+from morphcore.simulate.plan import FlightPlan
+
+Array = NDArray[np.float64]
+StartMode = Literal["trim", "given"]
+
+MOST_ITERATIONS = 25
+ANGLE_TOLERANCE = 1e-11  # rad, of the last Newton step in angle of attack and joint angles
+ANGLE_PROBE = 1e-6  # rad; balances truncation and round-off of a forward difference in double precision
+FORCE_PROBE = 1.0  # N and N m; these enter linearly
+LARGEST_STEP = 0.2  # rad in one Newton step: further, the linear model means nothing
+SLAB = 256  # particles at a time; bounds the memory of the Jacobian's probes
+
+
+@dataclass(frozen=True)
+class Trim:
+    """A start of flight for each parameter set p.
+
+    alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference point;
+    q_joint : (p, coordinates) rad; converged : (p,) whether Newton's iteration arrived; residual : (p,) the last step, rad.
+    """
+
+    alpha: Array
+    force_B: Array
+    moment_B: Array
+    q_joint: Array
+    converged: NDArray[np.bool_]
+    residual: Array
+
+    def require(self) -> Trim:
+        """Itself, if every parameter set is trimmed; else TrimNotFound."""
+        if not np.all(self.converged):
+            raise TrimNotFound(residual=float(np.nanmax(self.residual)), iterations=MOST_ITERATIONS)
+        return self
+
+
+def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: StartMode = "trim") -> Trim:
+    """Equilibrium at the plan's first hinge angles.
+
+    With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and across it, a
+    constant moment, and the joint angles: the aircraft then flies straight and level. With ``"given"`` angle of attack, force
+    and moment are those of the flight's start and only the joints settle (their accelerations vanish).
+
+    Raises
+    ------
+    InvalidInput : ``start="given"`` and the flight has none.
+    """
+    if start == "given" and model.flight.start is None:
+        raise InvalidInput(
+            "the start is to be taken as given, but the flight has none",
+            pointer="/flight/start",
+            hint="add start with alpha_rad, force_b_n and moment_b_n_m, or choose start = trim",
+        )
+    parts = [
+        _trim_slab(model, batch.select(slice(i, i + SLAB)), plan, start) for i in range(0, batch.particles, SLAB)
+    ]
+    return Trim(*(np.concatenate([getattr(part, name) for part in parts]) for name in Trim.__dataclass_fields__))
+
+
+def trimmed_state(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, found: Trim, psi: float = 0.0) -> Array:
+    """State rows (p, state_rows) of the trimmed start, heading ``psi``, at the origin of N."""
+    return _state(model, batch, plan, found.alpha, found.q_joint, psi)
+
+
+def _state(
+    model: ChainModel, batch: ParameterBatch, plan: FlightPlan, alpha: Array, q_joint: Array, psi: float = 0.0
+) -> Array:
+    particles = alpha.size
+    speed = model.flight.airspeed_m_s
+    zero = np.zeros(particles)
+    air_B = speed * np.stack([np.cos(alpha), zero, np.sin(alpha)], axis=1)
+    quaternion = quaternion_from_euler(zero, alpha, zero + psi)
+    # level through the air: the wind carries the aircraft along
+    wind_B = _to_body(quaternion, plan.wind_N[0])
+    R_BL, _ = link_poses(model, batch, plan.hinges[0], q_joint)
+    lag = np.zeros((particles, model.links, 3))
+    lag[..., 0] = np.einsum("pka,pa->pk", R_BL[..., 2], air_B)
+    return initial_state(
+        model,
+        quaternion=quaternion,
+        omega_B=np.zeros((particles, 3)),
+        velocity_B=air_B + wind_B,
+        q_joint=q_joint,
+        lag_motion=lag,
+    )
+
+
+def _to_body(quaternion: Array, vector_N: Array) -> Array:
+    w, xyz = quaternion[:, :1], -quaternion[:, 1:]
+    cross = 2.0 * np.cross(xyz, vector_N)
+    return np.asarray(vector_N + w * cross + np.cross(xyz, cross))
+
+
+def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start: StartMode) -> Trim:
+    n, particles = model.coordinates, batch.particles
+    given = model.flight.start if start == "given" else None
+    free = n + (0 if given else 6)
+    probes = np.full(free, ANGLE_PROBE)
+    probes[n + 1 :] = FORCE_PROBE
+    # unknowns of a particle: joint angles, angle of attack, force along and across the path, moment
+    x = np.zeros((particles, n + 6))
+    if given:
+        x[:, n] = given.alpha_rad
+    constants = lane_constants(model, batch)
+    everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(model.surfaces[:, 1], axis=0)
+    repeated = np.repeat(np.arange(particles), free + 1)
+    probed = batch.select(repeated)
+    rows = from_lanes(constants.rows, particles)[repeated]
+    moved = np.zeros((free + 1, n + 6))
+    moved[1:, :free] = np.diag(probes)
+    converged = np.zeros(particles, dtype=bool)
+    residual = np.full(particles, np.inf)
+    for _ in range(MOST_ITERATIONS if free else 1):
+        points = (x[:, None, :] + moved).reshape(-1, n + 6)
+        force_B, moment_B = _thrust(points, n, given)
+        rows[:, FORCE_C : FORCE_C + 3], rows[:, FORCE_C + 3 : FORCE_C + 6] = force_B, moment_B
+        blocks = to_lanes(rows)
+        lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), points.shape[0])
+        state = _state(model, probed, plan, points[:, n], points[:, :n])
+        rates = state_rates(model, plan, 0, lanes, state)
+        v = JOINTS + n
+        wanted = rates[:, v : v + n] if given else np.concatenate([rates[:, v : v + n], rates[:, OMEGA : OMEGA + 6]], axis=1)
+        wanted = wanted.reshape(particles, free + 1, free)
+        if not free:
+            converged[:] = True
+            residual[:] = 0.0
+            break
+        jacobian = ((wanted[:, 1:] - wanted[:, :1]) / probes[:, None]).transpose(0, 2, 1)
+        step = _solve(jacobian, -wanted[:, 0])
+        angles = np.abs(step[:, : n + 1]).max(axis=1)
+        step *= np.minimum(1.0, LARGEST_STEP / np.maximum(angles, 1e-300))[:, None]
+        x[:, :free] += np.where(np.isfinite(step), step, 0.0)
+        residual = np.where(np.isfinite(angles), angles, np.inf)
+        converged = residual < ANGLE_TOLERANCE
+        if np.all(converged | ~np.isfinite(residual)):
+            break
+    force_B, moment_B = _thrust(x, n, given)
+    # forward differences limit the last digits: what has nearly arrived is trimmed well enough
+    return Trim(x[:, n], force_B, moment_B, x[:, :n], converged | (residual < 1e3 * ANGLE_TOLERANCE), residual)
+
+
+def _solve(jacobian: Array, right: Array) -> Array:
+    finite = np.all(np.isfinite(jacobian), axis=(1, 2))
+    safe = np.where(finite[:, None, None], jacobian, np.eye(jacobian.shape[1]))
+    try:
+        step = np.linalg.solve(safe, right[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        step = np.einsum("pij,pj->pi", np.linalg.pinv(safe), right)
+    return np.where(finite[:, None], step, np.nan)
+
+
+def _thrust(points: Array, n: int, given: object) -> tuple[Array, Array]:
+    """Constant force and moment in B of each row of unknowns."""
+    if given is not None:
+        count = points.shape[0]
+        return np.tile(given.force_B, (count, 1)), np.tile(given.moment_B, (count, 1))  # type: ignore[attr-defined]
+    alpha, along, across = points[:, n], points[:, n + 1], points[:, n + 2]
+    return np.stack([along * np.cos(alpha), across, along * np.sin(alpha)], axis=1), points[:, n + 3 : n + 6]
