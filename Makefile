@@ -37,6 +37,7 @@ $(VENV)/.stamp-full: $(VENV)/.stamp-uv pyproject.toml constraints.txt
 	@touch $@ $(VENV)/.stamp-server
 
 setup: $(VENV)/.stamp-full  ## make .venv with everything in it
+	@:
 
 demo: $(VENV)/.stamp-server  ## identify a model from the example flights through the running service
 	@$(BIN)/python examples/demo.py

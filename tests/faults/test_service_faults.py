@@ -1,0 +1,85 @@
+"""An identification whose worker is killed: it goes on by itself and ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from cli.service import Service
+from tests.identification_request import identification
+from tests.live import LiveService
+
+SEARCH = {"method": "pso", "particles": 256, "generations": 25, "seed": 2}
+SHORT = {"MORPHID_LEASE_S": "4", "MORPHID_HEARTBEAT_S": "1", "MORPHID_REAP_EVERY_S": "1"}
+PROMISED_S = 90.0
+
+
+@pytest.fixture
+def short_leases(tmp_path: Path) -> Iterator[LiveService]:
+    """A service whose reaper comes within seconds."""
+    service = LiveService(tmp_path, environment=SHORT).start()
+    yield service
+    service.stop()
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> Iterator[LiveService]:
+    """A service as it is shipped."""
+    service = LiveService(tmp_path).start()
+    yield service
+    service.stop()
+
+
+def runner_of(service: LiveService, job_id: str) -> int:
+    """Process id of the worker that runs a job, from the job's own events."""
+    answer = httpx.get(f"{service.url}/jobs/{job_id}/events", headers={"Accept": "application/json"})
+    started = [event for event in answer.json()["events"] if event["type"] == "started"]
+    return int(started[-1]["payload"]["worker"].rpartition(":")[2])
+
+
+def identify(client: Service, live: LiveService, *, kill_at: int | None) -> tuple[dict[str, Any], float, int]:
+    """Identify; kill the worker at a generation. Give result, time without progress (s) and attempts."""
+    job = client.submit("identify", identification("train_rate_0.8", links=2, search=SEARCH))
+    killed_at: float | None = None
+    away_s, reached = 0.0, 0
+    for job in client.watch(job["id"], poll_s=0.1):  # noqa: B020 - the newest look is the one that counts
+        generation = (job.get("progress") or {}).get("generation") or 0
+        if kill_at is not None and killed_at is None and generation >= kill_at:
+            os.kill(runner_of(live, job["id"]), signal.SIGKILL)
+            killed_at, reached = time.monotonic(), generation
+        elif killed_at is not None and away_s == 0.0 and job["attempt"] == 2 and generation > reached:
+            away_s = time.monotonic() - killed_at
+    assert job["status"] == "succeeded", f"{job['error']}\n{live.logs()}"
+    return client.result(job["id"]), away_s, job["attempt"]
+
+
+def assert_recovery(live: LiveService, within_s: float) -> None:
+    """Kill once, run once undisturbed, compare."""
+    with Service(live.url) as client:
+        killed, away_s, attempts = identify(client, live, kill_at=5)
+        undisturbed, _, _ = identify(client, live, kill_at=None)
+    print(f"killed worker: progress again after {away_s:.1f} s")
+    assert attempts == 2
+    assert 0.0 < away_s < within_s
+    assert killed["model"] == undisturbed["model"]
+    assert killed["fit"] == undisturbed["fit"]
+    assert killed["search"]["history"] == undisturbed["search"]["history"]
+
+
+def test_a_killed_worker_with_short_leases(short_leases: LiveService) -> None:
+    """SIGKILL amid an identification: it resumes from its checkpoint, to the bit-identical result."""
+    assert_recovery(short_leases, within_s=60.0)
+
+
+@pytest.mark.faults
+@pytest.mark.timeout(600)
+def test_a_killed_worker_as_shipped(shipped: LiveService) -> None:
+    """With the leases that are shipped the job goes on within 90 s of the kill."""
+    assert_recovery(shipped, within_s=PROMISED_S)
