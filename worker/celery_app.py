@@ -63,12 +63,12 @@ def threads_per_job() -> int:
 
 
 app = make_app(load_settings(), reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
-numerics.prepare_environment(threads_per_job())
 
 
 @worker_init.connect
 def _before_the_pool(**_: Any) -> None:
     shutdown.arm()
+    numerics.prepare_environment(threads_per_job())
 
 
 @worker_process_init.connect

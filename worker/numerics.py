@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -46,7 +48,9 @@ def share_cores(concurrency: int, *, cores: int | None = None) -> int:
 
 
 def prepare_environment(threads: int) -> None:
-    """Fix the thread count of this process and of those it forks; must run before numba is imported."""
+    """Fix the thread count of this process and of those it forks; without effect once numba is imported."""
+    if "numba" in sys.modules:
+        return  # its threads may run already; numba refuses to change their number
     os.environ["NUMBA_NUM_THREADS"] = str(threads)
     # plain threads: OpenMP dies in forked children, TBB may be missing
     os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
@@ -54,6 +58,28 @@ def prepare_environment(threads: int) -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     os.environ.setdefault("MPLBACKEND", "Agg")
+    _ensure_cache()
+
+
+def _ensure_cache() -> None:
+    """Point numba to a folder of the user's when the one it was told to use cannot be written."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if not chosen:
+        return  # numba itself finds one: beside the source, else in the user's cache
+    try:
+        Path(chosen).mkdir(parents=True, exist_ok=True)
+        if os.access(chosen, os.W_OK | os.X_OK):
+            return
+    except OSError:
+        pass
+    fallback = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
+    fallback.mkdir(mode=0o700, exist_ok=True)
+    if fallback.stat().st_uid != os.getuid():
+        fallback = Path(
+            tempfile.mkdtemp(prefix="morphid-kernels-")
+        )  # compiled code of others is not ours to run
+    log.warning("NUMBA_CACHE_DIR %s cannot be written; kernels are kept in %s", chosen, fallback)
+    os.environ["NUMBA_CACHE_DIR"] = str(fallback)
 
 
 class Kernels:

@@ -90,7 +90,7 @@ def test_a_running_search_is_cancelled_within_two_seconds(live_service: LiveServ
 
 
 def test_posting_four_samples_answers_at_once(live_service: LiveService) -> None:
-    """POST /identify with four samples is accepted in under 100 ms (best of five: test machines are shared)."""
+    """POST /identify with four samples is accepted in under 100 ms: best of five, machines are shared."""
     body = identification(*ALL_FLIGHTS, search=ENDLESS)
     took_s = []
     with httpx.Client(base_url=live_service.url) as client, Service(live_service.url) as service:

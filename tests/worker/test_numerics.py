@@ -22,14 +22,32 @@ def test_concurrent_jobs_share_the_cores(cores: int, concurrency: int, threads: 
     assert share_cores(concurrency, cores=cores) == threads
 
 
-def test_thread_counts_are_fixed_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def fresh_process(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """An environment of its own, in a process that has not imported numba."""
+    environment: dict[str, str] = {}
+    monkeypatch.setattr(os, "environ", environment)
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    return environment
+
+
+def test_thread_counts_are_fixed_for_children(fresh_process: dict[str, str]) -> None:
     """The environment that children inherit holds the thread count and a layer that survives a fork."""
-    for name in ("NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        monkeypatch.delenv(name, raising=False)
     prepare_environment(3)
-    assert os.environ["NUMBA_NUM_THREADS"] == "3"
-    assert os.environ["NUMBA_THREADING_LAYER"] == "workqueue"
-    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    assert fresh_process["NUMBA_NUM_THREADS"] == "3"
+    assert fresh_process["NUMBA_THREADING_LAYER"] == "workqueue"
+    assert fresh_process["OPENBLAS_NUM_THREADS"] == "1"
+
+
+def test_an_unwritable_cache_is_replaced(fresh_process: dict[str, str], tmp_path: Path) -> None:
+    """A cache folder that cannot be written gives way to one that can; a good one stays."""
+    fresh_process["NUMBA_CACHE_DIR"] = str(tmp_path / "good")
+    prepare_environment(1)
+    assert fresh_process["NUMBA_CACHE_DIR"] == str(tmp_path / "good")
+    (tmp_path / "file").touch()
+    fresh_process["NUMBA_CACHE_DIR"] = str(tmp_path / "file" / "under")
+    prepare_environment(1)
+    assert os.access(fresh_process["NUMBA_CACHE_DIR"], os.W_OK)
 
 
 def test_kernels_warm_up_once() -> None:

@@ -1,0 +1,126 @@
+"""The commands and health checks of docker-compose.yml, run as processes on Postgres and a real broker."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from app.database import Database
+from app.jobs.records import JobStatus
+from app.jobs.store import create_job, get_job
+from cli.broker import free_port, prepare_broker
+from cli.supervisor import ChildSpec, Supervisor
+
+PORT_INSIDE = "8000"
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+
+
+@dataclass
+class Composition:
+    """The compose file's services as processes of this machine.
+
+    Parameters
+    ----------
+    services : as the file says.
+    supervisor : runs them.
+    environment : addresses of this machine's Postgres and broker in the place of the containers'.
+    port : the API's.
+    """
+
+    services: dict[str, Any]
+    supervisor: Supervisor
+    environment: dict[str, str]
+    port: int
+
+    def command(self, name: str) -> list[str]:
+        """Give a service's command, its port and address exchanged."""
+        exchanged = {PORT_INSIDE: str(self.port), "0.0.0.0": "127.0.0.1"}  # noqa: S104 - exchanged
+        return [exchanged.get(word, word) for word in self.services[name]["command"]]
+
+    def start(self, name: str) -> None:
+        """Start a service."""
+        environment = {**self.services[name]["environment"], **self.environment}
+        self.supervisor.start(ChildSpec(name=name, command=self.command(name), environment=environment))
+
+    def healthy(self, name: str) -> bool:
+        """Run a service's health check as its container would."""
+        kind, *words = self.services[name]["healthcheck"]["test"]
+        pid = self.supervisor.children[name].pid
+        inside = {f":{PORT_INSIDE}/": f":{self.port}/", "/proc/1/": f"/proc/{pid}/", "$$": "$"}
+        for there, here in inside.items():
+            words = [word.replace(there, here) for word in words]
+        command = ["sh", "-c", words[0]] if kind == "CMD-SHELL" else words
+        checked = subprocess.run(
+            command,
+            env={**os.environ, **self.environment, "HOSTNAME": socket.gethostname()},
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+        return checked.returncode == 0
+
+    def until_healthy(self, name: str, within_s: float = 60.0) -> None:
+        """Wait for a service's health."""
+        deadline = time.monotonic() + within_s
+        while not self.healthy(name):
+            assert time.monotonic() < deadline, self.supervisor.children[name].last_words(30)
+            time.sleep(0.3)
+
+
+@pytest.fixture
+def composition(root: Path, tmp_path: Path, postgres_server: str) -> Iterator[Composition]:
+    """Postgres and a broker run; the compose file's own services are the test's to start."""
+    import psycopg
+
+    name = f"compose_{uuid.uuid4().hex}"
+    with psycopg.connect(f"postgresql://postgres@/postgres?host={postgres_server}", autocommit=True) as link:
+        link.execute(f"CREATE DATABASE {name}")
+    supervisor = Supervisor(tmp_path / "logs", report=lambda _sentence: None)
+    broker = prepare_broker(tmp_path)
+    child = supervisor.start(broker.spec)
+    assert supervisor.wait_until(child, broker.answers, 10.0)
+    yield Composition(
+        services=yaml.safe_load((root / "docker-compose.yml").read_text())["services"],
+        supervisor=supervisor,
+        environment={
+            "MORPHID_DATABASE_URL": f"postgresql://postgres@/{name}?host={postgres_server}",
+            "MORPHID_BROKER_URL": broker.url,
+            "PATH": PATH,
+        },
+        port=free_port(0),
+    )
+    supervisor.stop()
+
+
+def test_the_composed_service_works(composition: Composition, root: Path) -> None:
+    """Migrated by its own command, all services become healthy; the beat repeats a lost message."""
+    environment = {**os.environ, **composition.environment}
+    subprocess.run(composition.command("migrate"), env=environment, cwd=root, check=True, timeout=60)
+    for name in ("api", "worker", "beat"):
+        composition.start(name)
+    for name in ("api", "worker", "beat"):
+        composition.until_healthy(name)
+    database = Database(composition.environment["MORPHID_DATABASE_URL"])
+    with database.write() as session:
+        # no worker knows this operation: the row's end shows that beat, broker, worker and database connect
+        job = create_job(session, owner="local", operation="walk", request={})
+    deadline = time.monotonic() + 60.0
+    while not job.finished:
+        assert time.monotonic() < deadline, composition.supervisor.children["worker"].last_words(30)
+        time.sleep(0.3)
+        with database.read() as session:
+            job = get_job(session, "local", job.id)
+    database.dispose()
+    assert job.status is JobStatus.FAILED
+    assert (job.error or {})["code"] == "unknown_operation"
