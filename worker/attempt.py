@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from enum import Enum
 
+from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
-from sqlalchemy.orm import Session
 
 from app.database import Database
 from app.jobs.records import Claim, JobStatus
@@ -105,9 +105,9 @@ class Attempt:
             return self._fail(_error("internal_error", "the worker met an unforeseen error", hint=hint))
 
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
-        with self._database.read() as session:
-            request = load_request(session, self._claim.job_id)
-            self._checkpoint = load_checkpoint(session, self._claim)
+        with self._database.read() as connection:
+            request = load_request(connection, self._claim.job_id)
+            self._checkpoint = load_checkpoint(connection, self._claim)
         if not self._prepare_kernels():
             return self._stopped()
         self._work = find_operation(self._claim.operation)(request, self._kernels.threads)
@@ -141,7 +141,7 @@ class Attempt:
             self._unsaved, self._saved_at = None, self._clock()
 
     def _save(self, progress: Document, checkpoint: bytes | None) -> None:
-        self._persist(lambda session: save_progress(session, self._claim, progress, checkpoint))
+        self._persist(lambda connection: save_progress(connection, self._claim, progress, checkpoint))
 
     # ends
 
@@ -149,7 +149,7 @@ class Attempt:
         reason = self._vigil.reason
         if reason is StopReason.SHUTDOWN:
             self._save_unsaved()
-            self._persist(lambda session: release_job(session, self._claim))
+            self._persist(lambda connection: release_job(connection, self._claim))
             return Ending.RELEASED
         if reason is StopReason.CANCEL:
             return self._finish(JobStatus.CANCELLED, outcome=self._best_so_far())
@@ -180,8 +180,8 @@ class Attempt:
         self, status: JobStatus, *, outcome: Outcome | None = None, error: Document | None = None
     ) -> Ending:
         self._persist(
-            lambda session: finish_job(
-                session,
+            lambda connection: finish_job(
+                connection,
                 self._claim,
                 status,
                 result=None if outcome is None else outcome.document,
@@ -191,7 +191,7 @@ class Attempt:
         )
         return ENDINGS[status]
 
-    def _persist(self, write: Callable[[Session], bool]) -> None:
+    def _persist(self, write: Callable[[Connection], bool]) -> None:
         """Write in a transaction of its own; wait out a database that restarts.
 
         Raises
@@ -200,8 +200,8 @@ class Attempt:
         """
         for pause_s in (*PERSIST_PAUSES_S, None):
             try:
-                with self._database.write() as session:
-                    accepted = write(session)
+                with self._database.write() as connection:
+                    accepted = write(connection)
             except OperationalError:
                 if pause_s is None:
                     raise

@@ -111,14 +111,14 @@ class Vigil:
 
     def _changed(self) -> bool:
         """Whether the row says anything but "running" (a read; the heartbeat then finds out what)."""
-        with self._database.read() as session:
-            job = get_job(session, self._claim.owner, self._claim.job_id)
+        with self._database.read() as connection:
+            job = get_job(connection, self._claim.owner, self._claim.job_id)
         overdue = job.deadline_at is not None and job.deadline_at.timestamp() < time.time()
         return self._reason is None and (job.status is not JobStatus.RUNNING or overdue)
 
     def _renew(self) -> LeaseState:
-        with self._database.write() as session:
-            return renew_lease(session, self._claim, self._lease_s)
+        with self._database.write() as connection:
+            return renew_lease(connection, self._claim, self._lease_s)
 
     def _judge(self, state: LeaseState) -> None:
         if not state.held:

@@ -75,11 +75,11 @@ class Runner:
 
     def _claim(self) -> Claim | None:
         for _ in range(CLAIM_TRIES):
-            with self.database.write() as session:
-                job_id = next_queued(session)
+            with self.database.write() as connection:
+                job_id = next_queued(connection)
                 if job_id is None:
                     return None
-                claim = claim_job(session, job_id, self.worker_name, self.lease_s)
+                claim = claim_job(connection, job_id, self.worker_name, self.lease_s)
             if claim is not None:
                 return claim
         return None

@@ -71,8 +71,8 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
     process = enter_process()
     if republish_after_s is None:
         republish_after_s = process.settings.republish_after_s
-    with process.database.write() as session:
-        report = reap(session, republish_after_s=republish_after_s)
+    with process.database.write() as connection:
+        report = reap(connection, republish_after_s=republish_after_s)
     for kind in ("requeued", "failed", "cancelled", "expired"):
         for job_id in getattr(report, kind):
             log.warning("reaper: job %s %s", job_id, kind)
