@@ -69,9 +69,7 @@ def serve(
 def identify(
     aircraft: Annotated[Path, typer.Option(help="Aircraft, JSON.")],
     flight: Annotated[Path, typer.Option(help="Flight condition, JSON.")],
-    sample: Annotated[
-        list[Path], typer.Option(help="Sample flight to fit (CSV, JSON, Parquet, MATLAB); repeat.")
-    ],
+    sample: Annotated[list[Path], typer.Option(help="Sample flight to fit, CSV; repeat.")],
     held_out: Annotated[
         list[Path] | None, typer.Option(help="Sample flight to predict, not to fit; repeat.")
     ] = None,

@@ -25,7 +25,6 @@ QUEUE = "morphid"
 RUN_JOB = "morphid.run_job"
 REAP = "morphid.reap"
 REAP_EVERY_S = 10.0  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
-HARD_LIMIT_GRACE_S = 120.0  # after a job's own deadline, when a kernel never returned
 
 
 def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celery:
@@ -41,7 +40,6 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=True,  # `celery inspect ping` is the container's health check
-        task_time_limit=settings.job_max_seconds + HARD_LIMIT_GRACE_S,
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
         task_serializer="json",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +21,7 @@ from app.jobs.store import get_job, renew_lease
 
 log = logging.getLogger(__name__)
 
+STUCK_AFTER_S = 120.0  # work looks at its stop signal every second; if not, a kernel never returned
 LOOK_EVERY_S = 0.5  # a cancelled job must end within two seconds, and a chunk of numeric work may take one
 
 
@@ -29,6 +32,11 @@ class StopReason(Enum):
     DEADLINE = "deadline"  # its time is over
     SHUTDOWN = "shutdown"  # this worker ends; another will go on from the checkpoint
     LOST = "lost"  # another claim holds the job now; nothing we write counts
+
+
+def end_process() -> None:
+    """End this process at once: a kernel that never returns hears no signal. The reaper does the rest."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 class Vigil:
@@ -44,6 +52,8 @@ class Vigil:
     heartbeat_s : time between renewals, s.
     shutting_down : tells that this worker is asked to end.
     look_every_s : time between two looks, s.
+    on_stuck : called when the work has not heeded its stop signal for `stuck_after_s`.
+    stuck_after_s : patience with work that was asked to stop, s.
     """
 
     def __init__(
@@ -55,6 +65,8 @@ class Vigil:
         heartbeat_s: float,
         shutting_down: Callable[[], bool],
         look_every_s: float = LOOK_EVERY_S,
+        on_stuck: Callable[[], None] = end_process,
+        stuck_after_s: float = STUCK_AFTER_S,
     ) -> None:
         self._database = database
         self._claim = claim
@@ -62,6 +74,8 @@ class Vigil:
         self._heartbeat_s = heartbeat_s
         self._shutting_down = shutting_down
         self._look_every_s = min(look_every_s, heartbeat_s)
+        self._on_stuck = on_stuck
+        self._stuck_after_s = stuck_after_s
         self._over = threading.Event()
         self._reason: StopReason | None = None
         self._thread = threading.Thread(target=self._watch, name=f"vigil-{claim.job_id}", daemon=True)
@@ -91,6 +105,7 @@ class Vigil:
 
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
+        asked_at: float | None = None
         while not self._over.wait(self._look_every_s):
             now = time.monotonic()
             try:
@@ -107,7 +122,15 @@ class Vigil:
             if self._reason is None and self._shutting_down():
                 self._reason = StopReason.SHUTDOWN
             if self._reason is StopReason.LOST:
-                return
+                break
+            if self._reason is not None:
+                asked_at = now if asked_at is None else asked_at
+                if now - asked_at > self._stuck_after_s:
+                    break
+        patience_s = self._stuck_after_s if self._reason is StopReason.LOST else 0.0
+        if not self._over.wait(patience_s):
+            log.critical("job %s does not heed its stop signal; ending this process", self._claim.job_id)
+            self._on_stuck()
 
     def _changed(self) -> bool:
         """Whether the row says anything but "running" (a read; the heartbeat then finds out what)."""

@@ -77,9 +77,9 @@ class Rig:
 
     def add(self, *, published: bool = True, max_attempts: int = 3, **request: Any) -> str:
         """Queue a walk; send its wake-up message or lose it."""
-        with self.database.write() as session:
+        with self.database.write() as connection:
             job = create_job(
-                session,
+                connection,
                 owner=OWNER,
                 operation="walk",
                 request={"seed": 7, **request},
@@ -91,14 +91,14 @@ class Rig:
 
     def job(self, job_id: str) -> Job:
         """Give a job as it is now."""
-        with self.database.read() as session:
-            return get_job(session, OWNER, job_id)
+        with self.database.read() as connection:
+            return get_job(connection, OWNER, job_id)
 
     def result(self, job_id: str) -> dict[str, Any]:
         """Give a job's result."""
-        with self.database.read() as session:
+        with self.database.read() as connection:
             document: dict[str, Any] = unpacked(
-                session.execute(
+                connection.execute(
                     select(job_results.c.document).where(job_results.c.job_id == job_id)
                 ).scalar_one()
             )
@@ -114,8 +114,8 @@ class Rig:
 
     def kill_runner_of(self, job_id: str) -> None:
         """SIGKILL the process that runs a job."""
-        with self.database.read() as session:
-            name = session.execute(select(jobs.c.worker).where(jobs.c.id == job_id)).scalar_one()
+        with self.database.read() as connection:
+            name = connection.execute(select(jobs.c.worker).where(jobs.c.id == job_id)).scalar_one()
         os.kill(int(name.rpartition(":")[2]), signal.SIGKILL)
 
     def close(self) -> None:

@@ -112,15 +112,15 @@ def test_the_composed_service_works(composition: Composition, root: Path) -> Non
     for name in ("api", "worker", "beat"):
         composition.until_healthy(name)
     database = Database(composition.environment["MORPHID_DATABASE_URL"])
-    with database.write() as session:
+    with database.write() as connection:
         # no worker knows this operation: the row's end shows that beat, broker, worker and database connect
-        job = create_job(session, owner="local", operation="walk", request={})
+        job = create_job(connection, owner="local", operation="walk", request={})
     deadline = time.monotonic() + 60.0
     while not job.finished:
         assert time.monotonic() < deadline, composition.supervisor.children["worker"].last_words(30)
         time.sleep(0.3)
-        with database.read() as session:
-            job = get_job(session, "local", job.id)
+        with database.read() as connection:
+            job = get_job(connection, "local", job.id)
     database.dispose()
     assert job.status is JobStatus.FAILED
     assert (job.error or {})["code"] == "unknown_operation"

@@ -94,9 +94,9 @@ class Queue:
 
     def add(self, *, max_seconds: float | None = None, priority: int = 0, **request: Any) -> str:
         """Queue a walk and give its job's id."""
-        with self.database.write() as session:
+        with self.database.write() as connection:
             job = create_job(
-                session,
+                connection,
                 owner=OWNER,
                 operation="walk",
                 request={"seed": 7, "steps": 20, **request},
@@ -107,8 +107,8 @@ class Queue:
 
     def job(self, job_id: str) -> Job:
         """Give a job as it is now."""
-        with self.database.read() as session:
-            return get_job(session, OWNER, job_id)
+        with self.database.read() as connection:
+            return get_job(connection, OWNER, job_id)
 
 
 @pytest.fixture

@@ -27,8 +27,8 @@ MakeRunner = Callable[..., Runner]
 
 def result_of(database: Database, job_id: str) -> dict[str, Any] | None:
     """Read a job's result document."""
-    with database.read() as session:
-        data = session.execute(
+    with database.read() as connection:
+        data = connection.execute(
             select(job_results.c.document).where(job_results.c.job_id == job_id)
         ).scalar_one_or_none()
     return None if data is None else unpacked(data)
@@ -61,8 +61,8 @@ def test_a_job_ends_with_result_and_files(queue: Queue, database: Database, make
     assert job.progress is not None
     assert job.progress["fraction"] == 1.0
     assert result_of(database, job_id) == undisturbed()
-    with database.read() as session:
-        assert session.scalars(select(artifacts.c.name).where(artifacts.c.job_id == job_id)).all() == [
+    with database.read() as connection:
+        assert connection.scalars(select(artifacts.c.name).where(artifacts.c.job_id == job_id)).all() == [
             "walk.csv"
         ]
 
@@ -92,8 +92,8 @@ def test_stop_and_resume_give_the_undisturbed_result(
     assert 0 < released.progress["generation"] < 20
     assert make_runner().run_next() == (Ending.SUCCEEDED, job_id)
     assert result_of(database, job_id) == undisturbed()
-    with database.read() as session:
-        payloads = session.scalars(
+    with database.read() as connection:
+        payloads = connection.scalars(
             select(job_events.c.payload).where(job_events.c.job_id == job_id, job_events.c.type == "progress")
         ).all()
     seen = [payload["generation"] for payload in payloads if "generation" in payload]
@@ -109,8 +109,8 @@ def test_cancel_ends_a_running_job_within_two_seconds(
     thread = threading.Thread(target=lambda: endings.append(make_runner().run_next()[0]))
     thread.start()
     time.sleep(0.5)
-    with database.write() as session:
-        request_cancel(session, OWNER, job_id)
+    with database.write() as connection:
+        request_cancel(connection, OWNER, job_id)
     asked_at = time.monotonic()
     thread.join(10.0)
     assert endings == [Ending.CANCELLED]
@@ -141,10 +141,10 @@ def test_a_stale_worker_writes_nothing(queue: Queue, database: Database, make_ru
     thread = threading.Thread(target=lambda: endings.append(make_runner().run_next()[0]))
     thread.start()
     time.sleep(0.4)
-    with database.write() as session:
+    with database.write() as connection:
         # a day later the lease is over, whatever the heartbeat did
-        assert reap(session, now=time.time() + 86400.0).requeued == (job_id,)
-        assert claim_job(session, job_id, "another") is not None
+        assert reap(connection, now=time.time() + 86400.0).requeued == (job_id,)
+        assert claim_job(connection, job_id, "another") is not None
     thread.join(10.0)
     assert endings == [Ending.ABANDONED]
     job = queue.job(job_id)
@@ -160,8 +160,8 @@ def test_heartbeats_keep_a_long_step_alive(queue: Queue, database: Database, mak
     thread = threading.Thread(target=lambda: endings.append(runner.run_next()[0]))
     thread.start()
     while thread.is_alive():
-        with database.write() as session:
-            assert reap(session).requeued == ()
+        with database.write() as connection:
+            assert reap(connection).requeued == ()
         time.sleep(0.1)
     assert endings == [Ending.SUCCEEDED]
     assert queue.job(job_id).attempt == 1
@@ -218,10 +218,10 @@ def test_a_database_that_restarts_is_waited_for(
     begin = Attempt._persist
 
     def flaky(self: Attempt, write: Callable[..., bool]) -> None:
-        def refuse_twice(session: Any) -> bool:
+        def refuse_twice(connection: Any) -> bool:
             if len(pauses) < 2:
                 raise OperationalError("UPDATE", {}, Exception("the database is starting up"))
-            return write(session)
+            return write(connection)
 
         self._sleep = pauses.append
         begin(self, refuse_twice)
@@ -245,8 +245,8 @@ def test_kernels_are_ready_before_work_begins(
     thread.start()
     time.sleep(0.4)
     assert (queue.job(job_id).progress or {})["phase"] == "preparing"
-    with database.write() as session:
-        request_cancel(session, OWNER, job_id)
+    with database.write() as connection:
+        request_cancel(connection, OWNER, job_id)
     thread.join(3.0)
     assert endings == [Ending.CANCELLED]
     release.set()
