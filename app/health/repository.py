@@ -22,9 +22,7 @@ class JobCounts:
 def job_counts(session: Session) -> JobCounts:
     """Count jobs per state."""
     counts = dict.fromkeys(STATUSES, 0)
-    for status, number in session.execute(
-        select(jobs.c.status, func.count()).group_by(jobs.c.status)
-    ).tuples():
+    for status, number in session.execute(select(jobs.c.status, func.count()).group_by(jobs.c.status)):
         counts[status] = number
     oldest = session.scalar(
         select(database_time() - func.min(jobs.c.created_at)).where(jobs.c.status == JobStatus.QUEUED.value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from functools import lru_cache
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
 
@@ -14,6 +14,8 @@ TASK_NAME = "morphid.run_job"
 QUEUE_NAME = "morphid"
 CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
 SOCKET_TIMEOUT_S = 2.0
+
+WARM_UP_AFTER_S = 1.0  # the start of the process comes first
 
 logger = logging.getLogger(__name__)
 
@@ -85,6 +87,12 @@ class Publisher:
             self._thread = None
 
     def _run(self) -> None:
-        _client(self._broker_url)  # importing Celery takes a while: do it before the first job comes
-        while (job_id := self._waiting.get()) is not None:
+        try:
+            job_id = self._waiting.get(timeout=WARM_UP_AFTER_S)
+        except Empty:
+            # importing Celery takes most of a second: better before the first job than beside it
+            _client(self._broker_url).connection_for_write().transport  # noqa: B018 - imports, connects to nothing
+            job_id = self._waiting.get()
+        while job_id is not None:
             publish(job_id, self._broker_url)
+            job_id = self._waiting.get()

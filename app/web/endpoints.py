@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 
 from fastapi import APIRouter
@@ -12,9 +12,10 @@ from starlette.applications import Starlette
 from starlette.staticfiles import StaticFiles
 
 STATIC = Path(__file__).parent / "static"
-SWAGGER = (
-    Path(str(files("fastapi_offline"))) / "static"
-)  # Swagger UI as a package: no request leaves the machine
+PLAIN_DOCS = (
+    "<!doctype html><title>MorphID API</title><p>The interactive documentation needs the package "
+    "<code>fastapi-offline</code>. The OpenAPI document is at <a href='/openapi.json'>/openapi.json</a>."
+)
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -31,7 +32,9 @@ async def page() -> FileResponse:
 
 @router.get("/docs")
 async def docs() -> HTMLResponse:
-    """Return the documentation page."""
+    """Return the documentation page: Swagger UI from an installed package, nothing from other hosts."""
+    if swagger_folder() is None:
+        return HTMLResponse(PLAIN_DOCS)
     return get_swagger_ui_html(
         openapi_url="/openapi.json",
         title="MorphID API",
@@ -41,7 +44,17 @@ async def docs() -> HTMLResponse:
     )
 
 
+def swagger_folder() -> Path | None:
+    """Find the files of Swagger UI; None where their package is not installed."""
+    spec = find_spec("fastapi_offline")
+    if spec is None or spec.origin is None:
+        return None
+    return Path(spec.origin).parent / "static"
+
+
 def mount_static(app: Starlette) -> None:
     """Serve the page's files and Swagger UI's."""
-    app.mount("/static/swagger", StaticFiles(directory=SWAGGER), name="swagger")
+    swagger = swagger_folder()
+    if swagger is not None:
+        app.mount("/static/swagger", StaticFiles(directory=swagger), name="swagger")
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -16,6 +16,8 @@ from typing import Any
 import pytest
 
 from app.database import Database, upgrade
+from app.settings import Settings
+from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 
 UNPRIVILEGED_USER = "nobody"  # Postgres refuses to run as root
 START_S = 20.0
@@ -103,3 +105,34 @@ def database(database_url: str) -> Iterator[Database]:
     database = Database(database_url)
     yield database
     database.dispose()
+
+
+def _settings(database_url: str) -> Settings:
+    return Settings(
+        database_url=database_url,
+        broker_url=DEAD_BROKER,
+        event_poll_s=0.02,
+        keep_alive_s=0.2,
+        max_body_bytes=2**23,
+    )
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    """A running service on SQLite, one per test file."""
+    folder = tmp_path_factory.mktemp("service")
+    with running_service(_settings(f"sqlite:///{folder / 'service.sqlite3'}")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module", params=["sqlite", "postgres"])
+def any_service(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[RunningService]:
+    """A running service, once on each database."""
+    if request.param == "sqlite":
+        url = f"sqlite:///{tmp_path_factory.mktemp('service') / 'service.sqlite3'}"
+    else:
+        url = _fresh_postgres(request.getfixturevalue("postgres_server"))
+    with running_service(_settings(url)) as running:
+        yield running

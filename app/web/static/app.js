@@ -1,0 +1,260 @@
+"use strict";
+/* Two views: the list of jobs (#/) and one job (#/jobs/ID). Progress comes by server-sent events. */
+
+const view = document.getElementById("view");
+const FINAL = ["succeeded", "failed", "cancelled", "expired"];
+const LIVE_ROWS = 3; // event streams of the list: a browser opens six connections per host at most
+const LIST_POLL_MS = 3000;
+let leave = () => {};
+
+async function call(path, options = {}) {
+  const answer = await fetch(path, { headers: { Accept: "application/json" }, ...options });
+  if (answer.status === 204) return null;
+  const body = await answer.json();
+  if (!answer.ok) throw Object.assign(new Error(body.detail), { problem: body });
+  return body;
+}
+
+function follow(job, onEvent, after = 0) {
+  const source = new EventSource(`/jobs/${job}/events?after=${after}`);
+  const names = ["queued", "started", "progress", "requeued", "released", "cancelling", ...FINAL];
+  for (const name of names) {
+    source.addEventListener(name, (event) => {
+      if (FINAL.includes(name)) source.close();
+      onEvent(name, JSON.parse(event.data));
+    });
+  }
+  return source;
+}
+
+function problemCard(error) {
+  const told = error.problem ?? { detail: error.message };
+  return element("section", { class: "card problem" }, element("h2", {}, told.title ?? "Something went wrong"), element("p", {}, told.detail ?? ""), element("p", { class: "soft" }, told.hint ?? ""));
+}
+
+/* ---- list ---- */
+
+async function listView() {
+  const rows = new Map();
+  const sources = new Map();
+  const body = element("tbody");
+  const heads = ["Status", "Aircraft", "Links", "Search", "Progress", "Best cost", "Created"].map((text) => element("th", {}, text));
+  const more = element("button", {}, "Older jobs");
+  const older = element("tbody");
+  let cursor = null;
+  view.replaceChildren(
+    element("h1", {}, "Jobs"),
+    element("section", { class: "card" }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body, older)),
+    more,
+  );
+
+  function rowOf(job) {
+    const go = () => (location.hash = `#/jobs/${job.id}`);
+    return element(
+      "tr",
+      { class: "link", tabindex: 0, on: { click: go, keydown: (event) => event.key === "Enter" && go() } },
+      element("td", {}, pill(job.status)),
+      element("td", {}, job.request.aircraft ?? job.operation),
+      element("td", {}, String(job.request.links_per_wing ?? "–")),
+      element("td", {}, job.request.method ?? "–"),
+      element("td", {}, bar(job)),
+      element("td", {}, show.number(job.progress?.best_cost)),
+      element("td", { class: "soft" }, show.time(job.created_at)),
+    );
+  }
+
+  function place(job) {
+    const row = rowOf(job);
+    rows.get(job.id)?.row.replaceWith(row);
+    rows.set(job.id, { job, row });
+    return row;
+  }
+
+  function onEvent(id, name, data) {
+    const { job } = rows.get(id);
+    place({ ...job, status: data.status, progress: name === "progress" ? data : job.progress });
+  }
+
+  async function refresh() {
+    const page = await call("/jobs?limit=25");
+    body.replaceChildren(...page.jobs.map(place));
+    if (cursor === null) cursor = page.next_cursor;
+    more.hidden = cursor === null;
+    if (page.jobs.length === 0) body.replaceChildren(element("tr", {}, element("td", { colspan: 7, class: "empty" }, "No jobs yet. Start one: ", element("pre", {}, "morphid identify --url " + location.origin + " \\\n  --aircraft examples/aircraft.json --flight examples/flight.json \\\n  --sample examples/train_rate_0.5.csv"))));
+    const running = page.jobs.filter((job) => job.status === "running" || job.status === "cancelling").slice(0, LIVE_ROWS);
+    for (const [id, source] of sources) {
+      if (!running.some((job) => job.id === id)) { source.close(); sources.delete(id); }
+    }
+    for (const job of running) {
+      if (!sources.has(job.id)) sources.set(job.id, follow(job.id, (name, data) => onEvent(job.id, name, data), job.last_event));
+    }
+  }
+
+  more.addEventListener("click", async () => {
+    const page = await call(`/jobs?limit=25&cursor=${cursor}`);
+    older.append(...page.jobs.map(place));
+    cursor = page.next_cursor;
+    more.hidden = cursor === null;
+  });
+  const timer = setInterval(() => refresh().catch(() => {}), LIST_POLL_MS);
+  leave = () => { clearInterval(timer); sources.forEach((source) => source.close()); };
+  await refresh();
+}
+
+/* ---- one job ---- */
+
+function facts(entries) {
+  return element("dl", { class: "facts" }, ...entries.map(([title, value]) => element("div", {}, element("dt", {}, title), element("dd", {}, value))));
+}
+
+function headCard(job) {
+  const act = async (path, method) => {
+    try { await call(path, { method }); method === "DELETE" ? (location.hash = "#/") : route(); } catch (error) { view.prepend(problemCard(error)); }
+  };
+  const button = FINAL.includes(job.status)
+    ? element("button", { class: "bad push", on: { click: () => confirm("Delete this job with its files?") && act(`/jobs/${job.id}`, "DELETE") } }, "Delete")
+    : element("button", { class: "bad push", disabled: job.status === "cancelling", on: { click: () => act(job.links.cancel, "POST") } }, "Cancel");
+  const progress = job.progress ?? {};
+  const from = job.started_at ? new Date(job.started_at) : null;
+  const elapsed = from ? ((job.finished_at ? new Date(job.finished_at) : new Date()) - from) / 1000 : null;
+  return element(
+    "section",
+    { class: "card" },
+    element("div", { class: "row" }, element("h1", {}, job.request.aircraft ?? job.operation), pill(job.status), job.partial ? element("span", { class: "soft" }, "best so far") : null, button),
+    element("div", { class: "soft mono" }, job.id),
+    element("p", {}, bar(job)),
+    element("div", { class: "soft" }, progress.message ?? ""),
+    facts([
+      ["Links per wing", String(job.request.links_per_wing ?? "–")],
+      ["Search", job.request.method ?? "–"],
+      ["Phase", progress.phase ?? "–"],
+      ["Generation", String(progress.generation ?? "–")],
+      ["Best cost, rad²", show.number(progress.best_cost)],
+      ["Flights", show.number(progress.flights, 8)],
+      ["Flights per second", show.number(progress.flights_per_s)],
+      ["Running for", show.duration(elapsed)],
+      ["Remaining", FINAL.includes(job.status) ? "–" : show.duration(progress.eta_s)],
+      ["Attempt", `${job.attempt} of ${job.max_attempts}`],
+    ]),
+  );
+}
+
+function fitCard(result) {
+  const number = (text) => ({ text, number: true });
+  const rows = result.fit.map((fit) => [
+    fit.sample, fit.role === "held_out" ? "held out" : fit.role, show.number(fit.J_rigid), show.number(fit.J_initial), show.number(fit.J_identified),
+    show.number(fit.J_identified / fit.J_rigid, 2), ...["phi", "theta", "psi"].map((angle) => show.milliradians(fit.rms_rad[angle])),
+  ]);
+  const titles = ["Sample", "Role", ...["J rigid", "J first guess", "J identified", "ratio", "RMS φ, mrad", "RMS θ, mrad", "RMS ψ, mrad"].map(number)];
+  return element("section", { class: "card" }, element("h2", {}, "Fit"), table(titles, rows));
+}
+
+function modelCard(result) {
+  const model = result.model;
+  const number = (text) => ({ text, number: true });
+  const triples = (rows) => (Array.isArray(rows) ? rows : []).map((row, i) => [`joint ${i + 1}`, ...[row].flat(2).map((value) => show.number(value))]);
+  const wide = Math.max(4, ...triples(model.stiffness_nm_rad).map((row) => row.length));
+  const titles = ["", ...["flap", "torsion", "lag"].map(number)];
+  while (titles.length < wide) titles.push(number(""));
+  const aero = Object.entries(model.aero ?? {}).map(([name, value]) => [name.replaceAll("_", " "), typeof value === "number" ? show.number(value) : JSON.stringify(value)]);
+  return element(
+    "section", { class: "card" },
+    element("h2", {}, "Identified model"),
+    facts([["Links per wing", String(model.links_per_wing)], ["Division of the span", [model.division].flat(2).map((part) => show.number(part)).join(" : ")], ...aero]),
+    element("p", { class: "soft" }, "Stiffness, N m/rad"), table(titles, triples(model.stiffness_nm_rad)),
+    element("p", { class: "soft" }, "Damping, N m s/rad"), table(titles, triples(model.damping_nms_rad)),
+  );
+}
+
+function filesCards(files) {
+  const plots = files.filter((file) => file.name.endsWith(".svg"));
+  const figures = plots.map((file) => element("figure", {}, element("a", { href: file.href, target: "_blank" }, element("img", { src: file.href, alt: file.name, loading: "lazy" })), element("figcaption", {}, file.name.replace(".svg", "").replaceAll("_", " "))));
+  const links = files.map((file) => element("a", { href: file.href, download: file.name }, `${file.name} (${show.bytes(file.size_bytes)})`));
+  return [
+    figures.length ? element("section", { class: "card" }, element("h2", {}, "Plots"), element("div", { class: "plots" }, ...figures)) : null,
+    links.length ? element("section", { class: "card" }, element("h2", {}, "Files"), element("div", { class: "files" }, ...links)) : null,
+  ].filter(Boolean);
+}
+
+async function jobView(id) {
+  const points = [];
+  const log = [];
+  let job = await call(`/jobs/${id}`);
+  const head = element("div"), live = element("div"), results = element("div"), events = element("details", { class: "card" });
+  view.replaceChildren(head, results, live, events);
+
+  function draw() {
+    head.replaceChildren(headCard(job));
+    live.replaceChildren(points.length > 1 ? element("section", { class: "card" }, element("h2", {}, "Convergence"), convergence(points)) : "");
+    const rows = log.slice(-200).reverse().map(([name, data]) => [String(data.seq), name, show.time(data.at), data.message ?? data.reason ?? data.worker ?? ""]);
+    events.replaceChildren(element("summary", {}, `History (${log.length} events)`), table(["#", "Event", "Time", ""], rows));
+  }
+
+  async function finish() {
+    job = await call(`/jobs/${id}`);
+    draw();
+    const parts = [];
+    if (job.error) parts.push(problemCard({ problem: { title: `Failed: ${job.error.code}`, detail: job.error.detail, hint: job.error.hint } }));
+    try {
+      const result = await call(job.links.result);
+      parts.push(fitCard(result), modelCard(result));
+    } catch (error) {
+      if (!error.problem) throw error; // no result is told by the status and the error card
+    }
+    parts.push(...filesCards((await call(job.links.artifacts)).artifacts));
+    results.replaceChildren(...parts);
+  }
+
+  let pending = false;
+  const redraw = () => {
+    if (pending) return;
+    pending = true;
+    requestAnimationFrame(() => { pending = false; draw(); });
+  };
+  draw();
+  const source = follow(id, (name, data) => {
+    log.push([name, data]);
+    if (name === "progress") {
+      job.progress = data;
+      if (data.best_cost != null) points.push([data.generation ?? points.length, data.best_cost]);
+    }
+    job.status = data.status;
+    job.attempt = data.attempt;
+    if (name === "started" && !job.started_at) job.started_at = data.at;
+    if (FINAL.includes(name)) finish().catch((error) => results.replaceChildren(problemCard(error)));
+    redraw();
+  });
+  const timer = setInterval(() => { if (!FINAL.includes(job.status)) redraw(); }, 1000);
+  leave = () => { source.close(); clearInterval(timer); };
+}
+
+/* ---- frame ---- */
+
+async function route() {
+  leave();
+  leave = () => {};
+  const match = /^#\/jobs\/([A-Za-z0-9_]+)$/.exec(location.hash);
+  try {
+    await (match ? jobView(match[1]) : listView());
+  } catch (error) {
+    view.replaceChildren(problemCard(error));
+  }
+}
+
+async function health() {
+  const sign = document.getElementById("health");
+  try {
+    const state = await (await fetch("/readyz")).json();
+    const good = state.status === "ready";
+    sign.className = `health ${good ? (state.broker === "ok" ? "good" : "warn") : "bad"}`;
+    sign.textContent = good ? (state.broker === "ok" ? "ready" : `broker ${state.broker}`) : `database ${state.database}`;
+  } catch {
+    sign.className = "health bad";
+    sign.textContent = "service unreachable";
+  }
+}
+
+addEventListener("hashchange", route);
+setInterval(health, 10000);
+health();
+route();

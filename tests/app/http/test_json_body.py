@@ -1,0 +1,53 @@
+"""Laws of reading JSON bodies."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.errors import MalformedBody
+from app.http.json_body import MAX_KEYS, parse_json
+
+JSON_VALUES = st.recursive(
+    st.none() | st.booleans() | st.floats(allow_nan=False) | st.integers(-(2**53), 2**53) | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(JSON_VALUES)
+def test_reads_what_was_written(value: object) -> None:
+    """Every JSON value comes back as it was written."""
+    assert parse_json(json.dumps(value).encode()) == value
+
+
+def test_not_a_number_is_left_to_the_schema() -> None:
+    """NaN and overflowing numbers pass, so that the schema can name their field."""
+    first, second = parse_json(b"[NaN, 1e400]")
+    assert math.isnan(first)
+    assert math.isinf(second)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (b'{"a": 1,}', "line 1"),
+        (b"", "Not JSON"),
+        (b"[" * 99_999, "nested"),
+        (b'{"a":' * 9_000 + b"1" + b"}" * 9_000, "nested"),
+        (b'{"a": 1, "b": {"c": 1, "c": 2}}', "'c' appears twice"),
+        (b"[" * 200_000, "lists"),
+        (b'"\xff\xfe"', "UTF-8"),
+        (b"9" * 5000, "Not JSON"),
+        (json.dumps({str(i): i for i in range(MAX_KEYS + 1)}).encode(), "fields"),
+    ],
+)
+def test_bad_text_is_refused_in_words(body: bytes, words: str) -> None:
+    """Whatever is not a sensible JSON text is refused with a sentence and a way out."""
+    with pytest.raises(MalformedBody, match=words) as caught:
+        parse_json(body)
+    assert caught.value.hint

@@ -1,0 +1,73 @@
+"""A real server with the application in a thread of the test, so that tests can play the worker beside it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+import uvicorn
+
+from app.database import Database
+from app.jobs import store
+from app.jobs.records import Claim
+from app.main import create_app
+from app.settings import Settings
+
+DEAD_BROKER = "redis://127.0.0.1:1/0"  # nothing listens there: every test runs with the broker away
+START_S = 20.0
+
+
+@dataclass(frozen=True)
+class RunningService:
+    """One server, a client of it, and its database beside it."""
+
+    url: str
+    client: httpx.Client
+    database: Database
+    settings: Settings
+
+    def claim(self, job_id: str) -> Claim:
+        """Play a worker that takes up the job."""
+        with self.database.write() as session:
+            claim = store.claim_job(session, job_id, "a test")
+        assert claim is not None
+        return claim
+
+    def progress(self, claim: Claim, **progress: Any) -> None:
+        """Play a worker that reports progress."""
+        with self.database.write() as session:
+            assert store.save_progress(session, claim, progress, b"state")
+
+    def finish(self, claim: Claim, status: str, **end: Any) -> None:
+        """Play a worker that ends the job."""
+        with self.database.write() as session:
+            assert store.finish_job(session, claim, status, **end)
+
+
+@contextmanager
+def running_service(settings: Settings) -> Iterator[RunningService]:
+    """Serve until the block ends."""
+    config = uvicorn.Config(create_app(settings), port=0, log_level="error", timeout_graceful_shutdown=2)
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    deadline = time.monotonic() + START_S
+    while not server.started:
+        assert thread.is_alive(), "the server did not start"
+        assert time.monotonic() < deadline, "the server takes too long to start"
+        time.sleep(0.01)
+    port = server.servers[0].sockets[0].getsockname()[1]
+    url = f"http://127.0.0.1:{port}"
+    database = Database(settings.database_url)
+    try:
+        with httpx.Client(base_url=url, timeout=30.0) as client:
+            yield RunningService(url, client, database, settings)
+    finally:
+        server.should_exit = True
+        thread.join(10.0)
+        database.dispose()
