@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
@@ -20,6 +21,7 @@ Document = Mapping[str, Any]
 P = ParamSpec("P")
 R = TypeVar("R")
 
+LINE_EVERY_S = 5.0
 STATUS_COLOURS = {
     "queued": "yellow",
     "running": "cyan",
@@ -68,23 +70,25 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
 
 
 class Meter:
-    """A progress bar fed with a job's progress documents."""
+    """A progress bar fed with a job's progress documents; where there is no terminal, a line now and then."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
         self._task = progress.add_task("waiting", total=1.0, detail="")
+        self._next_line_at = 0.0
 
     def show(self, progress: Document | None, status: str = "running") -> None:
         """Show one progress document."""
         if progress is None:
             self._progress.update(self._task, description=status)
             return
-        self._progress.update(
-            self._task,
-            completed=float(progress.get("fraction") or 0.0),
-            description=str(progress.get("phase") or status),
-            detail=_detail(progress),
-        )
+        fraction, phase = float(progress.get("fraction") or 0.0), str(progress.get("phase") or status)
+        self._progress.update(self._task, completed=fraction, description=phase, detail=_detail(progress))
+        if not self._progress.console.is_terminal and time.monotonic() >= self._next_line_at:
+            self._progress.console.print(
+                f"{phase:<10} {100.0 * fraction:3.0f} %  {_detail(progress)}", markup=False
+            )
+            self._next_line_at = time.monotonic() + LINE_EVERY_S
 
 
 @contextmanager
@@ -104,10 +108,10 @@ def meter() -> Iterator[Meter]:
 
 def fit_table(result: Document) -> Table:
     """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
-    table = Table(title="Fit per sample (J in rad², RMS in mrad)")
+    table = Table(title="Fit: cost J in rad² (rigid, first guess, identified), RMS of φ, θ, ψ in mrad")
     for name in ("sample", "role"):
-        table.add_column(name)
-    for name in ("J rigid", "J initial", "J identified", "identified / rigid", "φ", "θ", "ψ"):
+        table.add_column(name, no_wrap=True)
+    for name in ("rigid", "guess", "identified", "ratio", "φ", "θ", "ψ"):
         table.add_column(name, justify="right")
     for row in result["fit"]:
         rms = row["rms_rad"]
@@ -124,7 +128,8 @@ def fit_table(result: Document) -> Table:
 def model_table(result: Document) -> Table:
     """Show the identified joints, root to tip: stiffness (N m/rad) and damping (N m s/rad)."""
     model = result["model"]
-    table = Table(title=f"Equivalent model, {model['links_per_wing']} links per wing")
+    corrections = ", ".join(f"{name} {_short(value)}" for name, value in model["aero"].items())
+    table = Table(title=f"Equivalent model, {model['links_per_wing']} links per wing", caption=corrections)
     table.add_column("joint")
     for name in ("k flap", "k torsion", "k lag", "damping"):
         table.add_column(name, justify="right")
