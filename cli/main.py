@@ -224,20 +224,18 @@ def cancel_job(job: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> N
 @reports_errors
 def upgrade_database(revision: Annotated[str, typer.Argument()] = "head") -> None:
     """Migrate the database (MORPHID_DATABASE_URL) up."""
-    from app.database import upgrade
-    from app.settings import load_settings
+    from cli.migrate import configured_url, upgrade_to
 
-    upgrade(load_settings().database_url, revision)
+    upgrade_to(configured_url(), revision)
 
 
 @database.command("downgrade")
 @reports_errors
 def downgrade_database(revision: Annotated[str, typer.Argument(help="`base` empties the database.")]) -> None:
     """Migrate the database (MORPHID_DATABASE_URL) down."""
-    from app.database import downgrade
-    from app.settings import load_settings
+    from cli.migrate import configured_url, downgrade_to
 
-    downgrade(load_settings().database_url, revision)
+    downgrade_to(configured_url(), revision)
 
 
 def _show_result(result: dict[str, Any], json_out: Path | None) -> None:

@@ -18,6 +18,7 @@ from rich.console import Console
 
 from cli.broker import LOOPBACK, Broker, free_port, prepare_broker
 from cli.exits import CommandError, Exit
+from cli.migrate import upgrade_to
 from cli.supervisor import Child, ChildSpec, Supervisor
 
 BROKER_WITHIN_S = 10.0
@@ -72,7 +73,7 @@ def serve(options: ServeOptions) -> None:
     with _own_data_dir(options.data_dir) as data_dir:
         port = _api_port(options.host, options.port)
         environment = _environment(options, data_dir, port)
-        _migrate(environment["MORPHID_DATABASE_URL"])
+        upgrade_to(environment["MORPHID_DATABASE_URL"])
         supervisor = Supervisor(
             data_dir / "logs", report=lambda sentence: announcer.event("restart", f"morphid: {sentence}")
         )
@@ -160,12 +161,6 @@ def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, 
         "MORPHID_WORKERS": str(options.workers),
         "PYTHONUNBUFFERED": "1",
     }
-
-
-def _migrate(database_url: str) -> None:
-    from app.database import upgrade
-
-    upgrade(database_url)
 
 
 @contextmanager
