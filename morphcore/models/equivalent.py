@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import AERO_ROWS, JONES_MEAN_LAG
+from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_MEAN_LAG
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
@@ -21,6 +21,7 @@ IntArray = NDArray[np.int64]
 
 MOST_LINKS = 8
 NEUTRAL_LIFT_FACTOR = 1.0
+SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ class ChainModel:
 
     @property
     def state_rows(self) -> int:
-        """Rows of a lane's state: 13 of the fuselage, angles and rates of the joints, six lag states a link."""
-        return 13 + 2 * self.coordinates + 6 * self.links
+        """Rows of a lane's state: 13 of the fuselage, angles and rates of the joints, nine rows of lag a link."""
+        return 13 + 2 * self.coordinates + 9 * self.links
 
     @property
     def relative_chord(self) -> Array:
@@ -185,8 +186,20 @@ def from_lanes(blocks: Array, particles: int) -> Array:
     return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:particles])
 
 
-def lane_constants(model: ChainModel, batch: ParameterBatch) -> LaneConstants:
-    """Lay a batch of parameters out for the kernels."""
+def lag_weights(lag_s: Array, step_s: float) -> Array:
+    """Weights (..., 4) of one step of both of Jones' exponentials for mean lag times (...), s.
+
+    For each of slow and fast: the decay e = exp(-h / T), and 1 - (1 - e) T / h.
+    """
+    weights = []
+    for semichords in (1.0 / JONES_B1, 1.0 / JONES_B2):
+        z = step_s / np.maximum(lag_s * semichords / JONES_MEAN_LAG, SHORTEST_LAG_S)
+        weights += [np.exp(-z), 1.0 + np.expm1(-z) / z]
+    return np.stack(weights, axis=-1)
+
+
+def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> LaneConstants:
+    """Lay a batch of parameters out for the kernels and for steps of ``step_s``."""
     particles = batch.particles
     links = np.zeros((particles, model.links, LINK_ROWS))
     stiffness, damping, overlap = [], [], []
@@ -215,8 +228,9 @@ def lane_constants(model: ChainModel, batch: ParameterBatch) -> LaneConstants:
         is_touched = weight > 0.0
         touched[:, mine, 0] = np.argmax(is_touched, axis=1)
         touched[:, mine, 1] = part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)
+    links[:, :, 10:] = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
     values = np.zeros((particles, LINKS_C))
-    values[:, AERO_C : AERO_C + AERO_ROWS] = np.stack([batch.lift_factor, batch.centre_shift, batch.lag], axis=1)
+    values[:, AERO_C : AERO_C + AERO_ROWS] = np.stack([batch.lift_factor, batch.centre_shift], axis=1)
     rows = np.concatenate([values, links.reshape(particles, -1), *stiffness, *damping, *overlap], axis=1)
     low = to_lanes(touched[..., 0].astype(np.float64)).min(axis=2)
     high = to_lanes(touched[..., 1].astype(np.float64)).max(axis=2)

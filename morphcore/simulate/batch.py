@@ -75,7 +75,7 @@ def initial_state(
     lag = lag_motion.reshape(particles, -1)
     position = np.zeros((particles, 3)) if position_N is None else position_N
     return np.concatenate(
-        [quaternion, omega_B, velocity_B, position, q_joint, np.zeros_like(q_joint), lag, lag], axis=1
+        [quaternion, omega_B, velocity_B, position, q_joint, np.zeros_like(q_joint), lag, lag, lag], axis=1
     )
 
 
@@ -109,7 +109,6 @@ def fly_batch(
     scratch = np.zeros((groups, scratch_rows(model.links, model.coordinates), LANES))
     inputs, outputs = np.zeros((groups, columns, LANES)), np.zeros((groups, rows, LANES))
     shared = shared_numbers(model)
-    relative_chord = model.relative_chord
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
     length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
     for first in range(0, plan.grid.steps, length):
@@ -119,8 +118,8 @@ def fly_batch(
         operators, strips = plan.table.between(first, last + 1)
         record = np.empty((last - first, record_rows, count, LANES))
         fly(
-            model.surfaces, constants.ranges, shared, relative_chord, strips, plan.hinges[first : last + 1], operators,
-            plan.wind_N[first : last + 1], constants.rows, plan.grid.step_s, blocks, work, scratch, inputs, outputs,
+            model.surfaces, constants.ranges, shared, strips, plan.hinges[first : last + 1],
+            plan.mean_accelerations[first:last], operators, plan.wind_N[first : last + 1], constants.rows, plan.grid.step_s, blocks, work, scratch, inputs, outputs,
             record,
         )  # fmt: skip
         yield Chunk(first + 1, record.reshape(last - first, record_rows, -1)[..., :particles])
@@ -134,8 +133,8 @@ def state_rates(model: ChainModel, plan: FlightPlan, row: int, constants: LaneCo
     operators, strips = plan.table.between(row, row + 1)
     rates = np.empty_like(blocks)
     rates_of_blocks(
-        model.surfaces, constants.ranges, shared_numbers(model), model.relative_chord, strips,
-        plan.hinges[row : row + 1], operators, plan.wind_N[row : row + 1], constants.rows,
+        model.surfaces, constants.ranges, shared_numbers(model), strips,
+        plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
         np.zeros((model.state_rows, LANES)), blocks, np.zeros((count, scratch_rows(model.links, model.coordinates), LANES)),
         np.zeros((count, columns, LANES)), np.zeros((count, rows, LANES)), rates,
     )  # fmt: skip

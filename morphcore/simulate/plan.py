@@ -13,7 +13,7 @@ from morphcore.frames import axis_rotation
 from morphcore.geometry.lattice import surface_pose
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
-from morphcore.multibody.kernels.aba import H_ACCELERATION, H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.multibody.kernels.aba import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
 from morphcore.simulate.schedule import Schedule
 
 Array = NDArray[np.float64]
@@ -86,14 +86,22 @@ class OperatorTable:
 class FlightPlan:
     """Everything about a flight that does not depend on the parameters.
 
-    hinges : (steps + 1, s, HINGE_ROWS); angles : (steps + 1, s) rad; wind_N : (steps + 1, 3) m/s.
+    angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the
+    kernels. wind_N : (steps + 1, 3) m/s.
     """
 
     grid: TimeGrid
     angles: Array
+    rates: Array
+    accelerations: Array
     hinges: Array
     wind_N: Array
     table: OperatorTable
+
+    @property
+    def mean_accelerations(self) -> Array:
+        """(steps, s) mean acceleration of the hinges over each step, rad/s^2."""
+        return np.diff(self.rates, axis=0) / self.grid.step_s
 
 
 def flight_plan(
@@ -109,18 +117,20 @@ def flight_plan(
     motions = [schedule.motion(times) for schedule in schedules]
     hinges = np.stack(
         [
-            _hinge_rows(surface, motion.angle, motion.rate, motion.acceleration)
+            _hinge_rows(surface, motion.angle, motion.rate)
             for surface, motion in zip(model.aircraft.surfaces, motions, strict=True)
         ],
         axis=1,
     )
-    angles = np.stack([motion.angle for motion in motions], axis=1)
+    angles, rates, accelerations = (
+        np.stack([getattr(motion, name) for motion in motions], axis=1) for name in ("angle", "rate", "acceleration")
+    )
     hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
     wind_N = np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
-    return FlightPlan(grid, angles, hinges, wind_N, _operator_table(model, angles * hinged, node_spacing_rad))
+    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, _operator_table(model, angles * hinged, node_spacing_rad))
 
 
-def _hinge_rows(surface: Surface, angle: Array, rate: Array, acceleration: Array) -> Array:
+def _hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
     """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/aba.py."""
     rows = np.zeros((angle.size, HINGE_ROWS))
     axis_offset = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
@@ -131,7 +141,6 @@ def _hinge_rows(surface: Surface, angle: Array, rate: Array, acceleration: Array
         return rows
     sign, axis = surface.rotation_sign, surface.hinge.axis_index
     pivot = np.array(surface.hinge.position_m)
-    # cached by angle: a held hinge repeats one rotation
     R_BW = np.stack([axis_rotation(axis, sign * value) for value in angle])
     arm_W = root - pivot + axis_offset  # from the hinge axis to the first link's origin, constant in W
     direction = sign * np.eye(3)[axis]
@@ -139,7 +148,6 @@ def _hinge_rows(surface: Surface, angle: Array, rate: Array, acceleration: Array
     rows[:, H_SUBSPACE : H_SUBSPACE + 3] = direction
     rows[:, H_SUBSPACE + 3 : H_SUBSPACE + 6] = np.cross(direction, arm_W)
     rows[:, H_RATE] = rate
-    rows[:, H_ACCELERATION] = acceleration
     rows[:, H_ORIGIN:] = pivot + R_BW @ arm_W
     return rows
 

@@ -116,7 +116,7 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
     x = np.zeros((particles, n + 6))
     if given:
         x[:, n] = given.alpha_rad
-    constants = lane_constants(model, batch)
+    constants = lane_constants(model, batch, plan.grid.step_s)
     everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(model.surfaces[:, 1], axis=0)
     repeated = np.repeat(np.arange(particles), free + 1)
     probed = batch.select(repeated)

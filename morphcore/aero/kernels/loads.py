@@ -23,7 +23,7 @@ from morphcore.jit import kernel
 from morphcore.lanes import LANES, not_in_lanes
 
 OUTPUTS = 5
-AERO_ROWS = 3  # lift factor, centre shift (m, forward), lag time (s)
+AERO_ROWS = 2  # lift factor, centre shift (m, forward)
 # Wagner's function by R. T. Jones (1940): 1 - A1 exp(-b1 s) - A2 exp(-b2 s), s in semichords travelled
 JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
@@ -33,18 +33,27 @@ LINK0, LINKS, STRIP0, STRIPS, PAIR0 = 0, 1, 2, 3, 4
 
 
 @kernel
-def lagged_motion(twist, slow, fast, aero, effective):
-    """What the circulation answers to: (v_z, omega_x, omega_y) of a link after Jones' lag, times the lift factor."""
-    if not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast) or not_in_lanes(aero):
+def lagged_motion(link, twist, slow, fast, previous, aero, effective):
+    """What the circulation answers to: (v_z, omega_x, omega_y) of a link after Jones' lag, times the lift factor.
+
+    ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at ``previous``; what its
+    linear change since then adds, in proportion to the lag weights of the link, is added here.
+    """
+    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
         return
-    if not_in_lanes(effective):
+    if not_in_lanes(previous) or not_in_lanes(aero) or not_in_lanes(effective):
         return
     now = 1.0 - JONES_A1 - JONES_A2
-    for l in range(LANES):
-        lift = aero[0, l]
-        effective[0, l] = lift * (now * twist[5, l] + JONES_A1 * slow[0, l] + JONES_A2 * fast[0, l])
-        effective[1, l] = lift * (now * twist[0, l] + JONES_A1 * slow[1, l] + JONES_A2 * fast[1, l])
-        effective[2, l] = lift * (now * twist[1, l] + JONES_A1 * slow[2, l] + JONES_A2 * fast[2, l])
+    for i in range(3):
+        source = twist[(5, 0, 1)[i]]
+        for l in range(LANES):
+            motion = source[l]
+            change = motion - previous[i, l]
+            effective[i, l] = aero[0, l] * (
+                now * motion
+                + JONES_A1 * (slow[i, l] + link[11, l] * change)
+                + JONES_A2 * (fast[i, l] + link[13, l] * change)
+            )
 
 
 @kernel

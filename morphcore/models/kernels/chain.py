@@ -25,10 +25,11 @@ from morphcore.multibody.kernels.aba import (
 )
 from morphcore.lanes import LANES, not_in_lanes
 
-# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates, lag states
+# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates, and
+# for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones first)
 OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
-# rows of a lane's constants: force and moment in B, then aero (3), links, stiffness, damping, overlap
-FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 9
+# rows of a lane's constants: force and moment in B, then aero (2), links, stiffness, damping, overlap
+FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 8
 # rows of the scratch block before the per-link and per-joint ones
 S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
 S_INERTIA, S_CARRIED, S_FACTOR, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 87, 100, 103, 106
@@ -100,8 +101,10 @@ def clear(block):
 
 
 @kernel
-def accelerations(surfaces, ranges, shared, strips, hinges, operator, wind, constants, state, scratch, inputs, outputs):
+def accelerations(surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, scratch, inputs, outputs):
     """Base and joint accelerations of a block for joint forces and added diagonal found in the scratch block.
+
+    ``hinge_accelerations`` (s,): accelerations of the hinges, rad/s^2.
 
     Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint accelerations and
     the links' twists in theirs.
@@ -122,9 +125,10 @@ def accelerations(surfaces, ranges, shared, strips, hinges, operator, wind, cons
     s_v = s_q + coordinates
     s_slow = s_v + coordinates
     s_fast = s_slow + 3 * links
+    s_previous = s_fast + 3 * links
     c_overlap = LINKS_C + LINK_ROWS * links + 2 * coordinates
     overlap = constants[c_overlap:]
-    aero = constants[AERO_C : AERO_C + 3]
+    aero = constants[AERO_C : AERO_C + 2]
     density = shared[DENSITY]
 
     body_axes(state, wind, shared[GRAVITY], scratch)
@@ -137,7 +141,7 @@ def accelerations(surfaces, ranges, shared, strips, hinges, operator, wind, cons
             link = surfaces[s, LINK0] + k
             twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
             if k == 0:
-                hinge_twist(base_twist, hinges[s], twist, scratch[w_bias + 6 * link : w_bias + 6 * link + 6])
+                hinge_twist(base_twist, hinges[s], hinge_accelerations[s], twist, scratch[w_bias + 6 * link : w_bias + 6 * link + 6])
             else:
                 c = 3 * joint_number
                 gimbal_twist(
@@ -150,9 +154,11 @@ def accelerations(surfaces, ranges, shared, strips, hinges, operator, wind, cons
                 )
                 joint_number += 1
             lagged_motion(
+                constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                 twist,
                 state[s_slow + 3 * link : s_slow + 3 * link + 3],
                 state[s_fast + 3 * link : s_fast + 3 * link + 3],
+                state[s_previous + 3 * link : s_previous + 3 * link + 3],
                 aero,
                 scratch[w_effective + 3 * link : w_effective + 3 * link + 3],
             )

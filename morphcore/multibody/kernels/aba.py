@@ -20,10 +20,11 @@ from morphcore.lanes import LANES, not_in_lanes, sine_cosine
 
 JOINT_ROWS = 44
 J_R, J_SINE, J_BIAS, J_U, J_INVERSE, J_FORCE = 0, 9, 11, 17, 35, 41
-LINK_ROWS = 10  # mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area
-# rotation W -> B (9), motion subspace S of the hinge in W (6), rate, acceleration, origin of the first link in B (3)
-HINGE_ROWS = 20
-H_SUBSPACE, H_RATE, H_ACCELERATION, H_ORIGIN = 9, 15, 16, 17
+# mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area, weights of the lag (4)
+LINK_ROWS = 14
+# rotation W -> B (9), motion subspace S of the hinge in W (6), rate, origin of the first link in B (3)
+HINGE_ROWS = 19
+H_SUBSPACE, H_RATE, H_ORIGIN = 9, 15, 16
 
 
 @kernel
@@ -78,19 +79,19 @@ def gimbal_twist(twist_parent, link, q, v, joint, twist):
 
 
 @kernel
-def hinge_twist(twist_base, hinge, twist, bias):
+def hinge_twist(twist_base, hinge, acceleration, twist, bias):
     """Twist of a surface's first link and its acceleration but for the base's: hinge motion is prescribed."""
     if not_in_lanes(twist_base) or not_in_lanes(twist) or not_in_lanes(bias):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    rate, acceleration = hinge[15], hinge[16]
+    rate = hinge[15]
     jx, jy, jz = hinge[9] * rate, hinge[10] * rate, hinge[11] * rate
     kx, ky, kz = hinge[12] * rate, hinge[13] * rate, hinge[14] * rate
     ex, ey, ez = hinge[9] * acceleration, hinge[10] * acceleration, hinge[11] * acceleration
     fx, fy, fz = hinge[12] * acceleration, hinge[13] * acceleration, hinge[14] * acceleration
-    px, py, pz = hinge[17], hinge[18], hinge[19]
+    px, py, pz = hinge[16], hinge[17], hinge[18]
     for l in range(LANES):
         ax, ay, az = twist_base[0, l], twist_base[1, l], twist_base[2, l]
         bx = twist_base[3, l] + ay * pz - az * py
@@ -379,7 +380,7 @@ def carry_through_hinge(hinge, inertia, force):
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    px, py, pz = hinge[17], hinge[18], hinge[19]
+    px, py, pz = hinge[16], hinge[17], hinge[18]
     for l in range(LANES):
         carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l)
 
@@ -462,7 +463,7 @@ def hinge_acceleration(base, hinge, bias, acceleration):
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    px, py, pz = hinge[17], hinge[18], hinge[19]
+    px, py, pz = hinge[16], hinge[17], hinge[18]
     for l in range(LANES):
         ax, ay, az = base[0, l], base[1, l], base[2, l]
         bx = base[3, l] + ay * pz - az * py

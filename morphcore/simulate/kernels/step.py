@@ -1,4 +1,4 @@
-"""One time step of a block of lanes: a two-stage W-method, implicit in joint stiffness, joint damping and lag.
+"""One time step of a block of lanes: a two-stage W-method, implicit in joint stiffness and damping, exact in the lag.
 
 The method is ROS2 of Verwer, Spee, Blom & Hundsdorfer (1999, SIAM J. Sci. Comput. 20, equation 2.1):
 
@@ -7,20 +7,22 @@ The method is ROS2 of Verwer, Spee, Blom & Hundsdorfer (1999, SIAM J. Sci. Compu
     u' = u + h (3/2 k1 + 1/2 k2)
 
 which is of second order for *any* matrix A, and L-stable with gamma = 1 - 1/sqrt(2) where A is exact. Here A holds the
-diagonal joint stiffness K and damping C and the lag's time constants, with the mass matrix of the stage: then the
-implicit equations are the articulated-body pass with gamma h C + (gamma h)^2 K added to the joint-space diagonal. (Taking
+diagonal joint stiffness K and damping C with the mass matrix of the stage: then the implicit equations are the articulated-body pass with gamma h C + (gamma h)^2 K added to the joint-space diagonal. (Taking
 the stage's own mass matrix instead of the first one's changes the step by O(h^3), so the order stays two.) For the second
 stage the unknown is y = k2 + 2 k1, which turns M k1 into the diagonal product 2 (gamma h C + (gamma h)^2 K) k1.
+
+The lag states are linear filters of the links' motion, some faster than a step. They are stepped exactly for a motion that
+changes linearly over the step (Cox & Matthews 2002, J. Comput. Phys. 176, the quadrature of ETD2), whatever the lag time,
+zero included. Each stage closes the current step's filter with its own motion, so that force and motion belong to the same
+instant: a state left over from the predicted end of the step before would cost ten times the error.
 """
 
 from __future__ import annotations
 
 import math
 
-from morphcore.aero.kernels.loads import JONES_B1, JONES_B2, JONES_MEAN_LAG
 from morphcore.jit import kernel
 from morphcore.models.kernels.chain import (
-    AERO_C,
     JOINTS,
     LINKS_C,
     PER_LINK,
@@ -33,7 +35,6 @@ from morphcore.multibody.kernels.aba import LINK_ROWS
 from morphcore.lanes import LANES, not_in_lanes
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-SHORTEST_LAG_S = 1e-9  # added to the lag times: a lag of zero is then quasi-steady, not a division by zero
 
 
 @kernel
@@ -85,20 +86,20 @@ def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate)
 
 
 @kernel
-def lag_rates(twist, aero, lag, state, first, step, relative_chord, semichords, rates):
-    """Rates of one lag state of a link (3 rows): (motion - x) / T, implicit; T = lag time x share of this exponential."""
-    if not_in_lanes(twist) or not_in_lanes(aero) or not_in_lanes(state) or not_in_lanes(first):
+def lag_advance(link, twist, slow, fast, previous):
+    """Carry the lag states of a link over a step whose begin has the given twist; see ``lagged_motion`` for the rows."""
+    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
         return
-    if not_in_lanes(rates):
+    if not_in_lanes(previous):
         return
-    share = relative_chord * semichords / JONES_MEAN_LAG
-    g = GAMMA * step
-    for l in range(LANES):
-        inverse = 1.0 / (aero[2, l] * share + lag)
-        weight = 1.0 / (1.0 + g * inverse)
-        rates[0, l] = ((twist[5, l] - state[0, l]) * inverse - 2.0 * first[0, l]) * weight
-        rates[1, l] = ((twist[0, l] - state[1, l]) * inverse - 2.0 * first[1, l]) * weight
-        rates[2, l] = ((twist[1, l] - state[2, l]) * inverse - 2.0 * first[2, l]) * weight
+    for i in range(3):
+        source = twist[(5, 0, 1)[i]]
+        for l in range(LANES):
+            motion = source[l]
+            change = motion - previous[i, l]
+            slow[i, l] = motion + link[10, l] * (slow[i, l] + link[11, l] * change - motion)
+            fast[i, l] = motion + link[12, l] * (fast[i, l] + link[13, l] * change - motion)
+            previous[i, l] = motion
 
 
 @kernel
@@ -127,7 +128,7 @@ def finish(state, first, second, step):
 
 @kernel
 def stage(
-    surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, first, step, rates,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, first, step, rates,
     scratch, inputs, outputs,
 ):  # fmt: skip
     """Rates k of one stage of the W-method; ``first`` is zero in stage 1 and k1 in stage 2."""
@@ -139,9 +140,8 @@ def stage(
     s_q = JOINTS
     s_v = s_q + coordinates
     s_slow = s_v + coordinates
-    s_fast = s_slow + 3 * links
     accelerations(
-        surfaces, ranges, shared, strips, hinges, operator, wind, constants, state, scratch, inputs, outputs
+        surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, scratch, inputs, outputs
     )
     base_rates(state, scratch, rates)
     for i in range(JOINTS):
@@ -152,26 +152,18 @@ def stage(
         state[s_v:s_slow], scratch[w_joint_acceleration : w_joint_acceleration + coordinates], step,
         first[s_q:s_v], first[s_v:s_slow], rates[s_q:s_v], rates[s_v:s_slow],
     )  # fmt: skip
-    aero = constants[AERO_C : AERO_C + 3]
-    for link in range(links):
-        twist = scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6]
-        slow, fast = s_slow + 3 * link, s_fast + 3 * link
-        lag_rates(
-            twist, aero, SHORTEST_LAG_S, state[slow : slow + 3], first[slow : slow + 3], step,
-            relative_chord[link], 1.0 / JONES_B1, rates[slow : slow + 3],
-        )  # fmt: skip
-        lag_rates(
-            twist, aero, SHORTEST_LAG_S, state[fast : fast + 3], first[fast : fast + 3], step,
-            relative_chord[link], 1.0 / JONES_B2, rates[fast : fast + 3],
-        )  # fmt: skip
 
 
 @kernel
 def step_block(
-    surfaces, ranges, shared, strips, relative_chord, hinges, operators, wind, constants, state, step,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, state, step,
     first, second, middle, scratch, inputs, outputs,
 ):  # fmt: skip
-    """Advance one block by one step. ``strips``, ``hinges``, ``operators``, ``wind``: at its begin [0] and end [1]."""
+    """Advance one block by one step. ``strips``, ``hinges``, ``operators``, ``wind``: at its begin [0] and end [1].
+
+    ``hinge_accelerations`` (s,) is the change of the hinges' rates over the step, divided by its length: where a schedule's
+    acceleration jumps, the momentum that the wings exchange with the fuselage is then still exact.
+    """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
     w_tau = S_FREE + PER_LINK * links
@@ -187,26 +179,37 @@ def step_block(
     joint_forces(stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
     clear(second)
     stage(
-        surfaces, ranges, shared, strips[0], relative_chord, hinges[0], operators[0], wind[0], constants, state,
+        surfaces, ranges, shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0], constants, state,
         second, step, first, scratch, inputs, outputs,
     )  # fmt: skip
-    advance(state, first, step, middle)
+    advance(state[:s_slow], first[:s_slow], step, middle[:s_slow])
+    for link in range(links):
+        slow, fast, previous = s_slow + 3 * link, s_slow + 3 * (links + link), s_slow + 3 * (2 * links + link)
+        lag_advance(
+            constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * (link + 1)],
+            scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6],
+            state[slow : slow + 3], state[fast : fast + 3], state[previous : previous + 3],
+        )  # fmt: skip
+    advance(state[s_slow:], state[s_slow:], 0.0, middle[s_slow:])
     second_joint_forces(
         stiffness, damping, middle[s_q:s_v], middle[s_v:s_slow], first[s_q:s_v], first[s_v:s_slow], step, tau, added
     )
     stage(
-        surfaces, ranges, shared, strips[1], relative_chord, hinges[1], operators[1], wind[1], constants, middle,
+        surfaces, ranges, shared, strips[1], hinges[1], hinge_accelerations, operators[1], wind[1], constants, middle,
         first, step, second, scratch, inputs, outputs,
     )  # fmt: skip
-    finish(state, first, second, step)
+    finish(state[:s_slow], first[:s_slow], second[:s_slow], step)
 
 
 @kernel
 def instant_rates(
-    surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, zero, scratch,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero, scratch,
     inputs, outputs, rates,
 ):  # fmt: skip
-    """Time derivative of a block's state: a stage of a step of no length. ``zero``: as many zero rows as the state."""
+    """Time derivative of a block's state: a stage of a step of no length. ``zero``: as many zero rows as the state.
+
+    The lag states' rows are not touched.
+    """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
     w_tau = S_FREE + PER_LINK * links
@@ -222,6 +225,6 @@ def instant_rates(
         scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
     )  # fmt: skip
     stage(
-        surfaces, ranges, shared, strips, relative_chord, hinges, operator, wind, constants, state, zero, 0.0,
+        surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero, 0.0,
         rates, scratch, inputs, outputs,
     )  # fmt: skip
