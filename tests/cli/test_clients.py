@@ -14,7 +14,8 @@ import pytest
 from tests.identification_request import QUICK_SEARCH
 from tests.live import LiveService
 
-WITHIN_S = 240  # the first identification of a fresh machine also compiles the kernels
+pytestmark = pytest.mark.timeout(600)
+WITHIN_S = 500  # the first identification of a fresh machine also compiles the kernels
 
 
 def run_client(command: list[str], service: LiveService, folder: Path) -> str:

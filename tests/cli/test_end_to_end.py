@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import httpx
+import pytest
 from typer.testing import CliRunner
 
 from cli.exits import Exit
@@ -16,6 +17,7 @@ from tests.identification_request import identification
 from tests.live import LiveService
 
 RUNNER = CliRunner()
+pytestmark = pytest.mark.timeout(600)  # the first identification on a machine also compiles the kernels
 ENDLESS = {"method": "pso", "particles": 400, "generations": 100_000, "seed": 1}
 ALL_FLIGHTS = ("train_rate_0.2", "train_rate_0.5", "train_rate_0.8", "train_asymmetric")
 

@@ -20,6 +20,8 @@ SEARCH = {"method": "pso", "particles": 256, "generations": 25, "seed": 2}
 SHORT = {"MORPHID_LEASE_S": "4", "MORPHID_HEARTBEAT_S": "1", "MORPHID_REAP_EVERY_S": "1"}
 PROMISED_S = 90.0
 
+pytestmark = pytest.mark.timeout(600)  # the first identification on a machine also compiles the kernels
+
 
 @pytest.fixture
 def short_leases(tmp_path: Path) -> Iterator[LiveService]:
@@ -79,7 +81,6 @@ def test_a_killed_worker_with_short_leases(short_leases: LiveService) -> None:
 
 
 @pytest.mark.faults
-@pytest.mark.timeout(600)
 def test_a_killed_worker_as_shipped(shipped: LiveService) -> None:
     """With the leases that are shipped the job goes on within 90 s of the kill."""
     assert_recovery(shipped, within_s=PROMISED_S)
