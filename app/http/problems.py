@@ -13,6 +13,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 
 from app.documents import finite
 from app.errors import Fault, InvalidRequest, ServiceError
@@ -168,6 +169,15 @@ class HttpProblem(ServiceError):
         self.title = phrase
 
 
+def allowed_methods(document: Mapping[str, Any], path: str) -> str:
+    """Return the value of the Allow header of `path`: every method that the OpenAPI document gives it."""
+    methods: set[str] = set()
+    for template, operations in document["paths"].items():
+        if compile_path(template)[0].match(path):
+            methods.update(name.upper() for name in operations)
+    return ", ".join(sorted(methods))
+
+
 def install_problem_handlers(app: FastAPI, known_fields: Callable[[], Sequence[str]]) -> None:
     """Make `app` answer every error with a problem document.
 
@@ -187,7 +197,12 @@ def install_problem_handlers(app: FastAPI, known_fields: Callable[[], Sequence[s
 
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> Response:
-        return problem_response(HttpProblem(error), request, error.headers)
+        headers = dict(error.headers or {})
+        if error.status_code == http.HTTPStatus.METHOD_NOT_ALLOWED:
+            # the router names the methods of the first route only
+            headers["allow"] = allowed_methods(app.openapi(), request.url.path) or headers.get("Allow", "GET")
+            headers.pop("Allow", None)
+        return problem_response(HttpProblem(error), request, headers)
 
     @app.exception_handler(Exception)
     async def _unforeseen(request: Request, error: Exception) -> Response:

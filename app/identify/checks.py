@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from app.errors import Fault
 from app.identify.schemas import Bounds, IdentifyRequest
@@ -42,6 +42,13 @@ def identify_faults(request: IdentifyRequest, samples: Sequence[InlineSample]) -
         *_bounds_faults(request.model.bounds),
         *_together_faults(samples),
     ]
+    corrections = request.model.aero_coefficients
+    for number, name in enumerate(corrections):
+        if name in corrections[:number]:
+            at = f"/model/aero_coefficients/{number}"
+            faults.append(
+                Fault("name_not_unique", f"{name} appears twice.", at, "Name each correction once.")
+            )
     if request.model.start == "given" and request.flight.start is None:
         faults.append(
             Fault(
@@ -76,14 +83,21 @@ def _together_faults(samples: Sequence[InlineSample]) -> Iterator[Fault]:
             "/samples/0/role",
             'Give at least one sample the role "train".',
         )
-    total = sum(len(sample.time_s) for sample in samples)
-    if total > MAX_TOTAL_ROWS:
-        yield Fault(
+
+
+def total_rows_faults(rows: Iterable[int]) -> list[Fault]:
+    """Check the rows of all samples together."""
+    total = sum(rows)
+    if total <= MAX_TOTAL_ROWS:
+        return []
+    return [
+        Fault(
             "too_many_rows",
             f"The samples have {total} rows together.",
             "/samples",
             f"At most {MAX_TOTAL_ROWS}: 10 ms between rows are enough.",
         )
+    ]
 
 
 def _hinge_ranges(aircraft: Aircraft) -> dict[str, tuple[float, float, str]]:

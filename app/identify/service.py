@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from app.database import Session
 from app.documents import Document
-from app.errors import Fault, InvalidRequest, TrajectoryNotFound
-from app.identify.checks import identify_faults
+from app.errors import Fault, InvalidRequest
+from app.identify.checks import identify_faults, total_rows_faults
 from app.identify.cost import estimate
 from app.identify.schemas import IdentifyRequest, IdentifyValidation
 from app.jobs import store
 from app.jobs.records import Job
-from app.schemas.samples import InlineSample
+from app.schemas.samples import InlineSample, UploadedSample
 from app.trajectories import repository as trajectories
 
 REPORT_TIME_S = 120.0  # after the search's own time budget: uncertainty, plots, writing
@@ -22,25 +22,36 @@ def resolve(session: Session, owner: str, request: IdentifyRequest) -> list[Inli
     Raises
     ------
     InvalidRequest
-        When a trajectory does not exist.
+        When a trajectory does not exist, or the samples have too many rows together.
     """
-    samples = []
-    faults = []
-    for number, sample in enumerate(request.samples):
-        if isinstance(sample, InlineSample):
-            samples.append(sample)
-            continue
-        try:
-            summary, columns = trajectories.get_trajectory(session, owner, sample.trajectory_id)
-        except TrajectoryNotFound as error:
-            faults.append(Fault(error.code, error.detail, f"/samples/{number}/trajectory_id", error.hint))
-            continue
-        samples.append(
-            InlineSample(name=sample.name or summary.name, role=sample.role, weight=sample.weight, **columns)
+    uploads = [sample.trajectory_id for sample in request.samples if isinstance(sample, UploadedSample)]
+    rows = trajectories.row_counts(session, owner, uploads)
+    faults = [
+        Fault(
+            "trajectory_not_found",
+            f"There is no trajectory {sample.trajectory_id}.",
+            f"/samples/{number}/trajectory_id",
+            "Upload it with POST /trajectories first.",
         )
+        for number, sample in enumerate(request.samples)
+        if isinstance(sample, UploadedSample) and sample.trajectory_id not in rows
+    ]
+    # before any row is read: a short request may name a flight of 100000 rows many times
+    faults += total_rows_faults(
+        len(sample.time_s) if isinstance(sample, InlineSample) else rows.get(sample.trajectory_id, 0)
+        for sample in request.samples
+    )
     if faults:
         raise InvalidRequest.of(faults)
-    return samples
+    return [
+        sample if isinstance(sample, InlineSample) else _uploaded(session, owner, sample)
+        for sample in request.samples
+    ]
+
+
+def _uploaded(session: Session, owner: str, sample: UploadedSample) -> InlineSample:
+    stored, columns = trajectories.get_trajectory(session, owner, sample.trajectory_id)
+    return InlineSample(name=sample.name or stored.name, role=sample.role, weight=sample.weight, **columns)
 
 
 def checked(session: Session, owner: str, request: IdentifyRequest) -> list[InlineSample]:

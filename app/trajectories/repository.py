@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -51,6 +52,16 @@ def insert_trajectory(session: Session, owner: str, name: str, columns: Columns)
         )
     ).one()
     return StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+
+
+def row_counts(session: Session, owner: str, ids: Iterable[str]) -> dict[str, int]:
+    """Rows of each of the trajectories that `owner` has, without reading them."""
+    found = session.execute(
+        select(trajectories.c.id, trajectories.c.rows).where(
+            trajectories.c.owner == owner, trajectories.c.id.in_(set(ids))
+        )
+    )
+    return {row.id: row.rows for row in found}
 
 
 def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, Columns]:

@@ -21,7 +21,7 @@ function svg(name, attributes = {}, text = "") {
 
 const show = {
   number: (value, digits = 3) => {
-    if (value === null || value === undefined) return "–";
+    if (value === null || value === undefined || !Number.isFinite(value)) return "–";
     const size = Math.abs(value);
     if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 1);
     return Number(value.toPrecision(digits + 1)).toLocaleString("en");
@@ -63,7 +63,7 @@ function table(titles, rows) {
 /* Best cost over generations, logarithmic: [[generation, cost], ...] */
 function convergence(points) {
   const usable = points.filter(([, cost]) => cost > 0);
-  const plot = svg("svg", { class: "live", viewBox: "0 0 600 200", preserveAspectRatio: "none", role: "img", "aria-label": "best cost over generations" });
+  const plot = svg("svg", { class: "live", viewBox: "0 0 600 200", role: "img", "aria-label": "best cost over generations" });
   if (usable.length < 2) return plot;
   const logs = usable.map(([, cost]) => Math.log10(cost));
   const low = Math.floor(Math.min(...logs)), high = Math.max(Math.ceil(Math.max(...logs)), low + 1);

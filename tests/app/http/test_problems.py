@@ -41,9 +41,14 @@ def test_every_refusal_is_a_problem(
     assert (problem.status, problem.code) == (status, code)
 
 
-def test_allow_header_stays(service: RunningService) -> None:
-    """405 keeps the Allow header that HTTP asks for."""
-    assert "GET" in service.client.put("/jobs").headers["allow"]
+@pytest.mark.parametrize(
+    ("path", "allow"),
+    [("/jobs", "GET"), ("/jobs/job_x", "DELETE, GET"), ("/identify", "POST"), ("/docs", "GET")],
+)
+def test_allow_header_names_every_method(service: RunningService, path: str, allow: str) -> None:
+    """405 tells all methods that the path has."""
+    answer = service.client.put(path)
+    assert (answer.status_code, answer.headers["allow"]) == (405, allow)
 
 
 def test_unforeseen_error_tells_nothing_of_itself() -> None:

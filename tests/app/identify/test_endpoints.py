@@ -184,6 +184,7 @@ BAD_FIELDS = [
         "decades",
     ),
     ("/model/bounds/lag_s", [0.0, 1e3], "/model/bounds/lag_s/1", "bound_out_of_range", "Narrow"),
+    ("/model/aero_coefficients", ["lag_s", "lag_s"], "/model/aero_coefficients/1", "name_not_unique", "once"),
     ("/search/particles", 10**6, None, "less_than_equal", "100000"),
     ("/search/method", "genetic", None, "literal_error", "least_squares"),
     ("/search/seed", 2**60, None, "less_than_equal", "at most"),
@@ -295,6 +296,20 @@ def test_too_many_rows_are_refused(service: RunningService) -> None:
     start = time.perf_counter()
     problem = fault(post(service, document))
     assert (problem["code"], problem["pointer"]) == ("invalid_request", "/samples/0/time_s")
+    assert time.perf_counter() - start < ANSWER_S
+
+
+def test_rows_of_uploads_are_counted_before_they_are_read(service: RunningService) -> None:
+    """A short request that names a long flight many times is refused quickly."""
+    rows = 50_000
+    zero = [0.0] * rows
+    columns = dict.fromkeys(("sweep_left_rad", "sweep_right_rad", "phi_rad", "theta_rad", "psi_rad"), zero)
+    flight = {"time_s": [0.01 * row for row in range(rows)], **columns}
+    uploaded = service.client.post("/trajectories", json=flight).raise_for_status().json()
+    document = identify_document()
+    document["samples"] = [{"trajectory_id": uploaded["id"], "name": f"s{i}"} for i in range(64)]
+    start = time.perf_counter()
+    assert fault(post(service, document))["errors"][0]["code"] == "too_many_rows"
     assert time.perf_counter() - start < ANSWER_S
 
 
