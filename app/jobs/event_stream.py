@@ -10,8 +10,8 @@ from app.errors import JobNotFound
 from app.http.context import Service
 from app.jobs import service as jobs
 from app.jobs.records import Job
+from app.jobs.rows import get_job
 from app.jobs.schemas import JobEvent, JobEventPage
-from app.jobs.store import get_job
 
 KEEP_ALIVE = b": keep-alive\n\n"
 RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection asks again

@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
 from app.database import Session, database_time
 from app.documents import Document
 from app.jobs.records import HELD, JobStatus, ReapReport
-from app.jobs.store import transition
+from app.jobs.rows import transition
 from app.tables import jobs
 
 DEADLINE_GRACE_S = (

@@ -10,7 +10,7 @@ from app.database import Session
 from app.documents import unpacked_json
 from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
 from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
-from app.jobs.store import JOB_COLUMNS, get_job, job_from_row
+from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
 from app.tables import artifacts, idempotency_keys, job_events, job_results, jobs
 
 

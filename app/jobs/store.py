@@ -11,133 +11,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Table, case, delete, insert, literal, select, update
+from sqlalchemy import ColumnElement, Table, case, delete, insert, literal, select, update
 
 from app.database import Session, database_time
 from app.documents import Document, digest, finite, packed, unpacked
 from app.errors import IdempotencyConflict, JobNotFound
 from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
-from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState, moment, optional_moment
+from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
+from app.jobs.rows import JOB_COLUMNS, get_job, insert_event, job_from_row, transition
 from app.models.repository import insert_model
-from app.tables import idempotency_keys, job_checkpoints, job_events, job_requests, job_results, jobs
+from app.tables import idempotency_keys, job_checkpoints, job_requests, job_results, jobs
 
-JOB_COLUMNS = (
-    jobs.c.id,
-    jobs.c.owner,
-    jobs.c.operation,
-    jobs.c.status,
-    jobs.c.priority,
-    jobs.c.summary,
-    jobs.c.progress,
-    jobs.c.error,
-    jobs.c.attempt,
-    jobs.c.max_attempts,
-    jobs.c.event_seq,
-    jobs.c.model_id,
-    jobs.c.partial,
-    jobs.c.created_at,
-    jobs.c.started_at,
-    jobs.c.updated_at,
-    jobs.c.finished_at,
-    jobs.c.deadline_at,
-)
-CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds)
-
-
-def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
-    """Turn a row of `JOB_COLUMNS` into a value."""
-    return Job(
-        id=row.id,
-        owner=row.owner,
-        operation=row.operation,
-        status=JobStatus(row.status),
-        priority=row.priority,
-        summary=row.summary,
-        progress=row.progress,
-        error=row.error,
-        attempt=row.attempt,
-        max_attempts=row.max_attempts,
-        event_seq=row.event_seq,
-        model_id=row.model_id,
-        partial=bool(row.partial),
-        created_at=moment(row.created_at),
-        started_at=optional_moment(row.started_at),
-        updated_at=moment(row.updated_at),
-        finished_at=optional_moment(row.finished_at),
-        deadline_at=optional_moment(row.deadline_at),
-        replayed=replayed,
-    )
-
-
-def get_job(session: Session, owner: str, job_id: str) -> Job:
-    """Read one job of `owner`.
-
-    Raises
-    ------
-    JobNotFound
-        When there is none with this id, or it is another owner's.
-    """
-    row = session.execute(
-        select(*JOB_COLUMNS).where(jobs.c.id == job_id, jobs.c.owner == owner)
-    ).one_or_none()
-    if row is None:
-        raise JobNotFound(job_id)
-    return job_from_row(row)
-
-
-def transition(
-    session: Session,
-    *conditions: ColumnElement[bool],
-    event: str | None,
-    payload: Mapping[str, Any] | None = None,
-    **values: Any,
-) -> Row[*tuple[Any, ...]] | None:
-    """Compare-and-set on one job row, with its event.
-
-    Parameters
-    ----------
-    *conditions
-        What must hold of the row (its id, and its state or fence).
-    event, payload
-        Type and content of the event; the job's new ``status`` and ``attempt`` are added.
-        None writes no event.
-    **values
-        Columns to set.
-
-    Returns
-    -------
-    Row or None
-        The row as it is now (`JOB_COLUMNS` and `CLAIM_COLUMNS`), or None when the conditions did not hold.
-    """
-    if event is not None:
-        values["event_seq"] = jobs.c.event_seq + 1
-    row = session.execute(
-        update(jobs)
-        .where(*conditions)
-        .values(**values, updated_at=database_time())
-        .returning(*JOB_COLUMNS, *CLAIM_COLUMNS)
-    ).one_or_none()
-    if row is not None and event is not None:
-        _insert_event(session, row.id, row.event_seq, event, row.status, row.attempt, payload)
-    return row
-
-
-def _insert_event(
-    session: Session,
-    job_id: str,
-    seq: int,
-    event: str,
-    status: str,
-    attempt: int,
-    payload: Mapping[str, Any] | None,
-) -> None:
-    content = {**(payload or {}), "status": status, "attempt": attempt}
-    session.execute(
-        insert(job_events).values(
-            job_id=job_id, seq=seq, type=event, payload=finite(content), at=database_time()
-        )
-    )
+__all__ = [
+    "claim_job",
+    "create_job",
+    "finish_job",
+    "get_job",
+    "load_checkpoint",
+    "load_request",
+    "next_queued",
+    "release_job",
+    "renew_lease",
+    "request_cancel",
+    "save_progress",
+]
 
 
 def create_job(
@@ -196,7 +94,7 @@ def create_job(
         )
     )
     session.execute(insert(job_requests).values(job_id=job_id, document=packed(request), sha256=fingerprint))
-    _insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
+    insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
     return get_job(session, owner, job_id)
 
 
