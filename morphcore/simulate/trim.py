@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 StartMode = Literal["trim", "given"]
 
 MOST_ITERATIONS = 25
+FULL_STEPS = 2  # Newton steps with a Jacobian of their own; later ones reuse it
 ANGLE_TOLERANCE = 1e-11  # rad, of the last Newton step in angle of attack and joint angles
 ANGLE_PROBE = 1e-6  # rad; balances truncation and round-off of a forward difference in double precision
 FORCE_PROBE = 1.0  # N and N m; these enter linearly
@@ -118,40 +119,42 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
         x[:, n] = given.alpha_rad
     constants = lane_constants(model, batch, plan.grid.step_s)
     everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(model.surfaces[:, 1], axis=0)
-    repeated = np.repeat(np.arange(particles), free + 1)
-    probed = batch.select(repeated)
-    rows = from_lanes(constants.rows, particles)[repeated]
+    rows = from_lanes(constants.rows, particles)
     moved = np.zeros((free + 1, n + 6))
     moved[1:, :free] = np.diag(probes)
-    converged = np.zeros(particles, dtype=bool)
-    residual = np.full(particles, np.inf)
-    for _ in range(MOST_ITERATIONS if free else 1):
-        points = (x[:, None, :] + moved).reshape(-1, n + 6)
-        force_B, moment_B = _thrust(points, n, given)
-        rows[:, FORCE_C : FORCE_C + 3], rows[:, FORCE_C + 3 : FORCE_C + 6] = force_B, moment_B
-        blocks = to_lanes(rows)
-        lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), points.shape[0])
-        state = _state(model, probed, plan, points[:, n], points[:, :n])
+
+    def unbalance(points: Array) -> Array:
+        """What must vanish, (particles, k, free), at points (particles, k, n + 6)."""
+        repeated = np.repeat(np.arange(particles), points.shape[1])
+        flat = points.reshape(-1, n + 6)
+        lane_rows = rows[repeated]
+        lane_rows[:, FORCE_C : FORCE_C + 3], lane_rows[:, FORCE_C + 3 : FORCE_C + 6] = _thrust(flat, n, given)
+        blocks = to_lanes(lane_rows)
+        lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), flat.shape[0])
+        state = _state(model, batch.select(repeated), plan, flat[:, n], flat[:, :n])
         rates = state_rates(model, plan, 0, lanes, state)
-        v = JOINTS + n
-        wanted = rates[:, v : v + n] if given else np.concatenate([rates[:, v : v + n], rates[:, OMEGA : OMEGA + 6]], axis=1)
-        wanted = wanted.reshape(particles, free + 1, free)
-        if not free:
-            converged[:] = True
-            residual[:] = 0.0
-            break
-        jacobian = ((wanted[:, 1:] - wanted[:, :1]) / probes[:, None]).transpose(0, 2, 1)
-        step = _solve(jacobian, -wanted[:, 0])
+        joints = rates[:, JOINTS + n : JOINTS + 2 * n]
+        wanted = joints if given else np.concatenate([joints, rates[:, OMEGA : OMEGA + 6]], axis=1)
+        return wanted.reshape(particles, -1, free)
+
+    residual = np.full(particles, np.inf if free else 0.0)
+    for iteration in range(MOST_ITERATIONS if free else 0):
+        if iteration < FULL_STEPS or iteration % 5 == 0:
+            probed = unbalance(x[:, None, :] + moved)
+            jacobian = ((probed[:, 1:] - probed[:, :1]) / probes[:, None]).transpose(0, 2, 1)
+            off = probed[:, 0]
+        else:  # near the solution the Jacobian hardly changes, and costs as many flights as there are unknowns
+            off = unbalance(x[:, None, :])[:, 0]
+        step = _solve(jacobian, -off)
         angles = np.abs(step[:, : n + 1]).max(axis=1)
         step *= np.minimum(1.0, LARGEST_STEP / np.maximum(angles, 1e-300))[:, None]
         x[:, :free] += np.where(np.isfinite(step), step, 0.0)
         residual = np.where(np.isfinite(angles), angles, np.inf)
-        converged = residual < ANGLE_TOLERANCE
-        if np.all(converged | ~np.isfinite(residual)):
+        if np.all((residual < ANGLE_TOLERANCE) | ~np.isfinite(residual)):
             break
     force_B, moment_B = _thrust(x, n, given)
     # forward differences limit the last digits: what has nearly arrived is trimmed well enough
-    return Trim(x[:, n], force_B, moment_B, x[:, :n], converged | (residual < 1e3 * ANGLE_TOLERANCE), residual)
+    return Trim(x[:, n], force_B, moment_B, x[:, :n], residual < 1e3 * ANGLE_TOLERANCE, residual)
 
 
 def _solve(jacobian: Array, right: Array) -> Array:

@@ -1,0 +1,185 @@
+"""What a parameter set costs: squared attitude errors over the samples, or the errors themselves.
+
+J = sum over samples and times of w (dphi^2 + dtheta^2 + dpsi^2), the differences wrapped; rad^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.simulate.batch import Stop, fly_batch
+from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
+from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
+
+Array = NDArray[np.float64]
+
+DIVERGED_ANGLE = 3.0  # rad of error charged for every angle of a row that a diverged flight never reached
+ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
+HINGE_TOLERANCE_RAD = 1e-6
+
+
+@dataclass(frozen=True)
+class SampleCase:
+    """A sample and the plan that all flights against it share."""
+
+    sample: Trajectory
+    plan: FlightPlan
+
+    @property
+    def weight(self) -> Array:
+        """(3,) square root of the weight of each angle's error."""
+        return np.full(3, np.sqrt(self.sample.weight))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Errors of parameter sets p against one sample of k rows.
+
+    errors : (p, k, 3) weighted wrapped angle differences, rad. diverged : (p,).
+    """
+
+    errors: Array
+    diverged: NDArray[np.bool_]
+
+    @property
+    def cost(self) -> Array:
+        """(p,) J."""
+        return np.einsum("pka,pka->p", self.errors, self.errors)
+
+
+def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> list[Schedule]:
+    """Hinge motion of every surface from a sample's sweep histories; refuses angles beyond a hinge's range."""
+    schedules: list[Schedule] = []
+    for surface in aircraft.surfaces:
+        angle = sample.sweep(surface.side)
+        if surface.hinge is not None:
+            low, high = surface.hinge.min_rad - HINGE_TOLERANCE_RAD, surface.hinge.max_rad + HINGE_TOLERANCE_RAD
+            bad = np.flatnonzero((angle < low) | (angle > high))
+            if bad.size:
+                raise InvalidInput(
+                    f"sweep {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
+                    pointer=f"{pointer}/sweep_{surface.side}_rad/{bad[0]}",
+                    hint=f"its range is {surface.hinge.min_rad:g}..{surface.hinge.max_rad:g} rad",
+                )
+        schedules.append(Tabulated(sample.time_s, angle))
+    return schedules
+
+
+def sample_cases(
+    model: ChainModel, samples: Sequence[Trajectory], longest_step_s: float = STEP_S, pointer: str = "/samples"
+) -> tuple[SampleCase, ...]:
+    """Plans for all samples."""
+    return tuple(
+        SampleCase(
+            sample,
+            flight_plan(
+                model,
+                sample_schedules(model.aircraft, sample, f"{pointer}/{i}"),
+                time_grid(sample.time_s, longest_step_s),
+            ),
+        )
+        for i, sample in enumerate(samples)
+    )
+
+
+def shared_trims(
+    model: ChainModel, batch: ParameterBatch, cases: Sequence[SampleCase], start: StartMode
+) -> Iterator[tuple[SampleCase, Trim]]:
+    """Each case with its trim; samples that begin in the same shape and wind share one."""
+    known: dict[tuple[float, ...], Trim] = {}
+    for case in cases:
+        key = tuple(np.round(np.concatenate([case.plan.angles[0], case.plan.wind_N[0]]), 9))
+        if key not in known:
+            known[key] = trim(model, batch, case.plan, start=start)
+        yield case, known[key]
+
+
+def fly_attitudes(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
+) -> Array:
+    """Euler angles (p, k, 3) at the sample's times from a trimmed start; NaN from where a flight diverged, or untrimmed."""
+    plan, sample = case.plan, case.sample
+    constants = lane_constants(model, batch, plan.grid.step_s)
+    constants.set_thrust(found.force_B, found.moment_B)
+    state = trimmed_state(model, batch, plan, found, psi=float(sample.psi[0]))
+    attitude = np.empty((batch.particles, sample.time_s.size, 3))
+    if plan.grid.at is not None:
+        for chunk in fly_batch(model, plan, constants, state, record_rows=4, stop=stop):
+            low, high = np.searchsorted(plan.grid.at, (chunk.first, chunk.first + chunk.rows.shape[0]))
+            wanted = chunk.rows[plan.grid.at[low:high] - chunk.first]
+            attitude[:, low:high] = euler_from_quaternion(wanted.transpose(2, 0, 1))
+    else:
+        rows = np.concatenate(
+            [c.rows for c in fly_batch(model, plan, constants, state, record_rows=ATTITUDE_ROWS, stop=stop)]
+        )
+        attitude[:] = _interpolated(rows, plan.grid.times_s, sample.time_s)
+    attitude[~found.converged] = np.nan
+    return attitude
+
+
+def evaluate(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
+) -> Evaluation:
+    """Fly parameter sets against one sample."""
+    attitude = fly_attitudes(model, batch, case, found, stop)
+    diverged = ~np.all(np.isfinite(attitude), axis=(1, 2))
+    errors = wrap_angle(attitude - case.sample.euler)
+    # a diverged flight: large, finite, and the less the longer it held out
+    errors = np.where(np.isfinite(errors), errors, DIVERGED_ANGLE)
+    return Evaluation(errors * case.weight, diverged)
+
+
+def costs(
+    model: ChainModel,
+    batch: ParameterBatch,
+    cases: Sequence[SampleCase],
+    start: StartMode,
+    stop: Stop | None = None,
+    slab: int = 512,
+) -> Array:
+    """(p,) J over all samples; parameter sets in slabs, so that memory does not grow with the swarm."""
+    total = np.zeros(batch.particles)
+    for low in range(0, batch.particles, slab):
+        part = slice(low, low + slab)
+        chosen = batch.select(part)
+        for case, found in shared_trims(model, chosen, cases, start):
+            total[part] += evaluate(model, chosen, case, found, stop).cost
+    return total
+
+
+def residuals(
+    model: ChainModel, batch: ParameterBatch, cases: Sequence[SampleCase], start: StartMode, stop: Stop | None = None
+) -> Array:
+    """(p, m) all weighted errors of all samples in one row per parameter set."""
+    return np.concatenate(
+        [
+            evaluate(model, batch, case, found, stop).errors.reshape(batch.particles, -1)
+            for case, found in shared_trims(model, batch, cases, start)
+        ],
+        axis=1,
+    )
+
+
+def _interpolated(rows: Array, grid_s: Array, times_s: Array) -> Array:
+    """Euler angles (p, k, 3) at uneven times by cubic Hermite interpolation between grid times."""
+    quaternion, omega = rows[:, :4].transpose(2, 0, 1), rows[:, 4:7].transpose(2, 0, 1)
+    euler = np.unwrap(euler_from_quaternion(quaternion), axis=1)
+    rates = euler_rates(euler, omega)
+    step = grid_s[1] - grid_s[0]
+    left = np.clip(((times_s - grid_s[0]) / step).astype(np.int64), 0, grid_s.size - 2)
+    s = ((times_s - grid_s[left]) / step)[:, None]
+    a, b = euler[:, left], euler[:, left + 1]
+    da, db = rates[:, left] * step, rates[:, left + 1] * step
+    return np.asarray(
+        (1 + 2 * s) * (1 - s) ** 2 * a + s * (1 - s) ** 2 * da + s**2 * (3 - 2 * s) * b + s**2 * (s - 1) * db
+    )

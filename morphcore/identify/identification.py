@@ -1,0 +1,248 @@
+"""Identification as an iterator of steps: one generation of the search each, with its complete state."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
+from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.polish import first_polish, next_polish
+from morphcore.identify.result import IdentifyResult, identify_result
+from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.state import SearchState, decode, encode
+from morphcore.identify.swarm import first_swarm, next_swarm
+from morphcore.models.equivalent import ChainModel, chain_model
+from morphcore.simulate.batch import Stop
+from morphcore.simulate.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+Clock = Callable[[], float]
+
+SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical guess, in search coordinates
+# A weak prior on the polish: being off the physical guess by one unit costs as much as one error of this size. It settles the
+# directions that the samples cannot see and is far below what they can.
+PRIOR_RAD = 1e-4
+# the field of starts narrows as the polish goes on: iteration -> starts kept (as a share of the first field)
+NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step of an identification leaves.
+
+    fraction : of the whole search, 0..1. best_cost : least J so far, rad^2. flights : flown so far, one per parameter set and
+    sample. checkpoint : complete state; ``steps(checkpoint)`` goes on to the bit-identical result.
+    """
+
+    phase: str
+    generation: int
+    fraction: float
+    best_cost: float
+    flights: int
+    message: str
+    checkpoint: bytes
+
+
+class Identification:
+    """The search for the parameters of an equivalent model from sample flights.
+
+    Raises
+    ------
+    InvalidInput : no sample to train on, two samples of one name, or a setting that makes no sense.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        flight: Flight,
+        samples: Sequence[Trajectory],
+        model: ModelSettings | None = None,
+        search: SearchSettings | None = None,
+        *,
+        clock: Clock = time.perf_counter,
+    ) -> None:
+        self.settings = model or ModelSettings()
+        self.search = search or SearchSettings()
+        self.samples = tuple(samples)
+        self._clock = clock
+        names = [sample.name for sample in samples]
+        if len(set(names)) != len(names):
+            raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
+        if not any(sample.role == "train" for sample in samples):
+            raise InvalidInput("no sample has the role train", pointer="/samples", hint="mark at least one with role train")
+        if self.settings.start == "given" and flight.start is None:
+            raise InvalidInput("the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim")
+        self.model = self._chain(aircraft, flight, self.settings.links_per_wing)
+        self.space: SearchSpace = search_space(
+            self.model,
+            separate_wings=self.settings.separate_wings,
+            aero_coefficients=self.settings.aero_coefficients,
+            bounds=self.settings.bounds,
+        )
+
+    def _chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
+        return chain_model(
+            aircraft, flight, links, chordwise=self.settings.chordwise, spanwise=self.settings.spanwise
+        )
+
+    @cached_property
+    def cases(self) -> tuple[SampleCase, ...]:
+        """All samples with their plans."""
+        return sample_cases(self.model, self.samples, self.settings.step_s)
+
+    @cached_property
+    def training(self) -> tuple[SampleCase, ...]:
+        """The samples to fit."""
+        return tuple(case for case in self.cases if case.sample.role == "train")
+
+    def steps(self, checkpoint: bytes | None = None, stop: Stop | None = None) -> Iterator[Step]:
+        """Search, one step after the other.
+
+        Parameters
+        ----------
+        checkpoint : of an earlier step; None starts anew.
+        stop : asked between chunks of well under a second; True raises Interrupted.
+        """
+        state = decode(checkpoint) if checkpoint is not None else None
+        while state is None or state.phase != "done":
+            begin = self._clock()
+            state = self._baseline(stop) if state is None else self._advance(state, stop)
+            state = replace(state, wall_s=state.wall_s + self._clock() - begin)
+            if self.search.max_seconds is not None and state.wall_s >= self.search.max_seconds:
+                state = replace(state, phase="done")
+            yield self._step(state)
+
+    def result(self, checkpoint: bytes) -> IdentifyResult:
+        """The identified model at any step, with its fit, uncertainty and cost."""
+        return identify_result(self, decode(checkpoint))
+
+    # one step each
+
+    def _baseline(self, stop: Stop | None) -> SearchState:
+        """Fly the physical guess: from here on there is a best so far."""
+        cost = self._costs(self.space.guess[None, :], stop)
+        if self.space.dimension == 0:
+            phase = "done"
+        else:
+            phase = "swarm" if self.search.method == "pso" else "screen"
+        state = SearchState(phase, self.space.guess, float(cost[0]), flights=len(self.training))  # type: ignore[arg-type]
+        return _recorded(state, "baseline", 0)
+
+    def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
+        step = {"screen": self._screen, "swarm": self._generation, "polish": self._polish}[state.phase]
+        return step(state, stop)
+
+    def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
+        """Fly candidates around the physical guess and choose the polish's starts among them."""
+        rng = np.random.default_rng(self.search.seed)
+        spread = rng.normal(0.0, SCREEN_SPREAD, (self.search.screen, self.space.dimension))
+        points = np.clip(self.space.guess + spread, self.space.lower, self.space.upper)
+        points[0] = self.space.guess
+        cost = self._costs(points, stop)
+        order = np.argsort(cost, kind="stable")
+        chosen = np.unique(np.append(order[: self.search.starts - 1], 0))
+        best = int(order[0])
+        found = SearchState(
+            "polish",
+            points[best],
+            float(cost[best]),
+            state.generation + 1,
+            state.flights + cost.size * len(self.training),
+            state.wall_s,
+            state.history,
+            polish=first_polish(points[chosen], cost[chosen]),
+        )
+        return _recorded(found, "screen", cost.size)
+
+    def _polish(self, state: SearchState, stop: Stop | None) -> SearchState:
+        """One Levenberg-Marquardt iteration of all starts still in the field."""
+        before = state.polish
+        assert before is not None
+        share = next((share for limit, share in NARROWING if before.iteration < limit), 0.0)
+        keep = max(1, round(share * before.cost.size))
+        flown = 0
+
+        def errors(points: Array) -> Array:
+            nonlocal flown
+            flown += points.shape[0]
+            prior = PRIOR_RAD * (points - self.space.guess)
+            return np.concatenate([self._residuals(points, stop), prior], axis=1)
+
+        after = next_polish(before, self.space.lower, self.space.upper, errors, keep)
+        if after is before:
+            return replace(state, phase="done")
+        best = after.point[after.best]
+        moved = replace(
+            state,
+            phase="polish" if after.iteration < self.search.iterations else "done",
+            best=best,
+            best_cost=float(after.cost[after.best] - PRIOR_RAD**2 * np.sum((best - self.space.guess) ** 2)),
+            generation=state.generation + 1,
+            flights=state.flights + flown * len(self.training),
+            polish=after,
+        )
+        return _recorded(moved, "polish", flown)
+
+    def _generation(self, state: SearchState, stop: Stop | None) -> SearchState:
+        """Fly one generation of the swarm and move it."""
+        settings, space = self.search.swarm, self.space
+        width = space.upper - space.lower
+        swarm = state.swarm or first_swarm(settings, (space.guess - space.lower) / width, self.search.seed)
+        cost = self._costs(space.lower + width * swarm.position, stop)
+        moved = next_swarm(swarm, settings, cost)
+        least = float(moved.best_cost.min())
+        better = least < state.best_cost
+        found = replace(
+            state,
+            phase="swarm" if moved.generation < settings.generations else "done",
+            best=space.lower + width * moved.leader if better else state.best,
+            best_cost=min(least, state.best_cost),
+            generation=moved.generation,
+            flights=state.flights + cost.size * len(self.training),
+            swarm=moved,
+        )
+        return _recorded(found, "swarm", cost.size, mean_cost=float(cost.mean()))
+
+    # flights
+
+    def _costs(self, points: Array, stop: Stop | None) -> Array:
+        return costs(self.model, self.space.decode(points), self.training, self.settings.start, stop)
+
+    def _residuals(self, points: Array, stop: Stop | None) -> Array:
+        return residuals(self.model, self.space.decode(points), self.training, self.settings.start, stop)
+
+    # reports
+
+    def _step(self, state: SearchState) -> Step:
+        last = state.history[-1]
+        total = self.search.swarm.generations if self.search.method == "pso" else 2 + self.search.iterations
+        fraction = 1.0 if state.phase == "done" else min(state.generation / total, 0.99)
+        return Step(
+            phase=str(last["phase"]),
+            generation=state.generation,
+            fraction=fraction,
+            best_cost=state.best_cost,
+            flights=state.flights,
+            message=f"{last['phase']}: J = {state.best_cost:.3g} rad^2 after {state.flights} flights",
+            checkpoint=encode(state),
+        )
+
+
+def _recorded(state: SearchState, phase: str, particles: int, **more: float) -> SearchState:
+    row = {
+        "generation": state.generation,
+        "phase": phase,
+        "particles": particles,
+        "flights": state.flights,
+        "best_cost": state.best_cost,
+        **more,
+    }
+    return replace(state, history=(*state.history, row))

@@ -1,0 +1,192 @@
+"""The result of an identification: model, fit on every sample, uncertainty, search and cost."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import wrap_angle
+from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, sample_cases, shared_trims
+from morphcore.identify.polish import differences
+from morphcore.identify.state import SearchState
+from morphcore.identify.uncertainty import Uncertainty, uncertainty
+from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
+
+if TYPE_CHECKING:
+    from morphcore.identify.identification import Identification
+
+Array = NDArray[np.float64]
+
+ANGLES = ("phi", "theta", "psi")
+
+
+@dataclass(frozen=True)
+class SampleFit:
+    """Attitudes (k, 3) flown against one sample by the rigid, the guessed and the identified model, rad."""
+
+    case: SampleCase
+    rigid: Array
+    initial: Array
+    identified: Array
+
+    def J(self, model: str) -> float | None:  # noqa: N802 - the cost's name in the literature
+        """The sample's part of J for a model, rad^2; None where its flight diverged."""
+        return _number(np.sum((self.errors(model) * self.case.weight) ** 2))
+
+    def errors(self, model: str) -> Array:
+        """(k, 3) wrapped angle differences, rad."""
+        return wrap_angle(getattr(self, model) - self.case.sample.euler)
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form with the names that the API fixes, and the rigid model's errors beside."""
+
+        def per_angle(values: Array) -> dict[str, float | None]:
+            return {angle: _number(value) for angle, value in zip(ANGLES, values, strict=True)}
+
+        identified, rigid = self.errors("identified"), self.errors("rigid")
+        return {
+            "sample": self.case.sample.name,
+            "role": self.case.sample.role,
+            "J_rigid": self.J("rigid"),
+            "J_initial": self.J("initial"),
+            "J_identified": self.J("identified"),
+            "rms_rad": per_angle(np.sqrt(np.mean(identified**2, axis=0))),
+            "max_abs_rad": per_angle(np.abs(identified).max(axis=0)),
+            "rms_rigid_rad": per_angle(np.sqrt(np.mean(rigid**2, axis=0))),
+            "range_rad": per_angle(np.ptp(self.case.sample.euler, axis=0)),
+        }
+
+    def to_curves(self) -> dict[str, Any]:
+        """Time histories for plots and tables."""
+        sample = self.case.sample
+
+        def angles(values: Array) -> dict[str, list[float | None]]:
+            return {
+                f"{name}_rad": [_number(v) for v in column] for name, column in zip(ANGLES, values.T, strict=True)
+            }
+
+        return {
+            "name": sample.name,
+            "role": sample.role,
+            "time_s": sample.time_s.tolist(),
+            "sweep_left_rad": sample.sweep_left.tolist(),
+            "sweep_right_rad": sample.sweep_right.tolist(),
+            "measured": angles(sample.euler),
+            "rigid": angles(self.rigid),
+            "initial": angles(self.initial),
+            "identified": angles(self.identified),
+        }
+
+
+@dataclass(frozen=True)
+class IdentifyResult:
+    """An identified equivalent model (``parameters``, a batch of one) with its proof."""
+
+    model: ChainModel
+    parameters: ParameterBatch
+    fits: tuple[SampleFit, ...]
+    uncertainty: Uncertainty | None
+    search: dict[str, Any]
+    cost: dict[str, float | None]
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form with the names that the API fixes."""
+        return {
+            "model": parameters_document(self.parameters),
+            "fit": [fit.to_document() for fit in self.fits],
+            "uncertainty": {"standard_error": {}, "correlation": [], "unidentifiable": []}
+            if self.uncertainty is None
+            else self.uncertainty.to_document(),
+            "search": self.search,
+            "cost": self.cost,
+        }
+
+    def curves(self) -> dict[str, Any]:
+        """Time histories of all samples for plots and tables."""
+        return {"samples": [fit.to_curves() for fit in self.fits]}
+
+
+def parameters_document(batch: ParameterBatch) -> dict[str, Any]:
+    """JSON form of one parameter set; with separate wings the lists of each wing stand in a list."""
+
+    def per_wing(values: Array) -> list[Any]:
+        lists: list[Any] = values[0].tolist()
+        return lists[0] if len(lists) == 1 else lists
+
+    return {
+        "links_per_wing": batch.links,
+        "separate_wings": batch.division.shape[1] > 1,
+        "division": per_wing(batch.division),
+        "stiffness_nm_rad": per_wing(batch.stiffness),
+        "damping_nms_rad": per_wing(batch.damping),
+        "aero": {
+            "lift_factor": float(batch.lift_factor[0]),
+            "centre_shift_m": float(batch.centre_shift[0]),
+            "profile_drag": float(batch.profile_drag[0]),
+            "lag_s": float(batch.lag[0]),
+        },
+    }
+
+
+def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
+    """Fly the best point so far against all samples and judge it."""
+    start, space = run.settings.start, run.space
+    rigid_model = run._chain(run.model.aircraft, run.model.flight, 1)
+    rigid_cases = sample_cases(rigid_model, run.samples, run.settings.step_s)
+    rigid = _attitudes(rigid_model, physical_guess(rigid_model), rigid_cases, start)
+    both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
+    judged = None
+    if space.dimension and np.isfinite(state.best_cost):
+
+        def errors(points: Array) -> Array:
+            return residuals(run.model, space.decode(points), run.training, start)
+
+        residual, jacobian = differences(state.best[None, :], space.lower, space.upper, errors)
+        judged = uncertainty(space, state.best, residual[0], jacobian[0])
+    best = space.decode(state.best)
+    longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
+    settings = run.search
+    return IdentifyResult(
+        model=run.model,
+        parameters=best,
+        fits=tuple(
+            SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
+        ),
+        uncertainty=judged,
+        search={
+            "method": settings.method,
+            "seed": settings.seed,
+            "flights": state.flights,
+            "generations": state.generation,
+            "wall_s": state.wall_s,
+            "best_cost": state.best_cost,
+            "finished": state.phase == "done",
+            "history": list(state.history),
+        },
+        cost={
+            "rigid_flight_s": _flight_time(rigid_model, physical_guess(rigid_model), rigid_cases[longest], start),
+            "equivalent_flight_s": _flight_time(run.model, best, run.cases[longest], start),
+            "flexible_flight_s": None,
+            "flight_duration_s": run.samples[longest].duration_s,
+        },
+    )
+
+
+def _attitudes(model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any) -> list[Array]:
+    return [fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)]
+
+
+def _flight_time(model: ChainModel, batch: ParameterBatch, case: SampleCase, start: Any) -> float:
+    """Wall time of one flight alone, trim included, s (kernels are warm by now)."""
+    begin = time.perf_counter()
+    _attitudes(model, batch, (case,), start)
+    return time.perf_counter() - begin
+
+
+def _number(value: Any) -> float | None:
+    number = float(value)
+    return number if np.isfinite(number) else None

@@ -1,0 +1,108 @@
+"""What an identification is asked to do, read from its JSON document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.fields import Fields
+from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
+from morphcore.identify.swarm import SwarmSettings
+from morphcore.models.equivalent import MOST_LINKS
+from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.trim import StartMode
+
+Method = Literal["hybrid", "pso", "least_squares"]
+
+METHODS: tuple[Method, ...] = ("hybrid", "pso", "least_squares")
+LARGEST_SEED = 2**53 - 1
+PAPER_PARTICLES = 2500
+# starts of the multi-start polish; one start at four links got stuck ten times higher than the best of several
+DEFAULT_STARTS = 8
+DEFAULT_SCREEN = 192  # candidates flown to find them
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """The model whose parameters are sought."""
+
+    links_per_wing: int = 3
+    separate_wings: bool = False
+    aero_coefficients: tuple[str, ...] = AERO_COEFFICIENTS
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    chordwise: int = 4
+    spanwise: int = 10
+    step_s: float = STEP_S
+    start: StartMode = "trim"
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """How they are sought. ``swarm`` rules the method "pso"; "hybrid" and "least_squares" polish ``starts`` candidates."""
+
+    method: Method = "hybrid"
+    seed: int = 1
+    max_seconds: float | None = None
+    swarm: SwarmSettings = SwarmSettings()
+    screen: int = DEFAULT_SCREEN
+    starts: int = DEFAULT_STARTS
+    iterations: int = 40
+
+
+def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSettings:
+    """Read the model's part of a request."""
+    fields = Fields(document, pointer)
+    default = ModelSettings()
+    lattice = fields.optional_child("lattice")
+    bounds = fields.optional_child("bounds")
+    pairs = {name: _pair(bounds, name) for name in BOUND_NAMES if bounds.has(name)}
+    bounds.done()
+    settings = ModelSettings(
+        links_per_wing=fields.whole("links_per_wing", default=default.links_per_wing, least=1, most=MOST_LINKS),
+        separate_wings=fields.flag("separate_wings", default=False),
+        aero_coefficients=tuple(fields.raw("aero_coefficients", list(AERO_COEFFICIENTS))),
+        bounds=pairs,
+        chordwise=lattice.whole("chordwise", default=default.chordwise, least=1, most=8),
+        spanwise=lattice.whole("spanwise", default=default.spanwise, least=4, most=20),
+        step_s=fields.number("step_s", default=default.step_s, least=5e-4, most=0.01),
+        start=fields.choice("start", ("trim", "given")) if fields.has("start") else "trim",  # type: ignore[arg-type]
+    )
+    lattice.done()
+    fields.done()
+    return settings
+
+
+def search_settings(document: dict[str, Any], pointer: str = "/search") -> SearchSettings:
+    """Read the search's part of a request; ``preset: "paper"`` is the swarm of the 2021 paper."""
+    fields = Fields(document, pointer)
+    paper = fields.choice("preset", ("paper",)) == "paper" if fields.has("preset") else False
+    method = fields.choice("method", METHODS) if fields.has("method") else ("pso" if paper else "hybrid")
+    default = SwarmSettings(particles=PAPER_PARTICLES) if paper else SwarmSettings()
+    swarm = SwarmSettings(
+        particles=fields.whole("particles", default=default.particles, least=1, most=100_000),
+        generations=fields.whole("generations", default=default.generations, least=1, most=100_000),
+        c1=fields.number("c1", default=default.c1, least=0.0, most=4.0),
+        c2=fields.number("c2", default=default.c2, least=0.0, most=4.0),
+        inertia=fields.number("inertia", default=default.inertia, least=0.0, most=1.5),
+    )
+    polished = SearchSettings()
+    settings = SearchSettings(
+        method="pso" if paper else method,  # type: ignore[arg-type]
+        seed=fields.whole("seed", default=1, least=0, most=LARGEST_SEED),
+        max_seconds=fields.optional_number("max_seconds", above=0.0),
+        swarm=swarm,
+        screen=swarm.particles if fields.has("particles") else polished.screen,
+        iterations=swarm.generations if fields.has("generations") else polished.iterations,
+    )
+    fields.done()
+    return settings
+
+
+def _pair(fields: Fields, name: str) -> tuple[float, float]:
+    value = fields.raw(name)
+    if not isinstance(value, list) or len(value) != 2:
+        raise InvalidInput(f"{name} is not [low, high]", pointer=f"{fields.pointer}/{name}", hint="give two numbers")
+    numbers = Fields({"low": value[0], "high": value[1]}, f"{fields.pointer}/{name}")
+    return numbers.number("low"), numbers.number("high")

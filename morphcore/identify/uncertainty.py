@@ -1,0 +1,88 @@
+"""How well the samples determine the parameters: Gauss-Newton covariance and the directions that they cannot see.
+
+Bard (1974), section 7-5: with residuals r and Jacobian A at the optimum, cov(x) = s^2 (A^T A)^-1, s^2 = r^T r / (m - d).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.identify.parameters import SearchSpace
+
+Array = NDArray[np.float64]
+
+UNSEEN_SPREAD = 1.0  # standard deviation along a direction, in search coordinates (factor e for a stiffness), beyond which
+# the samples say nothing about it
+NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left out of the report
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Uncertainty of an identified model (d search coordinates, m named parameters).
+
+    names : (d,) search coordinates. covariance : (d, d) in search coordinates. singular_values : (d,) of the Jacobian.
+    directions : (d, d) rows: right singular vectors. parameter_names : (m,). standard_error : (m,) in SI units.
+    """
+
+    names: tuple[str, ...]
+    covariance: Array
+    singular_values: Array
+    directions: Array
+    noise_rad: float
+    parameter_names: tuple[str, ...]
+    standard_error: Array
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form with the names that the API fixes."""
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        correlation = self.covariance / np.maximum(np.outer(spread, spread), 1e-300)
+        return {
+            "standard_error": {n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)},
+            "coordinates": list(self.names),
+            "correlation": np.clip(correlation, -1.0, 1.0).round(6).tolist(),
+            "singular_values": self.singular_values.tolist(),
+            "residual_rms_rad": self.noise_rad,
+            "unidentifiable": [
+                {
+                    "spread": _finite(self.noise_rad / value) if value > 0 else None,
+                    "direction": {
+                        name: round(float(part), 3)
+                        for name, part in zip(self.names, direction, strict=True)
+                        if abs(part) >= NEGLIGIBLE_PART
+                    },
+                }
+                for value, direction in zip(self.singular_values, self.directions, strict=True)
+                if self.noise_rad > UNSEEN_SPREAD * value
+            ],
+        }
+
+
+def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) -> Uncertainty:
+    """Uncertainty at search point x (d,) from residuals (m,) and Jacobian (m, d) there."""
+    d = x.size
+    freedom = max(residual.size - d, 1)
+    noise = float(np.sqrt(residual @ residual / freedom))
+    _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
+    floor = np.finfo(float).eps * max(jacobian.shape) * max(singular.max(initial=0.0), 1e-300)
+    inverse = 1.0 / np.maximum(singular, floor)
+    covariance = noise**2 * (directions.T * inverse**2) @ directions
+    probe = 1e-6
+    named = space.flatten(space.decode(np.concatenate([x[None, :], x + probe * np.eye(d)])))
+    slope = (named[1:] - named[0]).T / probe
+    return Uncertainty(
+        names=space.names,
+        covariance=covariance,
+        singular_values=singular,
+        directions=directions,
+        noise_rad=noise,
+        parameter_names=space.parameter_names,
+        standard_error=np.sqrt(np.maximum(np.einsum("md,de,me->m", slope, covariance, slope), 0.0)),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

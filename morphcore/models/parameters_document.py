@@ -1,0 +1,119 @@
+"""Parameters of an equivalent model as the ``model`` object of a result document, there and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.fields import Fields
+from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
+
+Array = NDArray[np.float64]
+Document = dict[str, Any]
+
+AXES = 3  # flap, torsion, lag
+SUM_TOLERANCE = 1e-6  # of the division fractions: documents may be rounded for printing
+
+
+def parameters_from_document(document: Document, pointer: str = "/model") -> ParameterBatch:
+    """Read one parameter set.
+
+    Parameters
+    ----------
+    document : a ``model`` object of an identification's result, or the whole result that holds one.
+        ``division`` (n,), ``stiffness_nm_rad`` (n - 1, 3) of flap, torsion and lag in N m/rad,
+        ``damping_nms_rad`` (n - 1, 3) in N m s/rad (or one number for a joint's three axes); each with one
+        more leading axis where the wings have parameters of their own. ``aero``: ``lift_factor`` (-),
+        ``centre_shift_m`` (forward positive), ``profile_drag`` (-), ``lag_s``. Other fields are not looked
+        at.
+    pointer : where the document stands, for errors.
+
+    Returns
+    -------
+    ParameterBatch of one particle.
+
+    Raises
+    ------
+    InvalidInput : a field is missing, has another shape than ``links_per_wing`` says, or is out of its range.
+    """
+    whole = Fields(document, pointer)
+    fields = Fields(whole.raw("model"), pointer) if whole.has("model") else whole
+    fields.raw("links_per_wing")
+    links = fields.whole("links_per_wing", default=1, least=1, most=MOST_LINKS)
+    division = _array(fields, "division")
+    wings = 1 if division.ndim == 1 else division.shape[0]
+    division = _shaped(fields, "division", division, (wings, links))
+    if np.any(division <= 0.0) or np.any(np.abs(division.sum(axis=1) - 1.0) > SUM_TOLERANCE):
+        raise _error(fields, "division", "the shares of the span are not positive or do not add up to 1")
+    stiffness = _array(fields, "stiffness_nm_rad")
+    stiffness = _shaped(fields, "stiffness_nm_rad", stiffness, (wings, links - 1, AXES))
+    damping = _array(fields, "damping_nms_rad")
+    if damping.ndim > 0 and damping.size == wings * (links - 1):
+        damping = np.repeat(damping.reshape(wings, links - 1, 1), AXES, axis=2)
+    damping = _shaped(fields, "damping_nms_rad", damping, (wings, links - 1, AXES))
+    for name, values in (("stiffness_nm_rad", stiffness), ("damping_nms_rad", damping)):
+        if np.any(values < 0.0):
+            raise _error(fields, name, f"{name} has a negative entry")
+    aero = fields.child("aero")
+    corrections = {
+        "lift_factor": aero.number("lift_factor", default=1.0, above=0.0, most=100.0),
+        "centre_shift": aero.number("centre_shift_m", default=0.0, least=-100.0, most=100.0),
+        "profile_drag": aero.number("profile_drag", least=0.0, most=10.0),
+        "lag": aero.number("lag_s", least=0.0, most=100.0),
+    }
+    return ParameterBatch(
+        division=(division / division.sum(axis=1, keepdims=True))[None],
+        stiffness=stiffness[None],
+        damping=damping[None],
+        **{name: np.array([value]) for name, value in corrections.items()},
+    )
+
+
+def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
+    """Write one parameter set of a batch as a ``model`` object; ``parameters_from_document`` reads it back.
+
+    Shared parameters are written flat; where each wing has its own, with one more leading axis.
+    """
+    shared = batch.division.shape[1] == 1
+    values = {
+        "division": batch.division[particle],
+        "stiffness_nm_rad": batch.stiffness[particle],
+        "damping_nms_rad": batch.damping[particle],
+    }
+    return {
+        "links_per_wing": batch.links,
+        **{name: (value[0] if shared else value).tolist() for name, value in values.items()},
+        "aero": {
+            "lift_factor": float(batch.lift_factor[particle]),
+            "centre_shift_m": float(batch.centre_shift[particle]),
+            "profile_drag": float(batch.profile_drag[particle]),
+            "lag_s": float(batch.lag[particle]),
+        },
+    }
+
+
+def _array(fields: Fields, name: str) -> Array:
+    raw = fields.raw(name)
+    try:
+        values = np.array(raw, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise _error(fields, name, f"{name} is not a list of numbers") from None
+    if values.ndim == 0 or not np.all(np.isfinite(values)):
+        raise _error(fields, name, f"{name} is not a list of finite numbers")
+    return values
+
+
+def _shaped(fields: Fields, name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    # no entries at all (one link has no joints): [] and [[]] are the same
+    if values.size != np.prod(shape) or (values.size and values.shape not in {shape, shape[1:]}):
+        wanted = " x ".join(str(n) for n in (shape if shape[0] > 1 else shape[1:]))
+        raise _error(fields, name, f"{name} does not hold {wanted} numbers")
+    return values.reshape(shape)
+
+
+def _error(fields: Fields, name: str, message: str) -> InvalidInput:
+    hint = "give the model of an identification's result"
+    return InvalidInput(message, pointer=f"{fields.pointer}/{name}", hint=hint)
