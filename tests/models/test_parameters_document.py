@@ -1,0 +1,79 @@
+"""Parameters as documents: there and back, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import load_aircraft, load_flight
+from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
+from morphcore.models.parameters_document import parameters_document, parameters_from_document
+
+DOCUMENT: dict[str, Any] = {
+    "links_per_wing": 2,
+    "division": [0.4, 0.6],
+    "stiffness_nm_rad": [[5e4, 6e4, 4e5]],
+    "damping_nms_rad": [[200.0, 250.0, 1800.0]],
+    "aero": {"lift_factor": 1.1, "centre_shift_m": -0.002, "profile_drag": 0.012, "lag_s": 0.004},
+}
+
+
+def _random_batch(rng: np.random.Generator, links: int, wings: int) -> ParameterBatch:
+    return ParameterBatch(
+        division=rng.dirichlet(np.full(links, 5.0), size=(2, wings)),
+        stiffness=rng.uniform(1e3, 1e6, (2, wings, links - 1, 3)),
+        damping=rng.uniform(0.0, 1e3, (2, wings, links - 1, 3)),
+        lift_factor=rng.uniform(0.5, 2.0, 2),
+        centre_shift=rng.normal(0.0, 0.01, 2),
+        profile_drag=rng.uniform(0.0, 0.1, 2),
+        lag=rng.uniform(0.0, 0.01, 2),
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.integers(1, 3), st.integers(0, 1))
+def test_documents_keep_every_digit(seed: int, links: int, wings: int, particle: int) -> None:
+    """Batch -> JSON text -> batch is exact but for the renormalised division, shared or not, one link or eight."""
+    batch = _random_batch(np.random.default_rng(seed), links, wings)
+    read = parameters_from_document(json.loads(json.dumps(parameters_document(batch, particle))))
+    for name, value in vars(batch.select(slice(particle, particle + 1))).items():
+        np.testing.assert_allclose(getattr(read, name), value, rtol=1e-15, atol=0.0)
+
+
+def test_a_whole_result_and_one_damping_a_joint_are_understood(examples: Path) -> None:
+    """The model may stand inside its result; a joint's damping may be one number for its three axes."""
+    read = parameters_from_document({"model": {**DOCUMENT, "damping_nms_rad": [200.0]}, "fit": []})
+    np.testing.assert_array_equal(read.damping, np.full((1, 1, 1, 3), 200.0))
+    rigid = chain_model(load_aircraft(examples / "aircraft.json"), load_flight(examples / "flight.json"), 1)
+    assert parameters_from_document(parameters_document(physical_guess(rigid))).links == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
+        ({"links_per_wing": None}, "/model/links_per_wing"),
+        ({"links_per_wing": 9}, "/model/links_per_wing"),
+        ({"links_per_wing": 3}, "/model/division"),
+        ({"division": [0.4, 0.7]}, "/model/division"),
+        ({"division": [-0.4, 1.4]}, "/model/division"),
+        ({"division": ["a", 1.0]}, "/model/division"),
+        ({"stiffness_nm_rad": [[5e4, 6e4]]}, "/model/stiffness_nm_rad"),
+        ({"stiffness_nm_rad": [[5e4, 6e4, -1.0]]}, "/model/stiffness_nm_rad"),
+        ({"stiffness_nm_rad": [[5e4, 6e4, float("nan")]]}, "/model/stiffness_nm_rad"),
+        ({"damping_nms_rad": 3.0}, "/model/damping_nms_rad"),
+        ({"aero": None}, "/model/aero"),
+        ({"aero": {"profile_drag": 0.01, "lag_s": -1.0}}, "/model/aero/lag_s"),
+    ],
+)
+def test_refusals_name_the_field(change: dict[str, Any], pointer: str) -> None:
+    """A document that is no model is refused with the field at fault."""
+    with pytest.raises(InvalidInput) as caught:
+        parameters_from_document({**DOCUMENT, **change})
+    assert caught.value.pointer == pointer
