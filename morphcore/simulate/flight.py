@@ -45,7 +45,7 @@ FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would run a c
 class Simulation:
     """A flown flight.
 
-    trajectory : attitude (rad) and sweep (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
+    trajectory : attitude and sweep (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
     and x, y, z (m) of the reference point in N, tip_left_z and tip_right_z (m, below the wing's root along z
     of B).
     trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad).
