@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -76,6 +77,7 @@ class Meter:
         self._progress = progress
         self._task = progress.add_task("waiting", total=1.0, detail="")
         self._next_line_at = 0.0
+        self._last_line = ""
 
     def show(self, progress: Document | None, status: str = "running") -> None:
         """Show one progress document."""
@@ -84,7 +86,11 @@ class Meter:
             return
         fraction, phase = float(progress.get("fraction") or 0.0), str(progress.get("phase") or status)
         self._progress.update(self._task, completed=fraction, description=phase, detail=_detail(progress))
-        if not self._progress.console.is_terminal and time.monotonic() >= self._next_line_at:
+        line = f"{phase:<10} {100.0 * fraction:3.0f} %  {_detail(progress)}"
+        console = self._progress.console
+        if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
+            console.print(line, markup=False, soft_wrap=True)
+            self._last_line = line
             self._progress.console.print(
                 f"{phase:<10} {100.0 * fraction:3.0f} %  {_detail(progress)}", markup=False
             )
@@ -108,19 +114,23 @@ def meter() -> Iterator[Meter]:
 
 def fit_table(result: Document) -> Table:
     """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
-    table = Table(title="Fit: cost J in rad² (rigid, first guess, identified), RMS of φ, θ, ψ in mrad")
-    for name in ("sample", "role"):
-        table.add_column(name, no_wrap=True)
+    title = "Fit: J in rad² (rigid, first guess, identified); RMS of φ, θ, ψ in mrad"
+    table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("sample", no_wrap=True)
     for name in ("rigid", "guess", "identified", "ratio", "φ", "θ", "ψ"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     for row in result["fit"]:
         rms = row["rms_rad"]
+        ratio = (
+            row["J_identified"] / row["J_rigid"]
+            if row["J_rigid"] and row["J_identified"] is not None
+            else None
+        )
         table.add_row(
-            str(row["sample"]),
-            str(row["role"]).replace("_", " "),
+            str(row["sample"]) + ("" if row["role"] == "train" else " (held out)"),
             *(_short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
-            _short(row["J_identified"] / row["J_rigid"] if row["J_rigid"] else None),
-            *(_short(1e3 * rms[angle]) for angle in ("phi", "theta", "psi")),
+            "" if ratio is None else f"{ratio:.1e}",
+            *("" if rms[angle] is None else f"{1e3 * rms[angle]:.3f}" for angle in ("phi", "theta", "psi")),
         )
     return table
 
@@ -129,7 +139,11 @@ def model_table(result: Document) -> Table:
     """Show the identified joints, root to tip: stiffness (N m/rad) and damping (N m s/rad)."""
     model = result["model"]
     corrections = ", ".join(f"{name} {_short(value)}" for name, value in model["aero"].items())
-    table = Table(title=f"Equivalent model, {model['links_per_wing']} links per wing", caption=corrections)
+    table = Table(
+        title=f"Equivalent model, {model['links_per_wing']} links per wing",
+        caption=corrections,
+        box=SIMPLE_HEAD,
+    )
     table.add_column("joint")
     for name in ("k flap", "k torsion", "k lag", "damping"):
         table.add_column(name, justify="right")
@@ -143,7 +157,7 @@ def model_table(result: Document) -> Table:
 
 def jobs_table(jobs: Sequence[Document]) -> Table:
     """Show jobs, one a line."""
-    table = Table()
+    table = Table(box=SIMPLE_HEAD)
     for name in ("job", "operation", "status", "progress", "attempt", "created"):
         table.add_column(name)
     for job in jobs:
