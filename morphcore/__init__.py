@@ -1,4 +1,4 @@
-"""MorphID's numeric library: fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
+"""MorphID's numeric library: equivalent models of sweep-morphing aircraft from sample flights.
 
 >>> from morphcore import load_aircraft, load_flight, load_trajectory, identify  # doctest: +SKIP
 """

@@ -1,9 +1,9 @@
 """The one numba decorator of the project, with its flags explained once.
 
-- ``error_model="numpy"``: division by zero gives inf instead of raising; the check would keep the compiler from
-  turning lane loops into vector instructions.
-- ``fastmath`` allows contraction to fused multiply-add and reordering of sums. ``nnan``/``ninf`` are left out: a diverged
-  flight must stay recognisable as such.
+- ``error_model="numpy"``: division by zero gives inf instead of raising; the check would keep the compiler
+  from turning lane loops into vector instructions.
+- ``fastmath`` allows contraction to fused multiply-add and reordering of sums. ``nnan``/``ninf`` are left
+  out: a diverged flight must stay recognisable as such.
 - ``nogil``: heartbeats and cancellation keep running beside a kernel.
 - ``cache``: compiled code is kept beside the source, or in ``NUMBA_CACHE_DIR``.
 - ``boundscheck=False``: shapes are checked once, in the typed shells.
@@ -18,7 +18,6 @@ from typing import Any
 
 import numba
 
-
 FAST_MATH = {"contract", "reassoc", "arcp", "nsz"}
 
 
@@ -29,7 +28,9 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def parallel_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile the one kind of kernel that spreads blocks of lanes over threads with ``prange``."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True, parallel=True)(function)
+    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True, parallel=True)(
+        function
+    )
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,8 +1,9 @@
 """Lanes: the innermost, contiguous axis of every hot array is the particle index, in blocks of ``LANES``.
 
-A kernel's loops ``for l in range(LANES)`` become vector instructions when the compiler knows that rows of an array are
-``LANES`` apart. Numba passes shapes as run-time values, so each kernel starts with ``if not_in_lanes(...): return``:
-past that line the row length is a known constant. (Without it the same loop runs two to three times slower.)
+A kernel's loops ``for l in range(LANES)`` become vector instructions when the compiler knows that rows of an
+array are ``LANES`` apart. Numba passes shapes as run-time values, so each kernel starts with ``if
+not_in_lanes(...): return``: past that line the row length is a known constant. (Without it the same loop runs
+two to three times slower.)
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import math
 
 from morphcore.jit import inlined
 
-LANES = 16  # two 512-bit or four 256-bit vectors: long enough to amortise loop overhead, short enough for the cache
+# two 512-bit or four 256-bit vectors: long enough to amortise loop overhead, short enough for the cache
+LANES = 16
 
 TWO_OVER_PI = 2.0 / math.pi
 # pi/2 in two parts (Cody & Waite): the first has trailing zeros, so that n * first is exact
@@ -36,7 +38,11 @@ def sine_cosine(angle: float) -> tuple[float, float]:
             + z
             * (
                 -1.98412698295895385996e-4
-                + z * (2.75573136213857245213e-6 + z * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10))
+                + z
+                * (
+                    2.75573136213857245213e-6
+                    + z * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10)
+                )
             )
         )
     )
@@ -53,7 +59,11 @@ def sine_cosine(angle: float) -> tuple[float, float]:
                 + z
                 * (
                     2.48015872888517045348e-5
-                    + z * (-2.75573141792967388112e-7 + z * (2.08757008419747316778e-9 - z * 1.13585365213876817300e-11))
+                    + z
+                    * (
+                        -2.75573141792967388112e-7
+                        + z * (2.08757008419747316778e-9 - z * 1.13585365213876817300e-11)
+                    )
                 )
             )
         )

@@ -7,4 +7,5 @@ import numba
 
 def use_threads(count: int) -> None:
     """Let the calling thread's kernels run on so many threads, at most those that numba was started with."""
-    numba.set_num_threads(max(1, min(count, numba.config.NUMBA_NUM_THREADS)))
+    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    numba.set_num_threads(max(1, min(count, most)))

@@ -1,18 +1,21 @@
 r"""The lattice of a whole aircraft, reduced to what the links feel of it.
 
-With the lattice frozen on the undeformed surfaces (at their hinge angles) and its wake along a fixed direction, the
-circulations are linear in the normal velocity of the structure, and on a flat link that velocity is
-``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the strips to five numbers for each
-strip (the rows that aero/kernels/loads.py lists), from which the forces on all bound edges follow.
+With the lattice frozen on the undeformed surfaces (at their hinge angles) and its wake along a fixed
+direction, the circulations are linear in the normal velocity of the structure, and on a flat link that
+velocity is ``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the
+strips to five numbers for each strip (the rows that aero/kernels/loads.py lists), from which the forces on
+all bound edges follow.
 
 Kutta-Joukowski on a ring of circulation G in the flow U = induced velocity - velocity of the structure:
 
-- In a flow that a rigid motion makes, a *closed* ring feels no net force but the moment rho G A (n x U). Only the rings of
-  the trailing edge are open there (wake and last edge cancel), which leaves the force rho G_te U x l at the trailing edge.
-  Hence normal force and moments from ``g = G_te dy``, ``S = sum G_i A_i`` and ``X = sum G_i A_i x_i``.
-- The normal velocity on the edges gives the forces in the plane of the surface. They are products of circulation and induced
-  velocity, both distributed along the chord; here the induced velocity of a strip is averaged with the chordwise
-  distribution of the circulation in uniform incidence, which is exact there and of second order elsewhere.
+- In a flow that a rigid motion makes, a *closed* ring feels no net force but the moment rho G A (n x U). Only
+  the rings of the trailing edge are open there (wake and last edge cancel), which leaves the force rho G_te U
+  x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, ``S = sum G_i A_i`` and ``X =
+  sum G_i A_i x_i``.
+- The normal velocity on the edges gives the forces in the plane of the surface. They are products of
+  circulation and induced velocity, both distributed along the chord; here the induced velocity of a strip is
+  averaged with the chordwise distribution of the circulation in uniform incidence, which is exact there and
+  of second order elsewhere.
 """
 
 from __future__ import annotations
@@ -67,8 +70,8 @@ class AircraftLattice:
 class LatticeOperator:
     """One reduced operator.
 
-    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 2): x of the trailing edge and of the centre of
-    circulation of each strip from the link axis (the elastic axis), m.
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 2): x of the trailing edge and of the
+    centre of circulation of each strip from the link axis (the elastic axis), m.
     """
 
     matrix: Array
@@ -79,7 +82,9 @@ def aircraft_lattice(aircraft: Aircraft, chordwise: int, spanwise: int) -> Aircr
     """Lattices of ``chordwise`` x ``spanwise`` panels on every surface."""
     lattices = tuple(surface_lattice(surface, chordwise, spanwise) for surface in aircraft.surfaces)
     strip0 = tuple(int(n) for n in np.cumsum([0] + [lattice.spanwise for lattice in lattices[:-1]]))
-    return AircraftLattice(aircraft, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices))
+    return AircraftLattice(
+        aircraft, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices)
+    )
 
 
 def lattice_operator(
@@ -104,7 +109,11 @@ def lattice_operator(
     points = np.concatenate([part for group in groups for part in group])
     velocity = influence(points, np.concatenate(corners), lattice.table, wake_direction_B, mach=mach)
     normal = np.concatenate(
-        [np.repeat(n[None, :], part.shape[0], axis=0) for group in groups for n, part in zip(normals, group, strict=True)]
+        [
+            np.repeat(n[None, :], part.shape[0], axis=0)
+            for group in groups
+            for n, part in zip(normals, group, strict=True)
+        ]
     )
     induced = np.einsum("pa,arp->pr", normal, velocity)  # normal velocity, (points, rings)
     rings = lattice.table.rings
@@ -117,7 +126,9 @@ def _boundary(lattice: AircraftLattice) -> Array:
     """Normal velocity at the control points (rings, inputs) from D0 and D1 of every strip."""
     out = np.zeros((lattice.table.rings, 2 * lattice.strips))
     ring = 0
-    for surface, part, strip0 in zip(lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True):
+    for surface, part, strip0 in zip(
+        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
+    ):
         x = part.control_points_W[..., 0] - surface.elastic_axis_offset_m
         for i in range(part.chordwise):
             for j in range(part.spanwise):
@@ -135,7 +146,9 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
     inputs = circulation.shape[1]
     ring = 0
     side0 = lattice.table.rings
-    for surface, part, strip0 in zip(lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True):
+    for surface, part, strip0 in zip(
+        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
+    ):
         shape = (part.chordwise, part.spanwise)
         count = part.rings
         side_count = part.chordwise * (part.spanwise + 1)

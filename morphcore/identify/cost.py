@@ -54,16 +54,19 @@ class Evaluation:
     @property
     def cost(self) -> Array:
         """(p,) J."""
-        return np.einsum("pka,pka->p", self.errors, self.errors)
+        return np.asarray(np.einsum("pka,pka->p", self.errors, self.errors))
 
 
 def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> list[Schedule]:
-    """Hinge motion of every surface from a sample's sweep histories; refuses angles beyond a hinge's range."""
+    """Hinge motion of every surface out of a sample; refuses angles beyond a hinge's range."""
     schedules: list[Schedule] = []
     for surface in aircraft.surfaces:
         angle = sample.sweep(surface.side)
         if surface.hinge is not None:
-            low, high = surface.hinge.min_rad - HINGE_TOLERANCE_RAD, surface.hinge.max_rad + HINGE_TOLERANCE_RAD
+            low, high = (
+                surface.hinge.min_rad - HINGE_TOLERANCE_RAD,
+                surface.hinge.max_rad + HINGE_TOLERANCE_RAD,
+            )
             bad = np.flatnonzero((angle < low) | (angle > high))
             if bad.size:
                 raise InvalidInput(
@@ -76,7 +79,10 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
 
 
 def sample_cases(
-    model: ChainModel, samples: Sequence[Trajectory], longest_step_s: float = STEP_S, pointer: str = "/samples"
+    model: ChainModel,
+    samples: Sequence[Trajectory],
+    longest_step_s: float = STEP_S,
+    pointer: str = "/samples",
 ) -> tuple[SampleCase, ...]:
     """Plans for all samples."""
     return tuple(
@@ -107,7 +113,7 @@ def shared_trims(
 def fly_attitudes(
     model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
 ) -> Array:
-    """Euler angles (p, k, 3) at the sample's times from a trimmed start; NaN from where a flight diverged, or untrimmed."""
+    """Euler angles (p, k, 3) at the sample's times; NaN from where a flight diverged, or untrimmed."""
     plan, sample = case.plan, case.sample
     constants = lane_constants(model, batch, plan.grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
@@ -158,7 +164,11 @@ def costs(
 
 
 def residuals(
-    model: ChainModel, batch: ParameterBatch, cases: Sequence[SampleCase], start: StartMode, stop: Stop | None = None
+    model: ChainModel,
+    batch: ParameterBatch,
+    cases: Sequence[SampleCase],
+    start: StartMode,
+    stop: Stop | None = None,
 ) -> Array:
     """(p, m) all weighted errors of all samples in one row per parameter set."""
     return np.concatenate(

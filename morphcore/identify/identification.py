@@ -17,7 +17,7 @@ from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import ModelSettings, SearchSettings
-from morphcore.identify.state import SearchState, decode, encode
+from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.identify.swarm import first_swarm, next_swarm
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.batch import Stop
@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 Clock = Callable[[], float]
 
 SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical guess, in search coordinates
-# A weak prior on the polish: being off the physical guess by one unit costs as much as one error of this size. It settles the
-# directions that the samples cannot see and is far below what they can.
+# A weak prior on the polish: being off the physical guess by one unit costs as much as one error of this
+# size. It settles the directions that the samples cannot see and is far below what they can.
 PRIOR_RAD = 1e-4
 # the field of starts narrows as the polish goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
@@ -38,8 +38,9 @@ NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
 class Step:
     """What one step of an identification leaves.
 
-    fraction : of the whole search, 0..1. best_cost : least J so far, rad^2. flights : flown so far, one per parameter set and
-    sample. checkpoint : complete state; ``steps(checkpoint)`` goes on to the bit-identical result.
+    fraction : of the whole search, 0..1. best_cost : least J so far, rad^2. flights : flown so far, one per
+    parameter set and sample. checkpoint : complete state; ``steps(checkpoint)`` goes on to the bit-identical
+    result.
     """
 
     phase: str
@@ -77,10 +78,14 @@ class Identification:
         if len(set(names)) != len(names):
             raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
         if not any(sample.role == "train" for sample in samples):
-            raise InvalidInput("no sample has the role train", pointer="/samples", hint="mark at least one with role train")
+            raise InvalidInput(
+                "no sample has the role train", pointer="/samples", hint="mark at least one with role train"
+            )
         if self.settings.start == "given" and flight.start is None:
-            raise InvalidInput("the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim")
-        self.model = self._chain(aircraft, flight, self.settings.links_per_wing)
+            raise InvalidInput(
+                "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
+            )
+        self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
@@ -88,7 +93,8 @@ class Identification:
             bounds=self.settings.bounds,
         )
 
-    def _chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
+    def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
+        """A chain model with the lattice that the settings ask for."""
         return chain_model(
             aircraft, flight, links, chordwise=self.settings.chordwise, spanwise=self.settings.spanwise
         )
@@ -129,11 +135,9 @@ class Identification:
     def _baseline(self, stop: Stop | None) -> SearchState:
         """Fly the physical guess: from here on there is a best so far."""
         cost = self._costs(self.space.guess[None, :], stop)
-        if self.space.dimension == 0:
-            phase = "done"
-        else:
-            phase = "swarm" if self.search.method == "pso" else "screen"
-        state = SearchState(phase, self.space.guess, float(cost[0]), flights=len(self.training))  # type: ignore[arg-type]
+        following: Phase = "swarm" if self.search.method == "pso" else "screen"
+        phase: Phase = following if self.space.dimension else "done"
+        state = SearchState(phase, self.space.guess, float(cost[0]), flights=len(self.training))
         return _recorded(state, "baseline", 0)
 
     def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
@@ -164,8 +168,7 @@ class Identification:
 
     def _polish(self, state: SearchState, stop: Stop | None) -> SearchState:
         """One Levenberg-Marquardt iteration of all starts still in the field."""
-        before = state.polish
-        assert before is not None
+        before = state.polish or first_polish(state.best[None, :], np.array([state.best_cost]))
         share = next((share for limit, share in NARROWING if before.iteration < limit), 0.0)
         keep = max(1, round(share * before.cost.size))
         flown = 0

@@ -1,8 +1,9 @@
 """The unknowns of an identification and the coordinates in which they are searched.
 
-Stiffness, damping and lag time are searched as logarithms; the division lengths, which sum to the span, as log-ratios to the
-last link (Aitchison 1982, the additive log-ratio: a box in them is inside the simplex); the other corrections linearly, in units
-of their natural size. So all coordinates are of order one and a difference step fits all.
+Stiffness, damping and lag time are searched as logarithms; the division lengths, which sum to the span, as
+log-ratios to the last link (Aitchison 1982, the additive log-ratio: a box in them is inside the simplex); the
+other corrections linearly, in units of their natural size. So all coordinates are of order one and a
+difference step fits all.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ LARGEST_DECADES = 12.0
 class SearchSpace:
     """Box of search coordinates and the way from them to parameters.
 
-    names : what each coordinate stands for. lower, upper, guess : (d,). wing_sets : 1, or the number of flexible surfaces.
+    names : what each coordinate stands for. lower, upper, guess : (d,). wing_sets : 1, or the number of
+    flexible surfaces.
     free_aero : the corrections that are searched; the others keep the guess.
     """
 
@@ -88,11 +90,17 @@ class SearchSpace:
         return self.model.aircraft.surfaces[0].mean_chord_m
 
     def flatten(self, batch: ParameterBatch) -> Array:
-        """Named parameters in SI units (p, m), in the order of ``parameter_names``: all that the model has, fixed ones too."""
+        """Named parameters in SI units (p, m), ordered as ``parameter_names``, fixed ones included."""
         p = batch.particles
         aero = np.stack([getattr(batch, _FIELDS[name]) for name in AERO_COEFFICIENTS], axis=1)
         return np.concatenate(
-            [batch.division.reshape(p, -1), batch.stiffness.reshape(p, -1), batch.damping.reshape(p, -1), aero], axis=1
+            [
+                batch.division.reshape(p, -1),
+                batch.stiffness.reshape(p, -1),
+                batch.damping.reshape(p, -1),
+                aero,
+            ],
+            axis=1,
         )
 
     @property
@@ -194,7 +202,14 @@ def search_space(
         lower.append(low[None])
         upper.append(high[None])
     return SearchSpace(
-        model, tuple(names), *(np.concatenate(part) for part in (lower, upper, guess)), wing_sets, free_aero, fixed
+        model=model,
+        names=tuple(names),
+        lower=np.concatenate(lower),
+        upper=np.concatenate(upper),
+        guess=np.concatenate(guess),
+        wing_sets=wing_sets,
+        free_aero=free_aero,
+        fixed=fixed,
     )
 
 
@@ -209,7 +224,8 @@ def _ratio_range(links: int, bound: Sequence[float] | None) -> float:
             pointer="/model/bounds/division",
             hint=f"they must hold 1/{links}",
         )
-    # the extreme shares of a box of log-ratios +-r: 1 / (1 + e^r + (n - 2) e^r) at least, the mirror image at most
+    # the extreme shares of a box of log-ratios +-r: 1 / (1 + e^r + (n - 2) e^r) at least, the mirror image at
+    # most
     smallest = np.log((1.0 / low - 1.0) / (links - 1)) if low > 0 else RATIO_RANGE
     largest = np.log((links - 1) / (1.0 / high - 1.0)) if high < 1 else RATIO_RANGE
     return float(min(RATIO_RANGE, smallest / 2, largest / 2))
@@ -223,10 +239,16 @@ def _check_bound(name: str, pair: Sequence[float]) -> None:
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidInput(f"{name} is bounded by {low:g}..{high:g}", pointer=pointer, hint="give low < high")
     if name in ("stiffness_nm_rad", "damping_nms_rad", "lag_s", "lift_factor") and low <= 0:
-        raise InvalidInput(f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must be greater than 0")
+        raise InvalidInput(
+            f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must be greater than 0"
+        )
     if name in ("profile_drag", "division") and low < 0:
-        raise InvalidInput(f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must not be negative")
+        raise InvalidInput(
+            f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must not be negative"
+        )
     if low > 0 and np.log10(high / low) > LARGEST_DECADES:
         raise InvalidInput(
-            f"the bounds of {name} span more than {LARGEST_DECADES:g} decades", pointer=pointer, hint="narrow them"
+            f"the bounds of {name} span more than {LARGEST_DECADES:g} decades",
+            pointer=pointer,
+            hint="narrow them",
         )

@@ -1,7 +1,8 @@
 """Multi-start Levenberg-Marquardt in a box, all starts and all finite differences flown as one batch.
 
-Marquardt (1963) with Nielsen's damping, bounds by the active set (a coordinate at its bound whose descent leads outward is
-held). Several damping values are tried at once, since a wider batch costs hardly more than a narrow one.
+Marquardt (1963) with Nielsen's damping, bounds by the active set (a coordinate at its bound whose descent
+leads outward is held). Several damping values are tried at once, since a wider batch costs hardly more than a
+narrow one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ PATIENCE = 3  # iterations without decrease before a start has converged
 
 @dataclass(frozen=True)
 class PolishState:
-    """Starts of a multi-start polish (s starts): points (s, d), costs, dampings, stalls (s,), and the iteration."""
+    """Starts s of a multi-start polish: points (s, d); costs, dampings, stalls (s,); the iteration."""
 
     point: Array
     cost: Array
@@ -50,14 +51,16 @@ def first_polish(points: Array, cost: Array) -> PolishState:
     return PolishState(points, cost, np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64), 0)
 
 
-def next_polish(state: PolishState, lower: Array, upper: Array, residuals: Residuals, keep: int) -> PolishState:
+def next_polish(
+    state: PolishState, lower: Array, upper: Array, residuals: Residuals, keep: int
+) -> PolishState:
     """One iteration of the ``keep`` best starts that still move; the others rest."""
     order = np.argsort(state.cost, kind="stable")[:keep]
     chosen = order[state.active[order]]
     if chosen.size == 0:
         return state
     points = state.point[chosen]
-    error, jacobian = differences(points, lower, upper, residuals)
+    error, jacobian = differences(points, upper, residuals)
     trials, factors = [], []
     for factor in DAMPING_TRIALS:
         trials.append(
@@ -88,12 +91,14 @@ def next_polish(state: PolishState, lower: Array, upper: Array, residuals: Resid
     return PolishState(point, cost, damping, stalled, state.iteration + 1)
 
 
-def differences(points: Array, lower: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
+def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
     """Residuals (s, m) and their forward-difference Jacobians (s, m, d) at points (s, d), one batch."""
     count, d = points.shape
     # step inward at an upper bound
     steps = np.where(points + PROBE > upper, -PROBE, PROBE)
-    probed = points[:, None, :] + np.concatenate([np.zeros((count, 1, d)), steps[:, :, None] * np.eye(d)], axis=1)
+    probed = points[:, None, :] + np.concatenate(
+        [np.zeros((count, 1, d)), steps[:, :, None] * np.eye(d)], axis=1
+    )
     flown = residuals(probed.reshape(-1, d)).reshape(count, d + 1, -1)
     jacobian = (flown[:, 1:] - flown[:, :1]) / steps[:, :, None]
     return flown[:, 0], jacobian.transpose(0, 2, 1)

@@ -33,7 +33,7 @@ class SampleFit:
     initial: Array
     identified: Array
 
-    def J(self, model: str) -> float | None:  # noqa: N802 - the cost's name in the literature
+    def J(self, model: str) -> float | None:
         """The sample's part of J for a model, rad^2; None where its flight diverged."""
         return _number(np.sum((self.errors(model) * self.case.weight) ** 2))
 
@@ -66,7 +66,8 @@ class SampleFit:
 
         def angles(values: Array) -> dict[str, list[float | None]]:
             return {
-                f"{name}_rad": [_number(v) for v in column] for name, column in zip(ANGLES, values.T, strict=True)
+                f"{name}_rad": [_number(v) for v in column]
+                for name, column in zip(ANGLES, values.T, strict=True)
             }
 
         return {
@@ -135,7 +136,7 @@ def parameters_document(batch: ParameterBatch) -> dict[str, Any]:
 def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
     """Fly the best point so far against all samples and judge it."""
     start, space = run.settings.start, run.space
-    rigid_model = run._chain(run.model.aircraft, run.model.flight, 1)
+    rigid_model = run.chain(run.model.aircraft, run.model.flight, 1)
     rigid_cases = sample_cases(rigid_model, run.samples, run.settings.step_s)
     rigid = _attitudes(rigid_model, physical_guess(rigid_model), rigid_cases, start)
     both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
@@ -145,7 +146,7 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
         def errors(points: Array) -> Array:
             return residuals(run.model, space.decode(points), run.training, start)
 
-        residual, jacobian = differences(state.best[None, :], space.lower, space.upper, errors)
+        residual, jacobian = differences(state.best[None, :], space.upper, errors)
         judged = uncertainty(space, state.best, residual[0], jacobian[0])
     best = space.decode(state.best)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
@@ -154,7 +155,8 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
         model=run.model,
         parameters=best,
         fits=tuple(
-            SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
+            SampleFit(case, r[0], pair[0], pair[1])
+            for case, r, pair in zip(run.cases, rigid, both, strict=True)
         ),
         uncertainty=judged,
         search={
@@ -168,7 +170,9 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
             "history": list(state.history),
         },
         cost={
-            "rigid_flight_s": _flight_time(rigid_model, physical_guess(rigid_model), rigid_cases[longest], start),
+            "rigid_flight_s": _flight_time(
+                rigid_model, physical_guess(rigid_model), rigid_cases[longest], start
+            ),
             "equivalent_flight_s": _flight_time(run.model, best, run.cases[longest], start),
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
@@ -176,8 +180,12 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
     )
 
 
-def _attitudes(model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any) -> list[Array]:
-    return [fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)]
+def _attitudes(
+    model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any
+) -> list[Array]:
+    return [
+        fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
+    ]
 
 
 def _flight_time(model: ChainModel, batch: ParameterBatch, case: SampleCase, start: Any) -> float:

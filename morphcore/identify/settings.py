@@ -19,7 +19,8 @@ Method = Literal["hybrid", "pso", "least_squares"]
 METHODS: tuple[Method, ...] = ("hybrid", "pso", "least_squares")
 LARGEST_SEED = 2**53 - 1
 PAPER_PARTICLES = 2500
-# starts of the multi-start polish; one start at four links got stuck ten times higher than the best of several
+# starts of the multi-start polish; one start at four links got stuck ten times higher than the best of
+# several
 DEFAULT_STARTS = 8
 DEFAULT_SCREEN = 192  # candidates flown to find them
 
@@ -40,12 +41,12 @@ class ModelSettings:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How they are sought. ``swarm`` rules the method "pso"; "hybrid" and "least_squares" polish ``starts`` candidates."""
+    """How they are sought: ``swarm`` rules "pso"; the other methods polish ``starts`` candidates."""
 
     method: Method = "hybrid"
     seed: int = 1
     max_seconds: float | None = None
-    swarm: SwarmSettings = SwarmSettings()
+    swarm: SwarmSettings = field(default_factory=SwarmSettings)
     screen: int = DEFAULT_SCREEN
     starts: int = DEFAULT_STARTS
     iterations: int = 40
@@ -60,7 +61,9 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
     pairs = {name: _pair(bounds, name) for name in BOUND_NAMES if bounds.has(name)}
     bounds.done()
     settings = ModelSettings(
-        links_per_wing=fields.whole("links_per_wing", default=default.links_per_wing, least=1, most=MOST_LINKS),
+        links_per_wing=fields.whole(
+            "links_per_wing", default=default.links_per_wing, least=1, most=MOST_LINKS
+        ),
         separate_wings=fields.flag("separate_wings", default=False),
         aero_coefficients=tuple(fields.raw("aero_coefficients", list(AERO_COEFFICIENTS))),
         bounds=pairs,
@@ -103,6 +106,8 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
 def _pair(fields: Fields, name: str) -> tuple[float, float]:
     value = fields.raw(name)
     if not isinstance(value, list) or len(value) != 2:
-        raise InvalidInput(f"{name} is not [low, high]", pointer=f"{fields.pointer}/{name}", hint="give two numbers")
+        raise InvalidInput(
+            f"{name} is not [low, high]", pointer=f"{fields.pointer}/{name}", hint="give two numbers"
+        )
     numbers = Fields({"low": value[0], "high": value[1]}, f"{fields.pointer}/{name}")
     return numbers.number("low"), numbers.number("high")

@@ -30,7 +30,8 @@ class UnreadableCheckpoint(MorphError):
 class SearchState:
     """A search between two steps.
 
-    phase : what comes next. best : (d,) search point with the least J so far. history : one row per generation.
+    phase : what comes next. best : (d,) search point with the least J so far. history : one row per
+    generation.
     """
 
     phase: Phase
@@ -49,7 +50,10 @@ def encode(state: SearchState) -> bytes:
     arrays: dict[str, Array] = {"best": state.best}
     header: dict[str, Any] = {
         "format": FORMAT,
-        **{name: getattr(state, name) for name in ("phase", "best_cost", "generation", "flights", "wall_s", "history")},
+        **{
+            name: getattr(state, name)
+            for name in ("phase", "best_cost", "generation", "flights", "wall_s", "history")
+        },
     }
     for name, part in (("swarm", state.swarm), ("polish", state.polish)):
         if part is None:
@@ -59,7 +63,9 @@ def encode(state: SearchState) -> bytes:
             value = getattr(part, item.name)
             if isinstance(value, np.ndarray):
                 arrays[f"{name}.{item.name}"] = value
-            elif item.name == "random":  # numpy's legacy generator: name, key vector, position, cached normal deviate
+            elif (
+                item.name == "random"
+            ):  # numpy's legacy generator: name, key vector, position, cached normal deviate
                 arrays[f"{name}.random"] = value[1]
                 header[name]["random"] = [value[0], *value[2:]]
             else:
@@ -80,22 +86,31 @@ def decode(checkpoint: bytes) -> SearchState:
         with np.load(io.BytesIO(checkpoint), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(arrays.pop("header").tobytes())
-        if header.pop("format") != FORMAT:
-            raise ValueError("unknown format")
+        known = header.pop("format") == FORMAT
     except (ValueError, KeyError, OSError, EOFError) as error:
         raise UnreadableCheckpoint(
             f"the checkpoint cannot be read: {error}", hint="start the identification anew"
         ) from None
+    if not known:
+        raise UnreadableCheckpoint(
+            "the checkpoint is of another version", hint="start the identification anew"
+        )
     swarm, polish = header.pop("swarm", None), header.pop("polish", None)
     if swarm is not None:
         random = swarm.pop("random")
-        swarm = SwarmState(**swarm, **_part(arrays, "swarm"), random=(random[0], arrays["swarm.random"], *random[1:]))
+        swarm = SwarmState(
+            **swarm, **_part(arrays, "swarm"), random=(random[0], arrays["swarm.random"], *random[1:])
+        )
     if polish is not None:
         polish = PolishState(**polish, **_part(arrays, "polish"))
     history = tuple(header.pop("history"))
     return SearchState(**header, best=arrays["best"], history=history, swarm=swarm, polish=polish)
 
 
-def _part(arrays: dict[str, Array], name: str) -> dict[str, Array]:
+def _part(arrays: dict[str, Array], name: str) -> dict[str, Any]:
     prefix = f"{name}."
-    return {key.removeprefix(prefix): value for key, value in arrays.items() if key.startswith(prefix) and key != f"{prefix}random"}
+    return {
+        key.removeprefix(prefix): value
+        for key, value in arrays.items()
+        if key.startswith(prefix) and key != f"{prefix}random"
+    }

@@ -1,6 +1,7 @@
-"""How well the samples determine the parameters: Gauss-Newton covariance and the directions that they cannot see.
+"""How well the samples determine the parameters, and the directions that they cannot see.
 
-Bard (1974), section 7-5: with residuals r and Jacobian A at the optimum, cov(x) = s^2 (A^T A)^-1, s^2 = r^T r / (m - d).
+Bard (1974), section 7-5: with residuals r and Jacobian A at the optimum, cov(x) = s^2 (A^T A)^-1, s^2 = r^T r
+/ (m - d).
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from morphcore.identify.parameters import SearchSpace
 
 Array = NDArray[np.float64]
 
-UNSEEN_SPREAD = 1.0  # standard deviation along a direction, in search coordinates (factor e for a stiffness), beyond which
+# standard deviation along a direction, in search coordinates (factor e for a stiffness), beyond which
+UNSEEN_SPREAD = 1.0
 # the samples say nothing about it
 NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left out of the report
 
@@ -24,8 +26,10 @@ NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left ou
 class Uncertainty:
     """Uncertainty of an identified model (d search coordinates, m named parameters).
 
-    names : (d,) search coordinates. covariance : (d, d) in search coordinates. singular_values : (d,) of the Jacobian.
-    directions : (d, d) rows: right singular vectors. parameter_names : (m,). standard_error : (m,) in SI units.
+    names : (d,) search coordinates. covariance : (d, d) in search coordinates. singular_values : (d,) of the
+    Jacobian.
+    directions : (d, d) rows: right singular vectors. parameter_names : (m,). standard_error : (m,) in SI
+    units.
     """
 
     names: tuple[str, ...]
@@ -41,7 +45,9 @@ class Uncertainty:
         spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         correlation = self.covariance / np.maximum(np.outer(spread, spread), 1e-300)
         return {
-            "standard_error": {n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)},
+            "standard_error": {
+                n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)
+            },
             "coordinates": list(self.names),
             "correlation": np.clip(correlation, -1.0, 1.0).round(6).tolist(),
             "singular_values": self.singular_values.tolist(),

@@ -1,4 +1,4 @@
-"""The equivalent model: each flexible surface a chain of rigid links on gimbal joints. The rigid model is its case n = 1."""
+"""The equivalent model: wings as chains of rigid links on gimbals; the rigid model is n = 1."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_ME
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
-from morphcore.models.kernels.chain import AERO_C, FORCE_C, LINKS_C
-from morphcore.multibody.kernels.aba import LINK_ROWS
 from morphcore.lanes import LANES
+from morphcore.models.kernels.chain import AERO_C, FORCE_C, LINKS_C
+from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
+from morphcore.multibody.kernels.aba import LINK_ROWS
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -30,8 +30,9 @@ class ParameterBatch:
 
     ``w`` is 1 where all flexible surfaces share their parameters, else the number of flexible surfaces.
 
-    division : (p, w, n) fractions of the span, summing to one. stiffness, damping : (p, w, n - 1, 3) of flap, torsion, lag,
-    N m/rad and N m s/rad. lift_factor (-), centre_shift (m, forward positive), profile_drag (-), lag (s) : (p,).
+    division : (p, w, n) fractions of the span, summing to one. stiffness, damping : (p, w, n - 1, 3) of flap,
+    torsion, lag, N m/rad and N m s/rad. lift_factor (-), centre_shift (m, forward positive), profile_drag
+    (-), lag (s) : (p,).
     """
 
     division: Array
@@ -87,12 +88,12 @@ class ChainModel:
 
     @property
     def state_rows(self) -> int:
-        """Rows of a lane's state: 13 of the fuselage, angles and rates of the joints, nine rows of lag a link."""
+        """Rows of a state: 13 of the fuselage, angles and rates of the joints, nine of lag a link."""
         return 13 + 2 * self.coordinates + 9 * self.links
 
     @property
     def relative_chord(self) -> Array:
-        """(links,) mean chord of each link's surface over that of the first surface: it scales the lag times."""
+        """Chord of each link's surface over the first surface's, (links,): it scales the lag times."""
         chords = [s.mean_chord_m for s in self.aircraft.surfaces]
         return np.repeat(np.array(chords) / chords[0], self.surfaces[:, 1])
 
@@ -129,10 +130,10 @@ def chain_model(
 
 
 def physical_guess(model: ChainModel, division: Array | None = None, *, wing_sets: int = 1) -> ParameterBatch:
-    """Parameters from beam theory and thin-airfoil theory: k = EI / l, c = beta k, neutral corrections, Jones' lag.
+    """Parameters from beam and thin-airfoil theory: k = EI / l, c = beta k, neutral corrections, Jones' lag.
 
-    ``division`` (p, w, n) defaults to one particle of equal links. Where all wings share parameters the first flexible surface
-    gives them.
+    ``division`` (p, w, n) defaults to one particle of equal links. Where all wings share parameters the first
+    flexible surface gives them.
     """
     n = model.links_per_wing
     if division is None:
@@ -140,7 +141,10 @@ def physical_guess(model: ChainModel, division: Array | None = None, *, wing_set
     flexible = model.aircraft.flexible_surfaces or model.aircraft.surfaces[:1]
     particles = division.shape[0]
     stiffness = np.stack(
-        [joint_stiffness(s, link_edges(division[:, i], s.span_m)) for i, s in enumerate(flexible[: division.shape[1]])],
+        [
+            joint_stiffness(s, link_edges(division[:, i], s.span_m))
+            for i, s in enumerate(flexible[: division.shape[1]])
+        ],
         axis=1,
     )
     beta = np.array([s.material.stiffness_damping_s for s in flexible[: division.shape[1]]])
@@ -159,8 +163,8 @@ def physical_guess(model: ChainModel, division: Array | None = None, *, wing_set
 class LaneConstants:
     """Parameter sets laid out for the kernels: ``rows`` (b, rows, LANES) and ``ranges`` (b, links, 2).
 
-    The last block is filled up with copies of the last particle. ``ranges`` gives, for each link, the strips that it may touch
-    in any lane of the block.
+    The last block is filled up with copies of the last particle. ``ranges`` gives, for each link, the strips
+    that it may touch in any lane of the block.
     """
 
     rows: Array
@@ -205,7 +209,9 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
     stiffness, damping, overlap = [], [], []
     touched = np.zeros((particles, model.links, 2), dtype=np.int64)
     wing = 0
-    for surface, part, row in zip(model.aircraft.surfaces, model.lattice.lattices, model.surfaces, strict=True):
+    for surface, part, row in zip(
+        model.aircraft.surfaces, model.lattice.lattices, model.surfaces, strict=True
+    ):
         first, count = row[0], row[1]
         mine = slice(first, first + count)
         if surface.flexible:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def gimbal_rotation(angles: Array) -> Array:
-    """Rotation (..., 3, 3) from link to parent components for gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(lag)."""
+    """Rotation (..., 3, 3) link to parent of gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(lag)."""
     (s1, s2, s3), (c1, c2, c3) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
     rows = [
         [c2 * c3, -c2 * s3, s2],
@@ -23,7 +23,9 @@ def gimbal_rotation(angles: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def link_poses(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array) -> tuple[Array, Array]:
+def link_poses(
+    model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array
+) -> tuple[Array, Array]:
     """Poses of all links for particles p.
 
     Parameters
@@ -42,6 +44,7 @@ def link_poses(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint:
         first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
         R_BL[:, first] = hinges[s, :9].reshape(3, 3)
         r_B[:, first] = hinges[s, H_ORIGIN:]
+        lengths = np.zeros((particles, 0))
         if surface.flexible:
             edges = link_edges(batch.division[:, min(wing, batch.division.shape[1] - 1)], surface.span_m)
             wing += 1
@@ -66,5 +69,7 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
         if surface.flexible:
             length = surface.span_m * batch.division[:, min(wing, batch.division.shape[1] - 1), -1]
             wing += 1
-        tips[:, s] = r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
+        tips[:, s] = (
+            r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
+        )
     return tips

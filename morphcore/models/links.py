@@ -1,7 +1,7 @@
 """Rigid links cut from a lifting surface: mass properties, joint compliance, share of the lattice's strips.
 
-All functions work on batches: ``edges`` (particles, n + 1) are the links' ends, distances from the root in m, rising from 0
-to the span.
+All functions work on batches: ``edges`` (particles, n + 1) are the links' ends, distances from the root in m,
+rising from 0 to the span.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from morphcore.geometry.surface import Surface
 
 Array = NDArray[np.float64]
 
-# Gauss-Legendre: four points integrate a linearly tapered solid wing's inertia (degree six in the span) exactly
+# Gauss-Legendre: four points integrate a linearly tapered solid wing's inertia (degree six in the span)
+# exactly
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 MASS_ROWS = 7
 
@@ -29,7 +30,8 @@ def link_edges(division: Array, span_m: float) -> Array:
 def link_masses(surface: Surface, edges: Array) -> Array:
     """Mass properties (particles, n, 7) of each link about its origin on the elastic axis at its inboard end.
 
-    Mass (kg), first moments m x and m y (kg m), and the elements xx, yy, zz, xy of the inertia matrix (kg m^2).
+    Mass (kg), first moments m x and m y (kg m), and the elements xx, yy, zz, xy of the inertia matrix (kg
+    m^2).
     """
     start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
     stations = start + length * 0.5 * (POINTS + 1)
@@ -58,8 +60,8 @@ def link_masses(surface: Surface, edges: Array) -> Array:
 def joint_stiffness(surface: Surface, edges: Array) -> Array:
     """Beam theory's guess (particles, n - 1, 3) for flap, torsion and lag, N m/rad.
 
-    A joint stands for the beam between the centres of its two links: 1/k is the integral of 1/EI (of 1/GJ) over it, EI / l on
-    a uniform beam.
+    A joint stands for the beam between the centres of its two links: 1/k is the integral of 1/EI (of 1/GJ)
+    over it, EI / l on a uniform beam.
     """
     centres = 0.5 * (edges[:, 1:] + edges[:, :-1])
     start, length = centres[:, :-1, None], np.diff(centres, axis=1)[..., None]
@@ -67,7 +69,8 @@ def joint_stiffness(surface: Surface, edges: Array) -> Array:
     weight = 0.5 * length * WEIGHTS
     section = surface.section_at(stations.ravel())
     compliance = [
-        (weight / value.reshape(stations.shape)).sum(-1) for value in (section.ei_flap, section.gj, section.ei_lag)
+        (weight / value.reshape(stations.shape)).sum(-1)
+        for value in (section.ei_flap, section.gj, section.ei_lag)
     ]
     return np.asarray(1.0 / np.stack(compliance, axis=-1))
 

@@ -85,6 +85,7 @@ def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
     }
     return {
         "links_per_wing": batch.links,
+        "separate_wings": not shared,
         **{name: (value[0] if shared else value).tolist() for name, value in values.items()},
         "aero": {
             "lift_factor": float(batch.lift_factor[particle]),

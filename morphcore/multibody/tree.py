@@ -1,10 +1,10 @@
 """The kinematic tree of one aircraft model: constant, read-only.
 
-Bodies are numbered from the fuselage (0) outward, every body after its parent. Body b > 0 hangs on a revolute joint
-about one coordinate axis of its own frame: a *prescribed* one (a hinge of known motion) or a *free* one (one axis of a
-gimbal, with stiffness and damping). A gimbal is three bodies in a row: flap (x), torsion (y), lag (z), of which only the
-last has mass. Frames follow Featherstone (2008), chapter 4: body frames coincide with the parent's, moved by ``offset``,
-when all joint coordinates are zero.
+Bodies are numbered from the fuselage (0) outward, every body after its parent. Body b > 0 hangs on a revolute
+joint about one coordinate axis of its own frame: a *prescribed* one (a hinge of known motion) or a *free* one
+(one axis of a gimbal, with stiffness and damping). A gimbal is three bodies in a row: flap (x), torsion (y),
+lag (z), of which only the last has mass. Frames follow Featherstone (2008), chapter 4: body frames coincide
+with the parent's, moved by ``offset``, when all joint coordinates are zero.
 """
 
 from __future__ import annotations
@@ -71,8 +71,10 @@ class Tree:
 def spatial_inertia(mass: float, centre: Array, inertia_centre: Array) -> Array:
     """Spatial inertia (6, 6) at a body's origin.
 
-    Featherstone (2008), equation 2.63: mass in kg, centre of mass (3,) in m from the origin, rotational inertia (3, 3) in
-    kg m^2 about the centre of mass; angular part first.
+    Featherstone (2008), equation 2.63: mass in kg, centre of mass (3,) in m from the origin, rotational
+    inertia (3, 3) in kg m^2 about the centre of mass; angular part first.
     """
     cross = skew(centre)
-    return np.block([[inertia_centre + mass * cross @ cross.T, mass * cross], [mass * cross.T, mass * np.eye(3)]])
+    return np.block(
+        [[inertia_centre + mass * cross @ cross.T, mass * cross], [mass * cross.T, mass * np.eye(3)]]
+    )

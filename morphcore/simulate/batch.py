@@ -9,9 +9,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.lanes import LANES
 from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
 from morphcore.models.kernels.chain import JOINTS, scratch_rows
-from morphcore.lanes import LANES
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
 
@@ -57,7 +57,6 @@ def shared_numbers(model: ChainModel) -> Array:
 
 
 def initial_state(
-    model: ChainModel,
     *,
     quaternion: Array,
     omega_B: Array,
@@ -68,8 +67,8 @@ def initial_state(
 ) -> Array:
     """State rows (p, state_rows) with resting joints.
 
-    quaternion (p, 4), omega_B, velocity_B, position_N (p, 3), q_joint (p, coordinates); ``lag_motion`` (p, links, 3): the
-    motion (v_z, omega_x, omega_y) of each link that the circulation has settled to.
+    quaternion (p, 4), omega_B, velocity_B, position_N (p, 3), q_joint (p, coordinates); ``lag_motion`` (p,
+    links, 3): the motion (v_z, omega_x, omega_y) of each link that the circulation has settled to.
     """
     particles = quaternion.shape[0]
     lag = lag_motion.reshape(particles, -1)
@@ -119,13 +118,15 @@ def fly_batch(
         record = np.empty((last - first, record_rows, count, LANES))
         fly(
             model.surfaces, constants.ranges, shared, strips, plan.hinges[first : last + 1],
-            plan.mean_accelerations[first:last], operators, plan.wind_N[first : last + 1], constants.rows, plan.grid.step_s, blocks, work, scratch, inputs, outputs,
-            record,
+            plan.mean_accelerations[first:last], operators, plan.wind_N[first : last + 1], constants.rows,
+            plan.grid.step_s, blocks, work, scratch, inputs, outputs, record,
         )  # fmt: skip
         yield Chunk(first + 1, record.reshape(last - first, record_rows, -1)[..., :particles])
 
 
-def state_rates(model: ChainModel, plan: FlightPlan, row: int, constants: LaneConstants, state: Array) -> Array:
+def state_rates(
+    model: ChainModel, plan: FlightPlan, row: int, constants: LaneConstants, state: Array
+) -> Array:
     """Time derivative (p, state_rows) of the states (p, state_rows) at one grid time of a plan."""
     blocks = to_lanes(state)
     count = blocks.shape[0]
@@ -134,8 +135,9 @@ def state_rates(model: ChainModel, plan: FlightPlan, row: int, constants: LaneCo
     rates = np.empty_like(blocks)
     rates_of_blocks(
         model.surfaces, constants.ranges, shared_numbers(model), strips,
-        plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
-        np.zeros((model.state_rows, LANES)), blocks, np.zeros((count, scratch_rows(model.links, model.coordinates), LANES)),
-        np.zeros((count, columns, LANES)), np.zeros((count, rows, LANES)), rates,
+        plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1],
+        constants.rows, np.zeros((model.state_rows, LANES)), blocks, np.zeros((count,
+        scratch_rows(model.links, model.coordinates), LANES)), np.zeros((count, columns, LANES)),
+        np.zeros((count, rows, LANES)), rates,
     )  # fmt: skip
     return from_lanes(rates, state.shape[0])

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.frames import axis_rotation
-from morphcore.geometry.lattice import surface_pose
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.kernels.aba import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
@@ -18,13 +17,16 @@ from morphcore.simulate.schedule import Schedule
 
 Array = NDArray[np.float64]
 
-STEP_S = 0.005  # holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
-NODE_SPACING_RAD = 0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
+# holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
+STEP_S = 0.005
+NODE_SPACING_RAD = (
+    0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
+)
 
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Equal steps of ``step_s`` from ``start_s``; rows ``at`` of the grid are the output times, or None if they differ."""
+    """Equal steps from ``start_s``; rows ``at`` of the grid are the output times (None: they differ)."""
 
     start_s: float
     step_s: float
@@ -34,11 +36,11 @@ class TimeGrid:
     @property
     def times_s(self) -> Array:
         """(steps + 1,) times."""
-        return self.start_s + self.step_s * np.arange(self.steps + 1)
+        return np.asarray(self.start_s + self.step_s * np.arange(self.steps + 1), dtype=np.float64)
 
 
 def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
-    """A grid that hits evenly spaced output times exactly; other output times need interpolation (``at`` is None)."""
+    """Make a grid that hits evenly spaced output times; others need interpolation (``at`` is None)."""
     times = np.asarray(output_s, dtype=np.float64)
     spacing = (times[-1] - times[0]) / (times.size - 1)
     if np.allclose(np.diff(times), spacing, rtol=1e-6, atol=1e-9):
@@ -53,8 +55,8 @@ def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
 class OperatorTable:
     """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
 
-    matrices : (nodes, rows, columns); strips : (nodes, strips, 2); position : (steps + 1,) of each grid time among the
-    nodes, in node spacings.
+    matrices : (nodes, rows, columns); strips : (nodes, strips, 2); position : (steps + 1,) of each grid time
+    among the nodes, in node spacings.
     """
 
     matrices: Array
@@ -68,7 +70,9 @@ class OperatorTable:
         if nodes == 1:
             shape = (position.size, *self.matrices.shape[1:])
             strips = np.broadcast_to(self.strips[0], (position.size, *self.strips.shape[1:]))
-            return np.ascontiguousarray(np.broadcast_to(self.matrices[0], shape)), np.ascontiguousarray(strips)
+            return np.ascontiguousarray(np.broadcast_to(self.matrices[0], shape)), np.ascontiguousarray(
+                strips
+            )
         base = np.clip(np.floor(position).astype(np.int64) - 1, 0, nodes - 4)
         s = position - base
         weight = np.zeros((position.size, nodes))
@@ -86,8 +90,8 @@ class OperatorTable:
 class FlightPlan:
     """Everything about a flight that does not depend on the parameters.
 
-    angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the
-    kernels. wind_N : (steps + 1, 3) m/s.
+    angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)
+    for the kernels. wind_N : (steps + 1, 3) m/s.
     """
 
     grid: TimeGrid
@@ -123,11 +127,22 @@ def flight_plan(
         axis=1,
     )
     angles, rates, accelerations = (
-        np.stack([getattr(motion, name) for motion in motions], axis=1) for name in ("angle", "rate", "acceleration")
+        np.stack([getattr(motion, name) for motion in motions], axis=1)
+        for name in ("angle", "rate", "acceleration")
     )
     hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
-    wind_N = np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
-    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, _operator_table(model, angles * hinged, node_spacing_rad))
+    wind_N = (
+        np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
+    )
+    return FlightPlan(
+        grid,
+        angles,
+        rates,
+        accelerations,
+        hinges,
+        wind_N,
+        _operator_table(model, angles * hinged, node_spacing_rad),
+    )
 
 
 def _hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:

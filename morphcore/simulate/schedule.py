@@ -58,7 +58,9 @@ class ConstantRate:
 
     def __post_init__(self) -> None:
         if self.duration_s <= 0:
-            raise InvalidInput("duration_s is not positive", pointer="/schedule/duration_s", hint="give a time in s")
+            raise InvalidInput(
+                "duration_s is not positive", pointer="/schedule/duration_s", hint="give a time in s"
+            )
         if not 0 <= self.ramp_s <= self.duration_s / 2:
             raise InvalidInput(
                 "ramp_s is not in 0..duration_s / 2", pointer="/schedule/ramp_s", hint="shorten the ramps"
@@ -75,8 +77,10 @@ class ConstantRate:
             s = np.maximum(t - begin, 0.0)
             rising = s < self.ramp_s
             angle = np.where(rising, 0.5 * steepness * s**2, rate * (s - self.ramp_s / 2))
-            return angle, np.where(rising, steepness * s, np.where(s > 0, rate, 0.0)), np.where(
-                rising & (s > 0), steepness, 0.0
+            return (
+                angle,
+                np.where(rising, steepness * s, np.where(s > 0, rate, 0.0)),
+                np.where(rising & (s > 0), steepness, 0.0),
             )
 
         up, down = ramped(0.0), ramped(self.duration_s - self.ramp_s)
@@ -120,10 +124,10 @@ class Spline:
 
 @dataclass(frozen=True)
 class Tabulated:
-    """A measured history: modified Akima interpolation, differentiable and without overshoot beside flat parts.
+    """A measured history, interpolated differentiably and without overshoot beside flat parts.
 
-    Akima (1970), with the weights of makima: exact for a parabola on even steps, and local, so that the corner of a ramp
-    does not ring through the history as it would in a cubic spline.
+    Akima (1970), with the weights of makima: exact for a parabola on even steps, and local, so that the
+    corner of a ramp does not ring through the history as it would in a cubic spline.
     """
 
     time_s: Array
@@ -137,7 +141,9 @@ class Tabulated:
         return _held(curve, time_s, float(self.time_s[0]), float(self.time_s[-1]))
 
 
-def _held(curve: CubicSpline | Akima1DInterpolator, time_s: ArrayLike, begin: float, end: float) -> HingeMotion:
+def _held(
+    curve: CubicSpline | Akima1DInterpolator, time_s: ArrayLike, begin: float, end: float
+) -> HingeMotion:
     t = np.asarray(time_s, dtype=np.float64)
     inside = (t >= begin) & (t <= end)
     s = np.clip(t, begin, end)

@@ -24,7 +24,7 @@ DEGREE = np.pi / 180.0
 
 @dataclass(frozen=True)
 class Trajectory:
-    """One flight: ``time_s`` (k,) rising; hinge angles and Euler angles (k,) in rad; other columns in ``extra``."""
+    """One flight: ``time_s`` (k,) rising; hinge and Euler angles (k,) in rad; other columns in ``extra``."""
 
     name: str
     time_s: Array
@@ -55,7 +55,8 @@ class Trajectory:
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     """Read a CSV file with the columns t, sweep_left, sweep_right, phi, theta, psi.
 
-    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns land in ``extra`` as they are.
+    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns land in ``extra`` as
+    they are.
 
     Raises
     ------
@@ -70,11 +71,15 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     except FileNotFoundError:
         raise InvalidInput(f"{path} does not exist", hint="check the path") from None
     if not rows:
-        raise InvalidInput(f"{path} holds no rows", hint="give a CSV file with a header and at least three rows")
+        raise InvalidInput(
+            f"{path} holds no rows", hint="give a CSV file with a header and at least three rows"
+        )
     try:
         table = np.array(rows, dtype=np.float64)
     except ValueError as error:
-        raise InvalidInput(f"{path}: {error}", hint="every cell must be a number, every row as long as the header") from None
+        raise InvalidInput(
+            f"{path}: {error}", hint="every cell must be a number, every row as long as the header"
+        ) from None
     if table.shape[1] != len(header):
         raise InvalidInput(f"{path}: rows and header differ in length", hint="repair the header")
     values, extra = {}, {}
@@ -86,7 +91,9 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
             extra[name] = column
     missing = [name for name in COLUMNS if name not in values]
     if missing:
-        raise InvalidInput(f"{path} has no column {', '.join(missing)}", hint=f"give the columns {', '.join(COLUMNS)}")
+        raise InvalidInput(
+            f"{path} has no column {', '.join(missing)}", hint=f"give the columns {', '.join(COLUMNS)}"
+        )
     return checked(
         Trajectory(
             name=path.stem,
@@ -131,13 +138,17 @@ def checked(trajectory: Trajectory, pointer: str) -> Trajectory:
         column = getattr(trajectory, name)
         if column.size != rows:
             raise InvalidInput(
-                f"{name} has {column.size} rows, time has {rows}", pointer=f"{pointer}/{name}_rad", hint="give equal lengths"
+                f"{name} has {column.size} rows, time has {rows}",
+                pointer=f"{pointer}/{name}_rad",
+                hint="give equal lengths",
             )
     for name in ("time_s", "sweep_left", "sweep_right", "phi", "theta", "psi"):
         bad = np.flatnonzero(~np.isfinite(getattr(trajectory, name)))
         if bad.size:
             raise InvalidInput(
-                f"{name} is not finite at row {bad[0]}", pointer=f"{pointer}/{name}/{bad[0]}", hint="remove or repair the row"
+                f"{name} is not finite at row {bad[0]}",
+                pointer=f"{pointer}/{name}/{bad[0]}",
+                hint="remove or repair the row",
             )
     falls = np.flatnonzero(np.diff(trajectory.time_s) <= 0)
     if falls.size:

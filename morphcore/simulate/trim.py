@@ -1,4 +1,4 @@
-"""Trim: straight level flight with the wings in static aeroelastic equilibrium, for many parameter sets at once."""
+"""Trim: straight level flight with the wings in static aeroelastic equilibrium, in batches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler
-from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, from_lanes, lane_constants, to_lanes
+from morphcore.models.equivalent import (
+    ChainModel,
+    LaneConstants,
+    ParameterBatch,
+    from_lanes,
+    lane_constants,
+    to_lanes,
+)
 from morphcore.models.kernels.chain import FORCE_C, JOINTS, OMEGA
 from morphcore.models.kinematics import link_poses
 from morphcore.simulate.batch import initial_state, state_rates
@@ -32,8 +39,10 @@ SLAB = 256  # particles at a time; bounds the memory of the Jacobian's probes
 class Trim:
     """A start of flight for each parameter set p.
 
-    alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference point;
-    q_joint : (p, coordinates) rad; converged : (p,) whether Newton's iteration arrived; residual : (p,) the last step, rad.
+    alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference
+    point;
+    q_joint : (p, coordinates) rad; converged : (p,) whether Newton's iteration arrived; residual : (p,) the
+    last step, rad.
     """
 
     alpha: Array
@@ -53,9 +62,10 @@ class Trim:
 def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: StartMode = "trim") -> Trim:
     """Equilibrium at the plan's first hinge angles.
 
-    With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and across it, a
-    constant moment, and the joint angles: the aircraft then flies straight and level. With ``"given"`` angle of attack, force
-    and moment are those of the flight's start and only the joints settle (their accelerations vanish).
+    With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and
+    across it, a constant moment, and the joint angles: the aircraft then flies straight and level. With
+    ``"given"`` angle of attack, force and moment are those of the flight's start and only the joints settle
+    (their accelerations vanish).
 
     Raises
     ------
@@ -68,12 +78,17 @@ def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: S
             hint="add start with alpha_rad, force_b_n and moment_b_n_m, or choose start = trim",
         )
     parts = [
-        _trim_slab(model, batch.select(slice(i, i + SLAB)), plan, start) for i in range(0, batch.particles, SLAB)
+        _trim_slab(model, batch.select(slice(i, i + SLAB)), plan, start)
+        for i in range(0, batch.particles, SLAB)
     ]
-    return Trim(*(np.concatenate([getattr(part, name) for part in parts]) for name in Trim.__dataclass_fields__))
+    return Trim(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in Trim.__dataclass_fields__)
+    )
 
 
-def trimmed_state(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, found: Trim, psi: float = 0.0) -> Array:
+def trimmed_state(
+    model: ChainModel, batch: ParameterBatch, plan: FlightPlan, found: Trim, psi: float = 0.0
+) -> Array:
     """State rows (p, state_rows) of the trimmed start, heading ``psi``, at the origin of N."""
     return _state(model, batch, plan, found.alpha, found.q_joint, psi)
 
@@ -92,7 +107,6 @@ def _state(
     lag = np.zeros((particles, model.links, 3))
     lag[..., 0] = np.einsum("pka,pa->pk", R_BL[..., 2], air_B)
     return initial_state(
-        model,
         quaternion=quaternion,
         omega_B=np.zeros((particles, 3)),
         velocity_B=air_B + wind_B,
@@ -118,7 +132,9 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
     if given:
         x[:, n] = given.alpha_rad
     constants = lane_constants(model, batch, plan.grid.step_s)
-    everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(model.surfaces[:, 1], axis=0)
+    everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(
+        model.surfaces[:, 1], axis=0
+    )
     rows = from_lanes(constants.rows, particles)
     moved = np.zeros((free + 1, n + 6))
     moved[1:, :free] = np.diag(probes)
@@ -138,12 +154,14 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
         return wanted.reshape(particles, -1, free)
 
     residual = np.full(particles, np.inf if free else 0.0)
+    jacobian = np.empty((particles, free, free))
     for iteration in range(MOST_ITERATIONS if free else 0):
         if iteration < FULL_STEPS or iteration % 5 == 0:
             probed = unbalance(x[:, None, :] + moved)
             jacobian = ((probed[:, 1:] - probed[:, :1]) / probes[:, None]).transpose(0, 2, 1)
             off = probed[:, 0]
-        else:  # near the solution the Jacobian hardly changes, and costs as many flights as there are unknowns
+        # near the solution the Jacobian hardly changes, and costs as many flights as there are unknowns
+        else:
             off = unbalance(x[:, None, :])[:, 0]
         step = _solve(jacobian, -off)
         angles = np.abs(step[:, : n + 1]).max(axis=1)

@@ -34,10 +34,11 @@ LINK0, LINKS, STRIP0, STRIPS, PAIR0 = 0, 1, 2, 3, 4
 
 @kernel
 def lagged_motion(link, twist, slow, fast, previous, aero, effective):
-    """What the circulation answers to: (v_z, omega_x, omega_y) of a link after Jones' lag, times the lift factor.
+    """Fill in what the circulation answers to: a link's (v_z, omega_x, omega_y) after lag, times lift factor.
 
-    ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at ``previous``; what its
-    linear change since then adds, in proportion to the lag weights of the link, is added here.
+    ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at
+    ``previous``; what its linear change since then adds, in proportion to the lag weights of the link, is
+    added here.
     """
     if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
         return
@@ -58,7 +59,7 @@ def lagged_motion(link, twist, slow, fast, previous, aero, effective):
 
 @kernel
 def strip_inputs(surface, ranges, overlap, effective, inputs):
-    """Normal velocity of each strip of one surface at the link axis and its slope along x: rows 2 j and 2 j + 1."""
+    """Normal velocity of each strip of a surface at the link axis and its slope along x: two rows a strip."""
     if not_in_lanes(overlap) or not_in_lanes(effective) or not_in_lanes(inputs):
         return
     strip0, strips = surface[STRIP0], surface[STRIPS]
@@ -115,7 +116,7 @@ def lane_product(matrix, inputs, outputs):
 
 @kernel
 def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench):
-    """Wrench (6 rows) of the air on link ``k`` of a surface: Kutta-Joukowski on its share of the strips, and drag.
+    """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, and profile drag.
 
     ``strips`` (n, 2): trailing edge x and circulation centre x of each strip from the link axis, m. ``sums``:
     13 scratch rows. Profile drag is quadratic in the velocity at the link's centre of drag area.

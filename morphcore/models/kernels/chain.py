@@ -1,13 +1,15 @@
 """Accelerations of the equivalent model's tree: a fuselage with chains of links on hinges, over lanes.
 
-This file fixes how a lane's state, constants and scratch are laid out in rows, and strings the passes together: twists from
-root to tips, air loads, articulated inertias from tips to root, accelerations from root to tips.
+This file fixes how a lane's state, constants and scratch are laid out in rows, and strings the passes
+together: twists from root to tips, air loads, articulated inertias from tips to root, accelerations from root
+to tips.
 """
 
 from __future__ import annotations
 
 from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
 from morphcore.jit import kernel
+from morphcore.lanes import LANES, not_in_lanes
 from morphcore.multibody.kernels.aba import (
     JOINT_ROWS,
     LINK_ROWS,
@@ -23,10 +25,10 @@ from morphcore.multibody.kernels.aba import (
     hinge_twist,
     solve_base,
 )
-from morphcore.lanes import LANES, not_in_lanes
 
-# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates, and
-# for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones first)
+# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates,
+# and for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones
+# first)
 OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
 # rows of a lane's constants: force and moment in B, then aero (2), links, stiffness, damping, overlap
 FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 8
@@ -101,13 +103,27 @@ def clear(block):
 
 
 @kernel
-def accelerations(surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, scratch, inputs, outputs):
+def accelerations(
+    surfaces,
+    ranges,
+    shared,
+    strips,
+    hinges,
+    hinge_accelerations,
+    operator,
+    wind,
+    constants,
+    state,
+    scratch,
+    inputs,
+    outputs,
+):
     """Base and joint accelerations of a block for joint forces and added diagonal found in the scratch block.
 
     ``hinge_accelerations`` (s,): accelerations of the hinges, rad/s^2.
 
-    Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint accelerations and
-    the links' twists in theirs.
+    Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint
+    accelerations and the links' twists in theirs.
     """
     links = ranges.shape[0]
     joints = links - surfaces.shape[0]
@@ -141,7 +157,13 @@ def accelerations(surfaces, ranges, shared, strips, hinges, hinge_accelerations,
             link = surfaces[s, LINK0] + k
             twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
             if k == 0:
-                hinge_twist(base_twist, hinges[s], hinge_accelerations[s], twist, scratch[w_bias + 6 * link : w_bias + 6 * link + 6])
+                hinge_twist(
+                    base_twist,
+                    hinges[s],
+                    hinge_accelerations[s],
+                    twist,
+                    scratch[w_bias + 6 * link : w_bias + 6 * link + 6],
+                )
             else:
                 c = 3 * joint_number
                 gimbal_twist(
@@ -187,7 +209,7 @@ def accelerations(surfaces, ranges, shared, strips, hinges, hinge_accelerations,
 
 @kernel
 def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates):
-    """Accelerations from twists, wrenches and joint forces that the scratch block holds: the articulated-body pass."""
+    """Articulated-body pass over the twists, wrenches and joint forces in the scratch block."""
     w_twist = S_FREE
     w_wrench = w_twist + 6 * links
     w_bias = w_wrench + 6 * links
@@ -227,7 +249,11 @@ def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates)
                 joint = scratch[w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)]
                 add_bias(inertia, joint[11:17], carried)
                 eliminate_gimbal(
-                    scratch[w_tau + c : w_tau + c + 3], scratch[w_added + c : w_added + c + 3], joint, inertia, carried
+                    scratch[w_tau + c : w_tau + c + 3],
+                    scratch[w_added + c : w_added + c + 3],
+                    joint,
+                    inertia,
+                    carried,
                 )
                 carry_through_gimbal(rows, joint, inertia, carried)
     solve_base(base_inertia, base_force, scratch[S_FACTOR : S_FACTOR + 21], base_acceleration)

@@ -1,14 +1,17 @@
-"""Articulated-body algorithm over lanes: chains of rigid links on gimbal joints, on hinges of prescribed motion.
+"""Articulated-body algorithm over lanes: chains of links on gimbals, on hinges of prescribed motion.
 
-Featherstone (2008), table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics), with the three revolutes of a
-gimbal joined into one joint of three degrees of freedom, which is the same by elimination of its massless frames.
+Featherstone (2008), table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics), with the three
+revolutes of a gimbal joined into one joint of three degrees of freedom, which is the same by elimination of
+its massless frames.
 
 Rows of the lane arrays ((rows, LANES), see lanes.py):
 
 - twist, spatial acceleration, wrench: 6 rows, angular part first, in link axes at the link's origin;
-- inertia: 21 rows: angular block A (00 01 02 11 12 22), coupling block B (row by row, 9), linear block L (as A);
-- joint scratch: ``JOINT_ROWS`` rows: rotation R child -> parent (9), S's second column's sine and cosine (2), bias
-  acceleration (6), U = I S (18), inverse of S^T I S + added diagonal (00 01 02 11 12 22), and u = tau - S^T p (3).
+- inertia: 21 rows: angular block A (00 01 02 11 12 22), coupling block B (row by row, 9), linear block L (as
+  A);
+- joint scratch: ``JOINT_ROWS`` rows: rotation R child -> parent (9), S's second column's sine and cosine (2),
+  bias acceleration (6), U = I S (18), inverse of S^T I S + added diagonal (00 01 02 11 12 22), and u = tau -
+  S^T p (3).
 
 The joint rates' projection is S = [R's first row; (sin lag, cos lag, 0); (0, 0, 1)] in link axes.
 """
@@ -29,7 +32,7 @@ H_SUBSPACE, H_RATE, H_ORIGIN = 9, 15, 16
 
 @kernel
 def gimbal_twist(twist_parent, link, q, v, joint, twist):
-    """Twist of a link from its parent's and its gimbal's angles and rates; fills R, S and the bias acceleration.
+    """Twist of a link from its parent's and its gimbal's motion; fills R, S and the bias acceleration.
 
     Bias: c = dS/dt qd + v x S qd; Featherstone (2008), equation 3.42.
     """
@@ -188,7 +191,8 @@ def add_bias(inertia, bias, force):
 def eliminate_gimbal(tau, added, joint, inertia, force):
     """Articulate inertia and bias force through a gimbal: I - U D^-1 U^T and p + U D^-1 u.
 
-    ``tau`` (3 rows) is the joint force, ``added`` (3 rows) what the implicit step adds to the joint-space diagonal.
+    ``tau`` (3 rows) is the joint force, ``added`` (3 rows) what the implicit step adds to the joint-space
+    diagonal.
     """
     if not_in_lanes(tau) or not_in_lanes(added) or not_in_lanes(joint):
         return
@@ -245,41 +249,77 @@ def eliminate_gimbal(tau, added, joint, inertia, force):
         force[4, l] += f4 * x0 + t4 * x1 + g4 * x2
         force[5, l] += f5 * x0 + t5 * x1 + g5 * x2
         # I -= W U^T with W = U D^-1
-        a0, a1, a2 = f0 * m00 + t0 * m01 + g0 * m02, f0 * m01 + t0 * m11 + g0 * m12, f0 * m02 + t0 * m12 + g0 * m22
+        a0, a1, a2 = (
+            f0 * m00 + t0 * m01 + g0 * m02,
+            f0 * m01 + t0 * m11 + g0 * m12,
+            f0 * m02 + t0 * m12 + g0 * m22,
+        )
         inertia[0, l] = i0 - (a0 * f0 + a1 * t0 + a2 * g0)
         inertia[1, l] = i1 - (a0 * f1 + a1 * t1 + a2 * g1)
         inertia[2, l] = i2 - (a0 * f2 + a1 * t2 + a2 * g2)
         inertia[6, l] = b0 - (a0 * f3 + a1 * t3 + a2 * g3)
         inertia[7, l] = b1 - (a0 * f4 + a1 * t4 + a2 * g4)
         inertia[8, l] = b2 - (a0 * f5 + a1 * t5 + a2 * g5)
-        a0, a1, a2 = f1 * m00 + t1 * m01 + g1 * m02, f1 * m01 + t1 * m11 + g1 * m12, f1 * m02 + t1 * m12 + g1 * m22
+        a0, a1, a2 = (
+            f1 * m00 + t1 * m01 + g1 * m02,
+            f1 * m01 + t1 * m11 + g1 * m12,
+            f1 * m02 + t1 * m12 + g1 * m22,
+        )
         inertia[3, l] = i3 - (a0 * f1 + a1 * t1 + a2 * g1)
         inertia[4, l] = i4 - (a0 * f2 + a1 * t2 + a2 * g2)
         inertia[9, l] = b3 - (a0 * f3 + a1 * t3 + a2 * g3)
         inertia[10, l] = b4 - (a0 * f4 + a1 * t4 + a2 * g4)
         inertia[11, l] = b5 - (a0 * f5 + a1 * t5 + a2 * g5)
-        a0, a1, a2 = f2 * m00 + t2 * m01 + g2 * m02, f2 * m01 + t2 * m11 + g2 * m12, f2 * m02 + t2 * m12 + g2 * m22
+        a0, a1, a2 = (
+            f2 * m00 + t2 * m01 + g2 * m02,
+            f2 * m01 + t2 * m11 + g2 * m12,
+            f2 * m02 + t2 * m12 + g2 * m22,
+        )
         inertia[5, l] = i5 - (a0 * f2 + a1 * t2 + a2 * g2)
         inertia[12, l] = b6 - (a0 * f3 + a1 * t3 + a2 * g3)
         inertia[13, l] = b7 - (a0 * f4 + a1 * t4 + a2 * g4)
         inertia[14, l] = b8 - (a0 * f5 + a1 * t5 + a2 * g5)
-        a0, a1, a2 = f3 * m00 + t3 * m01 + g3 * m02, f3 * m01 + t3 * m11 + g3 * m12, f3 * m02 + t3 * m12 + g3 * m22
+        a0, a1, a2 = (
+            f3 * m00 + t3 * m01 + g3 * m02,
+            f3 * m01 + t3 * m11 + g3 * m12,
+            f3 * m02 + t3 * m12 + g3 * m22,
+        )
         inertia[15, l] -= a0 * f3 + a1 * t3 + a2 * g3
         inertia[16, l] -= a0 * f4 + a1 * t4 + a2 * g4
         inertia[17, l] -= a0 * f5 + a1 * t5 + a2 * g5
-        a0, a1, a2 = f4 * m00 + t4 * m01 + g4 * m02, f4 * m01 + t4 * m11 + g4 * m12, f4 * m02 + t4 * m12 + g4 * m22
+        a0, a1, a2 = (
+            f4 * m00 + t4 * m01 + g4 * m02,
+            f4 * m01 + t4 * m11 + g4 * m12,
+            f4 * m02 + t4 * m12 + g4 * m22,
+        )
         inertia[18, l] -= a0 * f4 + a1 * t4 + a2 * g4
         inertia[19, l] -= a0 * f5 + a1 * t5 + a2 * g5
-        a0, a1, a2 = f5 * m00 + t5 * m01 + g5 * m02, f5 * m01 + t5 * m11 + g5 * m12, f5 * m02 + t5 * m12 + g5 * m22
+        a0, a1, a2 = (
+            f5 * m00 + t5 * m01 + g5 * m02,
+            f5 * m01 + t5 * m11 + g5 * m12,
+            f5 * m02 + t5 * m12 + g5 * m22,
+        )
         inertia[20, l] -= a0 * f5 + a1 * t5 + a2 * g5
 
 
 @inlined
 def congruence(r00, r01, r02, r10, r11, r12, r20, r21, r22, a00, a01, a02, a11, a12, a22):
     """R A R^T of a symmetric A: its six distinct elements."""
-    t00, t01, t02 = r00 * a00 + r01 * a01 + r02 * a02, r00 * a01 + r01 * a11 + r02 * a12, r00 * a02 + r01 * a12 + r02 * a22
-    t10, t11, t12 = r10 * a00 + r11 * a01 + r12 * a02, r10 * a01 + r11 * a11 + r12 * a12, r10 * a02 + r11 * a12 + r12 * a22
-    t20, t21, t22 = r20 * a00 + r21 * a01 + r22 * a02, r20 * a01 + r21 * a11 + r22 * a12, r20 * a02 + r21 * a12 + r22 * a22
+    t00, t01, t02 = (
+        r00 * a00 + r01 * a01 + r02 * a02,
+        r00 * a01 + r01 * a11 + r02 * a12,
+        r00 * a02 + r01 * a12 + r02 * a22,
+    )
+    t10, t11, t12 = (
+        r10 * a00 + r11 * a01 + r12 * a02,
+        r10 * a01 + r11 * a11 + r12 * a12,
+        r10 * a02 + r11 * a12 + r12 * a22,
+    )
+    t20, t21, t22 = (
+        r20 * a00 + r21 * a01 + r22 * a02,
+        r20 * a01 + r21 * a11 + r22 * a12,
+        r20 * a02 + r21 * a12 + r22 * a22,
+    )
     return (
         t00 * r00 + t01 * r01 + t02 * r02,
         t00 * r10 + t01 * r11 + t02 * r12,
@@ -293,18 +333,33 @@ def congruence(r00, r01, r02, r10, r11, r12, r20, r21, r22, a00, a01, a02, a11, 
 @inlined
 def rotated_block(r00, r01, r02, r10, r11, r12, r20, r21, r22, b0, b1, b2, b3, b4, b5, b6, b7, b8):
     """R B R^T of a general 3 x 3 B, row by row."""
-    t00, t01, t02 = r00 * b0 + r01 * b3 + r02 * b6, r00 * b1 + r01 * b4 + r02 * b7, r00 * b2 + r01 * b5 + r02 * b8
-    t10, t11, t12 = r10 * b0 + r11 * b3 + r12 * b6, r10 * b1 + r11 * b4 + r12 * b7, r10 * b2 + r11 * b5 + r12 * b8
-    t20, t21, t22 = r20 * b0 + r21 * b3 + r22 * b6, r20 * b1 + r21 * b4 + r22 * b7, r20 * b2 + r21 * b5 + r22 * b8
+    t00, t01, t02 = (
+        r00 * b0 + r01 * b3 + r02 * b6,
+        r00 * b1 + r01 * b4 + r02 * b7,
+        r00 * b2 + r01 * b5 + r02 * b8,
+    )
+    t10, t11, t12 = (
+        r10 * b0 + r11 * b3 + r12 * b6,
+        r10 * b1 + r11 * b4 + r12 * b7,
+        r10 * b2 + r11 * b5 + r12 * b8,
+    )
+    t20, t21, t22 = (
+        r20 * b0 + r21 * b3 + r22 * b6,
+        r20 * b1 + r21 * b4 + r22 * b7,
+        r20 * b2 + r21 * b5 + r22 * b8,
+    )
     return (
-        t00 * r00 + t01 * r01 + t02 * r02, t00 * r10 + t01 * r11 + t02 * r12, t00 * r20 + t01 * r21 + t02 * r22,
-        t10 * r00 + t11 * r01 + t12 * r02, t10 * r10 + t11 * r11 + t12 * r12, t10 * r20 + t11 * r21 + t12 * r22,
-        t20 * r00 + t21 * r01 + t22 * r02, t20 * r10 + t21 * r11 + t22 * r12, t20 * r20 + t21 * r21 + t22 * r22,
+        t00 * r00 + t01 * r01 + t02 * r02, t00 * r10 + t01 * r11 + t02 * r12, t00 * r20 + t01 * r21 + t02 *
+        r22, t10 * r00 + t11 * r01 + t12 * r02, t10 * r10 + t11 * r11 + t12 * r12, t10 * r20 + t11 * r21 + t12
+        * r22, t20 * r00 + t21 * r01 + t22 * r02, t20 * r10 + t21 * r11 + t22 * r12, t20 * r20 + t21 * r21 +
+        t22 * r22,
     )  # fmt: skip
 
 
 @inlined
-def shifted_inertia(px, py, pz, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, b6, b7, b8, l0, l1, l2, l3, l4, l5):
+def shifted_inertia(
+    px, py, pz, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, b6, b7, b8, l0, l1, l2, l3, l4, l5
+):
     """Blocks A and B of an articulated inertia moved from a point at p to the origin; L stays.
 
     B' = B + p x L; A' = A - B [p x] + [p x] B'^T; Featherstone (2008), table 2.1 applied to I' = X^T I X.
@@ -388,7 +443,12 @@ def carry_through_hinge(hinge, inertia, force):
 @kernel
 def accumulate(inertia, force, total_inertia, total_force):
     """Add a surface's articulated inertia and force to the fuselage's."""
-    if not_in_lanes(inertia) or not_in_lanes(force) or not_in_lanes(total_inertia) or not_in_lanes(total_force):
+    if (
+        not_in_lanes(inertia)
+        or not_in_lanes(force)
+        or not_in_lanes(total_inertia)
+        or not_in_lanes(total_force)
+    ):
         return
     for i in range(21):
         for l in range(LANES):

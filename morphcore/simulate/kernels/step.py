@@ -1,4 +1,4 @@
-"""One time step of a block of lanes: a two-stage W-method, implicit in joint stiffness and damping, exact in the lag.
+"""One time step of a block: a two-stage W-method, implicit in joint stiffness, exact in the lag.
 
 The method is ROS2 of Verwer, Spee, Blom & Hundsdorfer (1999, SIAM J. Sci. Comput. 20, equation 2.1):
 
@@ -6,15 +6,18 @@ The method is ROS2 of Verwer, Spee, Blom & Hundsdorfer (1999, SIAM J. Sci. Compu
     (I - gamma h A) k2 = F(t + h, u + h k1) - 2 k1
     u' = u + h (3/2 k1 + 1/2 k2)
 
-which is of second order for *any* matrix A, and L-stable with gamma = 1 - 1/sqrt(2) where A is exact. Here A holds the
-diagonal joint stiffness K and damping C with the mass matrix of the stage: then the implicit equations are the articulated-body pass with gamma h C + (gamma h)^2 K added to the joint-space diagonal. (Taking
-the stage's own mass matrix instead of the first one's changes the step by O(h^3), so the order stays two.) For the second
-stage the unknown is y = k2 + 2 k1, which turns M k1 into the diagonal product 2 (gamma h C + (gamma h)^2 K) k1.
+which is of second order for *any* matrix A, and L-stable with gamma = 1 - 1/sqrt(2) where A is exact. Here A
+holds the diagonal joint stiffness K and damping C with the mass matrix of the stage: then the implicit
+equations are the articulated-body pass with gamma h C + (gamma h)^2 K added to the joint-space diagonal.
+(Taking the stage's own mass matrix instead of the first one's changes the step by O(h^3), so the order stays
+two.) For the second stage the unknown is y = k2 + 2 k1, which turns M k1 into the diagonal product 2 (gamma h
+C + (gamma h)^2 K) k1.
 
-The lag states are linear filters of the links' motion, some faster than a step. They are stepped exactly for a motion that
-changes linearly over the step (Cox & Matthews 2002, J. Comput. Phys. 176, the quadrature of ETD2), whatever the lag time,
-zero included. Each stage closes the current step's filter with its own motion, so that force and motion belong to the same
-instant: a state left over from the predicted end of the step before would cost ten times the error.
+The lag states are linear filters of the links' motion, some faster than a step. They are stepped exactly for
+a motion that changes linearly over the step (Cox & Matthews 2002, J. Comput. Phys. 176, the quadrature of
+ETD2), whatever the lag time, zero included. Each stage closes the current step's filter with its own motion,
+so that force and motion belong to the same instant: a state left over from the predicted end of the step
+before would cost ten times the error.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from __future__ import annotations
 import math
 
 from morphcore.jit import kernel
+from morphcore.lanes import LANES, not_in_lanes
 from morphcore.models.kernels.chain import (
     JOINTS,
     LINKS_C,
@@ -32,7 +36,6 @@ from morphcore.models.kernels.chain import (
     clear,
 )
 from morphcore.multibody.kernels.aba import LINK_ROWS
-from morphcore.lanes import LANES, not_in_lanes
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -54,7 +57,7 @@ def joint_forces(stiffness, damping, q, v, step, tau, added):
 
 @kernel
 def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step, tau, added):
-    """Second stage: tau for y = k2 + 2 k1 (see the module's head); ``angle_rate`` and ``acceleration`` are k1's."""
+    """Second stage: tau for y = k2 + 2 k1 (see the module's head), from k1's angle rate and acceleration."""
     if not_in_lanes(stiffness) or not_in_lanes(damping) or not_in_lanes(q) or not_in_lanes(v):
         return
     if not_in_lanes(angle_rate) or not_in_lanes(acceleration) or not_in_lanes(tau) or not_in_lanes(added):
@@ -65,14 +68,12 @@ def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step
             k, c = stiffness[i, l], damping[i, l]
             added[i, l] = g * (c + g * k)
             remainder = v[i, l] - 2.0 * angle_rate[i, l]
-            tau[i, l] = (
-                -k * (q[i, l] + g * remainder) - c * v[i, l] + 2.0 * added[i, l] * acceleration[i, l]
-            )
+            tau[i, l] = -k * (q[i, l] + g * remainder) - c * v[i, l] + 2.0 * added[i, l] * acceleration[i, l]
 
 
 @kernel
 def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate):
-    """Rates of joint angles and velocities of a stage; ``first``, ``second``: k1's, subtracted twice (zero in stage 1)."""
+    """Rates of a stage's joint angles and velocities, less twice k1's (``first``, ``second``; 0 in stage 1)."""
     if not_in_lanes(v) or not_in_lanes(acceleration) or not_in_lanes(first) or not_in_lanes(second):
         return
     if not_in_lanes(angle_rate) or not_in_lanes(velocity_rate):
@@ -87,7 +88,7 @@ def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate)
 
 @kernel
 def lag_advance(link, twist, slow, fast, previous):
-    """Carry the lag states of a link over a step whose begin has the given twist; see ``lagged_motion`` for the rows."""
+    """Carry a link's lag states over a step that begins at the given twist (rows as in ``lagged_motion``)."""
     if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
         return
     if not_in_lanes(previous):
@@ -128,8 +129,8 @@ def finish(state, first, second, step):
 
 @kernel
 def stage(
-    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, first, step, rates,
-    scratch, inputs, outputs,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, first,
+    step, rates, scratch, inputs, outputs,
 ):  # fmt: skip
     """Rates k of one stage of the W-method; ``first`` is zero in stage 1 and k1 in stage 2."""
     links = ranges.shape[0]
@@ -141,7 +142,19 @@ def stage(
     s_v = s_q + coordinates
     s_slow = s_v + coordinates
     accelerations(
-        surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, scratch, inputs, outputs
+        surfaces,
+        ranges,
+        shared,
+        strips,
+        hinges,
+        hinge_accelerations,
+        operator,
+        wind,
+        constants,
+        state,
+        scratch,
+        inputs,
+        outputs,
     )
     base_rates(state, scratch, rates)
     for i in range(JOINTS):
@@ -159,10 +172,11 @@ def step_block(
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, state, step,
     first, second, middle, scratch, inputs, outputs,
 ):  # fmt: skip
-    """Advance one block by one step. ``strips``, ``hinges``, ``operators``, ``wind``: at its begin [0] and end [1].
+    """Advance a block by one step; ``strips``, ``hinges``, ``operators``, ``wind`` at its begin and end.
 
-    ``hinge_accelerations`` (s,) is the change of the hinges' rates over the step, divided by its length: where a schedule's
-    acceleration jumps, the momentum that the wings exchange with the fuselage is then still exact.
+    ``hinge_accelerations`` (s,) is the change of the hinges' rates over the step, divided by its length:
+    where a schedule's acceleration jumps, the momentum that the wings exchange with the fuselage is then
+    still exact.
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
@@ -179,8 +193,8 @@ def step_block(
     joint_forces(stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
     clear(second)
     stage(
-        surfaces, ranges, shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0], constants, state,
-        second, step, first, scratch, inputs, outputs,
+        surfaces, ranges, shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0], constants,
+        state, second, step, first, scratch, inputs, outputs,
     )  # fmt: skip
     advance(state[:s_slow], first[:s_slow], step, middle[:s_slow])
     for link in range(links):
@@ -192,21 +206,29 @@ def step_block(
         )  # fmt: skip
     advance(state[s_slow:], state[s_slow:], 0.0, middle[s_slow:])
     second_joint_forces(
-        stiffness, damping, middle[s_q:s_v], middle[s_v:s_slow], first[s_q:s_v], first[s_v:s_slow], step, tau, added
+        stiffness,
+        damping,
+        middle[s_q:s_v],
+        middle[s_v:s_slow],
+        first[s_q:s_v],
+        first[s_v:s_slow],
+        step,
+        tau,
+        added,
     )
     stage(
-        surfaces, ranges, shared, strips[1], hinges[1], hinge_accelerations, operators[1], wind[1], constants, middle,
-        first, step, second, scratch, inputs, outputs,
+        surfaces, ranges, shared, strips[1], hinges[1], hinge_accelerations, operators[1], wind[1], constants,
+        middle, first, step, second, scratch, inputs, outputs,
     )  # fmt: skip
     finish(state[:s_slow], first[:s_slow], second[:s_slow], step)
 
 
 @kernel
 def instant_rates(
-    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero, scratch,
-    inputs, outputs, rates,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero,
+    scratch, inputs, outputs, rates,
 ):  # fmt: skip
-    """Time derivative of a block's state: a stage of a step of no length. ``zero``: as many zero rows as the state.
+    """Time derivative of a block's state, a stage of a step of no length; ``zero``: rows of zeros.
 
     The lag states' rows are not touched.
     """
@@ -225,6 +247,6 @@ def instant_rates(
         scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
     )  # fmt: skip
     stage(
-        surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero, 0.0,
-        rates, scratch, inputs, outputs,
+        surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero,
+        0.0, rates, scratch, inputs, outputs,
     )  # fmt: skip
