@@ -318,7 +318,7 @@ def fly_fresh(
 def _settled(
     fresh: FreshModel, state: FreshState, a: Array, hinges: Array, constant: Array, h: float, time_s: float
 ) -> tuple[Array, Array]:
-    """Mean accelerations (6 + n,) of a step and the circulations (r,) at its middle, starting from a guess ``a``."""
+    """Mean accelerations (6 + n,) of a step and the circulations (r,) amid it, from a guess ``a``."""
     tree, gravity_N = fresh.tree, np.array([0.0, 0.0, fresh.model.flight.gravity_m_s2])
     for _ in range(MOST_ITERATIONS):
         motion = fresh.motion(_moved(state, a, h, 0.5 * h), hinges)
