@@ -91,9 +91,6 @@ class Meter:
         if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
             console.print(line, markup=False, soft_wrap=True)
             self._last_line = line
-            self._progress.console.print(
-                f"{phase:<10} {100.0 * fraction:3.0f} %  {_detail(progress)}", markup=False
-            )
             self._next_line_at = time.monotonic() + LINE_EVERY_S
 
 
@@ -115,7 +112,7 @@ def meter() -> Iterator[Meter]:
 def fit_table(result: Document) -> Table:
     """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
     title = "Fit: J in rad² (rigid, first guess, identified); RMS of φ, θ, ψ in mrad"
-    table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1))
+    table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1), collapse_padding=True, pad_edge=False)
     table.add_column("sample", no_wrap=True)
     for name in ("rigid", "guess", "identified", "ratio", "φ", "θ", "ψ"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -130,7 +127,7 @@ def fit_table(result: Document) -> Table:
             str(row["sample"]) + ("" if row["role"] == "train" else " (held out)"),
             *(_short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
             "" if ratio is None else f"{ratio:.1e}",
-            *("" if rms[angle] is None else f"{1e3 * rms[angle]:.3f}" for angle in ("phi", "theta", "psi")),
+            *("" if rms[angle] is None else f"{1e3 * rms[angle]:.2f}" for angle in ("phi", "theta", "psi")),
         )
     return table
 
