@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
-from typing import Any
 
+from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
 from morphcore.identify import Identification, Interrupted, identification_from_document
 from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted
-
-ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-CURVES = ("measured", "rigid", "initial", "identified")
 
 
 class IdentificationWork:
@@ -69,20 +64,3 @@ def begin(request: Document, threads: int) -> IdentificationWork:
     morphcore.errors.MorphError : the request cannot be flown.
     """
     return IdentificationWork(identification_from_document(request, threads=threads))
-
-
-def curve_tables(curves: Document) -> dict[str, bytes]:
-    """Write each sample's time histories as CSV: time (s) and the Euler angles (rad) of every model flown."""
-    return {f"curves_{sample['name']}.csv": _table(sample) for sample in curves["samples"]}
-
-
-def _table(sample: dict[str, Any]) -> bytes:
-    columns = {"time_s": sample["time_s"]}
-    for curve in CURVES:
-        for angle in ANGLES:
-            columns[f"{curve}_{angle}"] = sample[curve][angle]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return text.getvalue().encode()
