@@ -45,8 +45,8 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Returns
     -------
-    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, sweep_*_rad, then ``<model>_<angle>_rad``. Where a
-    flight diverged its cells are empty. Titles are ours, none can be taken for a formula.
+    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, sweep_*_rad, then ``<model>_<angle>_rad``. Where
+    a flight diverged its cells are empty. Titles are ours, none can be taken for a formula.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)

@@ -62,13 +62,13 @@ def identification_plots(document: Document, curves: Document) -> dict[str, byte
     ----------
     document : the result; its ``search.history`` gives the convergence.
     curves : ``{"samples": [{"name", "role", "time_s", "sweep_left_rad", "sweep_right_rad", "measured":
-        {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...}, "identified": {...}}]}``; a value
-        that a diverged flight never reached is None.
+        {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...}, "identified": {...}}]}``; a
+        value that a diverged flight never reached is None.
 
     Returns
     -------
-    File name -> content: ``attitude_<sample>``, ``residuals_<sample>`` and ``convergence``, each as ``.svg`` and
-    ``.png``. The same input gives the same bytes.
+    File name -> content: ``attitude_<sample>``, ``residuals_<sample>`` and ``convergence``, each as ``.svg``
+    and ``.png``. The same input gives the same bytes.
     """
     samples = curves["samples"]
     files: dict[str, bytes] = {}
@@ -93,11 +93,11 @@ def attitude_figure(sample: Document) -> Figure:
     figure = Figure(figsize=(7.2, 1.3 + 1.75 * sum(heights)))
     rows = _stack(figure, heights)
     for axes, (key, label) in zip(rows, ANGLES, strict=False):
+        _label(axes, f"{label}, deg")
         for model, values in (("measured", measured), *flown.items()):
             _draw(axes, time_s, np.degrees(values[key]), model)
-        _label(axes, f"{label}, deg")
         if silent[key]:
-            axes.set_ylim(-SILENT_SPAN_DEG, SILENT_SPAN_DEG)
+            _quiet(axes, SILENT_SPAN_DEG)
     if has_sweep:
         _draw_sweep(rows[-1], time_s, sample)
     _finish(figure, rows, time_s, _title(sample, "attitude"), list(flown))
@@ -105,37 +105,37 @@ def attitude_figure(sample: Document) -> Figure:
 
 
 def residual_figure(sample: Document) -> Figure:
-    """Errors of roll, pitch and yaw in mrad: all models at the left, the identified one alone at the right."""
+    """Errors of roll, pitch and yaw in mrad: all models at the left, the identified one at the right."""
     time_s = _series(sample["time_s"])
     models = [model for model in ("rigid", "initial", "identified") if sample.get(model)]
     figure = Figure(figsize=(9.0, 6.2))
-    grid = figure.add_gridspec(3, 2, hspace=0.16, wspace=0.2, left=0.085, right=0.985, top=0.85, bottom=0.085)
+    grid = figure.add_gridspec(3, 2, hspace=0.22, wspace=0.2, left=0.085, right=0.985, top=0.85, bottom=0.085)
     for row, (key, label) in enumerate(ANGLES):
         errors = {model: _error(sample, model, key) for model in models}
         for column, shown in enumerate((models, ["identified"])):
             axes = figure.add_subplot(grid[row, column])
+            _label(axes, f"{label} error, mrad" if column == 0 else "")
             axes.axhline(0.0, color="0.5", linewidth=0.6)
             for model in shown:
                 if model in errors:
                     _draw(axes, time_s, 1e3 * errors[model], model)
             if _is_silent([errors[model] for model in shown if model in errors]):
-                axes.set_ylim(-SILENT_SPAN_MRAD, SILENT_SPAN_MRAD)
-            _label(axes, f"{label} error, mrad" if column == 0 else "")
+                _quiet(axes, SILENT_SPAN_MRAD)
             axes.set_xlim(time_s[0], time_s[-1])
             if row < len(ANGLES) - 1:
                 axes.tick_params(labelbottom=False)
             else:
                 axes.set_xlabel("time, s")
             if column == 1 and "identified" in errors:
-                _note(axes, _rms_text(errors["identified"]))
+                axes.set_title(_rms_text(errors["identified"]), loc="right", fontsize=8.5, pad=2.0)
             if row == 0:
-                axes.set_title("all models" if column == 0 else "identified model", fontsize=9)
-    _legend(figure, models, _title(sample, "errors: model − sample"))
+                axes.set_title("all models" if column == 0 else "identified model", fontsize=9, pad=8.0)
+    _legend(figure, models, _title(sample, "model − sample"))
     return figure
 
 
 def convergence_figure(document: Document) -> Figure:
-    """Least cost J so far against the flights flown (or generations, where flights are not told), logarithmic."""
+    """Least cost J so far against flights flown (or generations, if flights are not told), logarithmic."""
     history = [row for row in document.get("search", {}).get("history", []) if _is_cost(row.get("best_cost"))]
     figure = Figure(figsize=(7.2, 3.8))
     axes = figure.add_axes((0.115, 0.13, 0.865, 0.77))
@@ -144,14 +144,13 @@ def convergence_figure(document: Document) -> Figure:
         float(row["flights"] if by_flights else row.get("generation", i)) for i, row in enumerate(history)
     ]
     cost = [float(row["best_cost"]) for row in history]
-    axes.set_title("convergence of the search", fontsize=10)
     axes.set_xlabel("flights flown" if by_flights else "generation")
     axes.set_ylabel("least cost J so far, rad²")
     axes.grid(visible=True, which="major", linewidth=0.4, color="0.88")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     if not history:
-        _note(axes, "no generation was finished")
+        axes.text(0.5, 0.5, "no generation was finished", transform=axes.transAxes, ha="center", fontsize=9)
         return figure
     axes.plot(position, cost, color="0.6", linewidth=1.0, drawstyle="steps-post")
     phases = [str(row.get("phase", "search")) for row in history]
@@ -168,6 +167,7 @@ def convergence_figure(document: Document) -> Figure:
         )
     axes.set_yscale("log")
     low, high = min(cost), max(cost)
+    axes.set_title(f"convergence of the search to J = {_scientific(low)} rad²", fontsize=10)
     axes.set_ylim(low / 1.6, high * 1.6)
     axes.yaxis.set_major_formatter(FuncFormatter(_power_of_ten))
     axes.yaxis.set_minor_formatter(NullFormatter())
@@ -175,7 +175,6 @@ def convergence_figure(document: Document) -> Figure:
     if by_flights:
         axes.set_xlim(left=0.0)
     axes.legend(frameon=False, fontsize=8.5, loc="upper right")
-    _note(axes, f"J = {low:.3g} rad²", at=(0.985, 0.08), align="right")
     return figure
 
 
@@ -254,8 +253,10 @@ def _legend(figure: Figure, models: Sequence[str], title: str) -> None:
     )
 
 
-def _note(axes: Axes, text: str, *, at: tuple[float, float] = (0.985, 0.93), align: str = "right") -> None:
-    axes.text(*at, text, transform=axes.transAxes, ha=align, va="top", fontsize=8.5, parse_math=False)
+def _quiet(axes: Axes, span: float) -> None:
+    """An axis for an angle that does not move: round-off is a flat line on it."""
+    axes.set_ylim(-span, span)
+    axes.set_yticks([-span, 0.0, span])
 
 
 def _title(sample: Document, subject: str) -> str:
@@ -285,7 +286,8 @@ def _is_silent(curves: Sequence[Array]) -> bool:
 def _rms_text(errors: Array) -> str:
     if not np.all(np.isfinite(errors)):
         return "diverged"
-    return f"rms {1e3 * float(np.sqrt(np.mean(errors**2))):.2g} mrad"
+    rms = float(np.sqrt(np.mean(errors**2)))
+    return "rms below 0.001 mrad" if rms < SILENT_RAD else f"rms {1e3 * rms:.2g} mrad"
 
 
 def _is_cost(value: object) -> bool:
@@ -297,6 +299,11 @@ def _power_of_ten(value: float, _position: object = None) -> str:
     lead = value / 10.0**exponent
     power = "10" + str(exponent).translate(SUPERSCRIPTS)
     return power if abs(lead - 1.0) < 1e-6 else f"{lead:.0f}·{power}"
+
+
+def _scientific(value: float) -> str:
+    lead, exponent = f"{value:.2e}".split("e")
+    return f"{lead}·10{str(int(exponent)).translate(SUPERSCRIPTS)}"
 
 
 def _printable(text: str) -> str:
@@ -316,10 +323,10 @@ def _rendered(stem: str, figure: Figure) -> dict[str, bytes]:
     with _drawing:
         vector, pixels = io.BytesIO(), io.BytesIO()
         with _fixed_ids():
-            FigureCanvasSVG(figure).print_svg(vector, metadata={"Date": None, "Creator": "MorphID"})
-        canvas = FigureCanvasAgg(figure)
-        figure.set_dpi(PNG_DPI)
-        canvas.print_png(pixels, metadata={"Software": "MorphID"})
+            figure.set_canvas(FigureCanvasSVG(figure))
+            figure.savefig(vector, format="svg", metadata={"Date": None, "Creator": "MorphID"})
+        figure.set_canvas(FigureCanvasAgg(figure))
+        figure.savefig(pixels, format="png", dpi=PNG_DPI, metadata={"Software": "MorphID"})
     return {f"{stem}.svg": vector.getvalue(), f"{stem}.png": pixels.getvalue()}
 
 

@@ -40,7 +40,7 @@ def _random_batch(rng: np.random.Generator, links: int, wings: int) -> Parameter
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8), st.integers(1, 3), st.integers(0, 1))
 def test_documents_keep_every_digit(seed: int, links: int, wings: int, particle: int) -> None:
-    """Batch -> JSON text -> batch is exact but for the renormalised division, shared or not, one link or eight."""
+    """Batch -> JSON text -> batch is exact but for the division, which is made to add up to one again."""
     batch = _random_batch(np.random.default_rng(seed), links, wings)
     read = parameters_from_document(json.loads(json.dumps(parameters_document(batch, particle))))
     for name, value in vars(batch.select(slice(particle, particle + 1))).items():
