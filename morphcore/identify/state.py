@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
@@ -87,7 +88,7 @@ def decode(checkpoint: bytes) -> SearchState:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(arrays.pop("header").tobytes())
         known = header.pop("format") == FORMAT
-    except (ValueError, KeyError, OSError, EOFError) as error:
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise UnreadableCheckpoint(
             f"the checkpoint cannot be read: {error}", hint="start the identification anew"
         ) from None

@@ -1,0 +1,66 @@
+"""Flights to identify from: the examples, and synthetic ones flown with known parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore import Aircraft, Flight, Trajectory, load_aircraft, load_flight, load_trajectory
+from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
+from morphcore.models.equivalent import ParameterBatch, chain_model
+from morphcore.simulate.schedule import ConstantRate
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+@cache
+def reference_aircraft() -> Aircraft:
+    """The example aircraft."""
+    return load_aircraft(EXAMPLES / "aircraft.json")
+
+
+@cache
+def reference_flight() -> Flight:
+    """The example flight condition."""
+    return load_flight(EXAMPLES / "flight.json")
+
+
+@cache
+def example(name: str, role: str = "train") -> Trajectory:
+    """An example flight."""
+    return load_trajectory(EXAMPLES / f"train_{name}.csv", role=role)  # type: ignore[arg-type]
+
+
+def shortened(sample: Trajectory, rows: int) -> Trajectory:
+    """The first rows of a flight."""
+    names = ("time_s", "sweep_left", "sweep_right", "phi", "theta", "psi")
+    return replace(sample, **{name: getattr(sample, name)[:rows] for name in names}, extra={})
+
+
+def synthetic(
+    batch: ParameterBatch,
+    *,
+    name: str = "synthetic",
+    left_rad: float = 0.6,
+    right_rad: float = 0.6,
+    duration_s: float = 0.8,
+    noise_rad: float = 0.0,
+    seed: int = 0,
+) -> Trajectory:
+    """A flight flown with known parameters, with white noise on the angles."""
+    time_s = np.arange(0.0, duration_s + 0.3, 0.01)
+    rest: NDArray[np.float64] = np.zeros_like(time_s)
+    left, right = (
+        ConstantRate(0.0, final, duration_s, start_s=0.1).motion(time_s).angle
+        for final in (left_rad, right_rad)
+    )
+    blank = Trajectory(name, time_s, left, right, rest, rest, rest)
+    model = chain_model(reference_aircraft(), reference_flight(), batch.links)
+    ((case, found),) = shared_trims(model, batch, sample_cases(model, [blank]), "trim")
+    euler = fly_attitudes(model, batch, case, found)[0]
+    euler = euler + np.random.default_rng(seed).normal(0.0, noise_rad, euler.shape)
+    return replace(blank, phi=euler[:, 0], theta=euler[:, 1], psi=euler[:, 2])
