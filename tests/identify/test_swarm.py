@@ -68,7 +68,7 @@ def test_stays_in_the_unit_cube_and_starts_at_the_guess() -> None:
 
 def test_import_is_silent(tmp_path: Path) -> None:
     """Importing the swarm installs no logging handler and writes no file (pyswarms alone does both)."""
-    code = "import logging, morphcore.identify.swarm as s; print(logging.getLogger().handlers)"
+    code = "import logging; from morphcore.identify import swarm; print(logging.getLogger().handlers)"
     root = Path(__file__).resolve().parents[2]
     done = subprocess.run(
         [sys.executable, "-c", code],

@@ -73,7 +73,7 @@ def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step
 
 @kernel
 def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate):
-    """Rates of a stage's joint angles and velocities, less twice k1's (``first``, ``second``; 0 in stage 1)."""
+    """Rates of a stage's joint angles and velocities, less twice k1's (``first``, ``second``)."""
     if not_in_lanes(v) or not_in_lanes(acceleration) or not_in_lanes(first) or not_in_lanes(second):
         return
     if not_in_lanes(angle_rate) or not_in_lanes(velocity_rate):
