@@ -49,7 +49,7 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
         while job["status"] in {"queued", "running", "cancelling"}:
             time.sleep(0.5)
             job = service.get(place).raise_for_status().json()
-            print(f"{job['status']:<10} {100 * (job.get('progress') or {}).get('fraction', 0.0):5.1f} %")
+            print(f"{job['status']:<10} {100 * ((job.get('progress') or {}).get('fraction') or 0.0):5.1f} %")
         if job["status"] != "succeeded":
             print(json.dumps(job.get("error")))
             return 1
