@@ -129,7 +129,8 @@ def residual_figure(sample: Document) -> Figure:
             if column == 1 and "identified" in errors:
                 axes.set_title(_rms_text(errors["identified"]), loc="right", fontsize=8.5, pad=2.0)
             if row == 0:
-                axes.set_title("all models" if column == 0 else "identified model", fontsize=9, pad=8.0)
+                heading = "all models" if column == 0 else "identified model alone"
+                axes.set_title(heading, loc="left", fontsize=9, pad=4.0)
     _legend(figure, models, _title(sample, "model − sample"))
     return figure
 

@@ -1,0 +1,70 @@
+"""Benchmarks: what they report, where the flights come from, whose clock counts."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from morphcore import bench
+from morphcore.bench import Effort, benchmark_swarm, benchmark_table, run_benchmarks
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import load_aircraft, load_flight
+from morphcore.models.equivalent import chain_model, physical_guess
+
+SMALLEST = Effort(particles=17, rounds=1, singles=1, links=(1, 2), refinement=2)
+
+
+def test_figures_follow_from_the_times() -> None:
+    """With a clock that ticks one second a look, every time is known, and so is every factor made of them."""
+    threads = numba.get_num_threads()
+    ticks = itertools.count()
+    figures = run_benchmarks(effort=SMALLEST, clock=lambda: float(next(ticks)))
+    assert numba.get_num_threads() == threads, "the caller's threads are as before"
+    json.dumps(figures, allow_nan=False)
+    flights_s, batch = figures["settings"]["flight_s"], figures["batch"]
+    assert flights_s == pytest.approx(5.49 + 2.49 + 1.74)
+    assert batch["flights"] == 17 * 3
+    assert (batch["fly_s"], batch["trim_s"], batch["untrimmed"]) == (3.0, 1.0, 0)
+    assert batch["real_time_factor_per_core"] == pytest.approx(17 * flights_s / 3)
+    assert batch["real_time_factor_per_core_with_trim"] == pytest.approx(17 * flights_s / 4)
+    assert figures["growth_with_links"]["s_per_simulated_s"] == pytest.approx({"1": 1 / 2.49, "2": 1 / 2.49})
+    assert figures["single_flight"] | {"flight_s": 0} == {
+        "flight_s": 0,
+        "rigid_s": 1.0,
+        "equivalent_s": 1.0,
+        "trim_s": 1.0,
+        "plan_s": 1.0,
+    }
+    assert 1e-9 < figures["step_error"]["worst_rad"] < 1e-4
+    assert figures["step_error"]["worst_rad"] == max(figures["step_error"]["rad"].values())
+    table = dict(benchmark_table(figures))
+    assert table["one lattice operator"] == "1e+03 ms"
+    assert any(key.endswith("real time per core") for key in table)
+
+
+def test_swarm_is_the_same_every_time(examples: Path) -> None:
+    """The benchmark's parameter sets depend on the seed alone, lie on the simplex and around the guess."""
+    model = chain_model(
+        load_aircraft(examples / "aircraft.json"), load_flight(examples / "flight.json"), 3, chordwise=1
+    )
+    one, same, other = (benchmark_swarm(model, 500, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.stiffness, same.stiffness)
+    assert not np.array_equal(one.stiffness, other.stiffness)
+    np.testing.assert_allclose(one.division.sum(axis=-1), 1.0, rtol=1e-14)
+    spread = np.log(one.stiffness / physical_guess(model, one.division).stiffness)
+    assert np.std(spread) == pytest.approx(0.3, rel=0.1)
+
+
+def test_flights_may_lie_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An installation without examples says what it needs; so does a folder that does not hold them."""
+    with pytest.raises(InvalidInput, match=r"aircraft\.json does not exist"):
+        run_benchmarks(effort=SMALLEST, samples_dir=tmp_path)
+    monkeypatch.setattr(bench, "__file__", str(tmp_path / "site-packages" / "morphcore" / "bench.py"))
+    with pytest.raises(InvalidInput, match="not beside this installation") as caught:
+        run_benchmarks(effort=SMALLEST)
+    assert caught.value.pointer == "/samples_dir"
