@@ -75,8 +75,7 @@ def identify_here(inputs: Inputs, meter: Meter) -> Answer:
     from worker import numerics
 
     numerics.prepare_environment(numerics.usable_cores())
-    from morphcore.errors import MorphError
-    from worker.operations import WorkInterrupted
+    from worker.operations import WorkInterrupted, WorkRefused
     from worker.operations.identification import begin
     from worker.progress import Pace
 
@@ -101,9 +100,9 @@ def identify_here(inputs: Inputs, meter: Meter) -> Answer:
                 raise CommandError("the identification ended without a step")
             outcome = work.outcome(checkpoint)
         return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
-    except MorphError as error:
+    except WorkRefused as error:
         raise CommandError(
-            error.message, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+            error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
         ) from None
 
 
@@ -135,9 +134,13 @@ def identify_there(inputs: Inputs, service: Service, meter: Meter) -> Answer:
 def sample_document(path: Path, role: str) -> Document:
     """Read a sample file and give it as it stands inline in a request."""
     from morphcore import load_trajectory
+    from morphcore.errors import MorphError
 
     _must_exist(path)
-    trajectory = load_trajectory(path)
+    try:
+        trajectory = load_trajectory(path)
+    except MorphError as error:
+        raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
     return {
         "name": path.stem,
         "role": role,

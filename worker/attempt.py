@@ -13,10 +13,18 @@ from sqlalchemy.exc import OperationalError
 from app.database import Database
 from app.jobs.records import Claim, JobStatus
 from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
-from morphcore.errors import MorphError
 from worker.lease import StopReason, Vigil
 from worker.numerics import Kernels
-from worker.operations import Begin, Document, Outcome, Step, UnknownOperation, Work, WorkInterrupted
+from worker.operations import (
+    Begin,
+    Document,
+    Outcome,
+    Step,
+    UnknownOperation,
+    Work,
+    WorkInterrupted,
+    WorkRefused,
+)
 from worker.progress import Pace
 
 log = logging.getLogger(__name__)
@@ -92,8 +100,8 @@ class Attempt:
             return self._run(find_operation)
         except StaleClaim:
             return Ending.ABANDONED
-        except MorphError as error:
-            return self._fail(_error(error.code, error.message, hint=error.hint, pointer=error.pointer))
+        except WorkRefused as error:
+            return self._fail(_error(error.code, error.detail, hint=error.hint, pointer=error.pointer))
         except MemoryError:
             hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
             return self._fail(_error("out_of_memory", "the job needs more memory than there is", hint=hint))

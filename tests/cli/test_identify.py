@@ -199,3 +199,33 @@ def test_listing_jobs_loads_no_compiler() -> None:
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
+
+
+def test_a_refused_sample_is_a_sentence(examples: Path, tmp_path: Path) -> None:
+    """In this process too, a sample whose time falls is refused with a sentence and exit code 3."""
+    rows = (examples / "train_rate_0.8.csv").read_text().splitlines()
+    (tmp_path / "falls.csv").write_text("\n".join([*rows[:5], rows[3], *rows[5:]]))
+    ended = RUNNER.invoke(
+        app,
+        [
+            *("identify", "--aircraft", str(examples / "aircraft.json")),
+            *("--flight", str(examples / "flight.json"), "--sample", str(tmp_path / "falls.csv")),
+        ],
+    )
+    assert ended.exit_code == Exit.INVALID_INPUT
+    assert "rise" in ended.stderr
+
+
+def test_a_refused_flight_names_the_field(examples: Path, tmp_path: Path) -> None:
+    """A value that the library refuses is named by its JSON pointer."""
+    flight = json.loads((examples / "flight.json").read_text())
+    (tmp_path / "flight.json").write_text(json.dumps({**flight, "airspeed_m_s": -1.0}))
+    ended = RUNNER.invoke(
+        app,
+        [
+            *("identify", "--aircraft", str(examples / "aircraft.json")),
+            *("--flight", str(tmp_path / "flight.json"), "--sample", str(examples / "train_rate_0.8.csv")),
+        ],
+    )
+    assert ended.exit_code == Exit.INVALID_INPUT
+    assert "/flight/airspeed_m_s" in ended.stderr

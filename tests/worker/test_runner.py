@@ -17,9 +17,9 @@ from app.jobs.reaper import reap
 from app.jobs.records import JobStatus
 from app.jobs.store import claim_job, request_cancel
 from app.tables import artifacts, job_events, job_results
-from morphcore.errors import InvalidInput
 from tests.worker.conftest import FAILURES, OWNER, Queue, Walk
 from worker.attempt import Attempt, Ending
+from worker.operations import WorkRefused
 from worker.runner import Runner
 
 MakeRunner = Callable[..., Runner]
@@ -171,7 +171,9 @@ def test_heartbeats_keep_a_long_step_alive(queue: Queue, database: Database, mak
     ("failure", "expected"),
     [
         (
-            InvalidInput("the span is negative", pointer="/aircraft/span_m", hint="give a length"),
+            WorkRefused(
+                "invalid_input", "the span is negative", pointer="/aircraft/span_m", hint="give a length"
+            ),
             {
                 "code": "invalid_input",
                 "detail": "the span is negative",

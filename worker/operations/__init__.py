@@ -2,7 +2,8 @@
 
 An operation is one function ``begin(request, threads) -> Work``. To add one, write a module with such a
 function and name it in `OPERATIONS`; nothing else in the worker changes. Modules are imported on first use,
-so that the pool's parent process never loads the compiler.
+so that the pool's parent process never loads the compiler; for the same reason they translate the library's
+errors.
 """
 
 from __future__ import annotations
@@ -18,6 +19,25 @@ Stop = Callable[[], bool]
 
 class WorkInterrupted(Exception):
     """The work saw its stop signal and ended between two chunks; the last step's checkpoint holds."""
+
+
+class WorkRefused(Exception):
+    """The work cannot be done as requested; carries what the user is told.
+
+    Parameters
+    ----------
+    code : stable, for programs.
+    detail : a sentence.
+    pointer : JSON pointer to the field at fault, "" for the whole.
+    hint : what to do about it.
+    """
+
+    def __init__(self, code: str, detail: str, *, pointer: str = "", hint: str = "") -> None:
+        super().__init__(detail)
+        self.code = code
+        self.detail = detail
+        self.pointer = pointer
+        self.hint = hint
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +73,13 @@ class Work(Protocol):
     """Long work as an iterator of steps with serialisable state."""
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
-        """Give one step after another; raise `WorkInterrupted` soon after ``stop()`` turns true."""
+        """Give one step after another.
+
+        Raises
+        ------
+        WorkInterrupted : soon after ``stop()`` turned true.
+        WorkRefused : what was asked cannot be done.
+        """
 
     def outcome(self, checkpoint: bytes) -> Outcome:
         """Give the result at the last step's checkpoint, with everything that belongs to it."""

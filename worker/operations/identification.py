@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
+from morphcore.errors import MorphError
 from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
 from morphcore.identify import Identification, Interrupted, identification_from_document
-from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted
+from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted, WorkRefused
 
 
 class IdentificationWork:
@@ -37,10 +38,15 @@ class IdentificationWork:
                 yield Step(progress=progress, checkpoint=step.checkpoint)
         except Interrupted:
             raise WorkInterrupted from None
+        except MorphError as error:
+            raise refusal(error) from error
 
     def outcome(self, checkpoint: bytes) -> Outcome:
         """Give the identified model with its plots and curves."""
-        result = self._run.result(checkpoint)
+        try:
+            result = self._run.result(checkpoint)
+        except MorphError as error:
+            raise refusal(error) from error
         document: Document = result.to_document()
         curves = result.curves()
         artifacts = {
@@ -61,6 +67,14 @@ def begin(request: Document, threads: int) -> IdentificationWork:
 
     Raises
     ------
-    morphcore.errors.MorphError : the request cannot be flown.
+    WorkRefused : the request cannot be flown.
     """
-    return IdentificationWork(identification_from_document(request, threads=threads))
+    try:
+        return IdentificationWork(identification_from_document(request, threads=threads))
+    except MorphError as error:
+        raise refusal(error) from error
+
+
+def refusal(error: MorphError) -> WorkRefused:
+    """Say in the worker's words what the library refused."""
+    return WorkRefused(error.code, error.message, pointer=error.pointer, hint=error.hint)
