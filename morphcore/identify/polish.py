@@ -20,7 +20,7 @@ PROBE = 1e-4  # forward-difference step in coordinates of order one; residuals a
 DAMPING_TRIALS = (0.03, 0.3, 3.0, 30.0)  # times each start's present damping
 FIRST_DAMPING = 1e-2
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e8
-STALLED = 0.02  # relative decrease of the cost that counts as none: past it, only unseen directions drift
+STALLED = 0.05  # relative decrease of the cost that counts as none: past it, only unseen directions drift
 PATIENCE = 3  # iterations without decrease before a start has converged
 
 
