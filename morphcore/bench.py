@@ -336,6 +336,8 @@ def _machine() -> Figures:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "numba": numba.__version__,
+        # unless 1, linear algebra on threads of its own fights with ours for the cores
+        "openblas_num_threads": os.environ.get("OPENBLAS_NUM_THREADS"),
     }
 
 

@@ -17,7 +17,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_fl
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.simulate.flight import simulate, write_trajectory_csv
-from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold, Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 
@@ -112,19 +112,6 @@ def test_mirrored_morph_gives_mirrored_flight(
     assert np.abs(one.phi).max() > 0.01, "the morph rolls the aircraft"
     np.testing.assert_allclose(other.euler, one.euler * [-1.0, 1.0, -1.0], atol=1e-9)
     np.testing.assert_allclose(other.extra["tip_left_z"], one.extra["tip_right_z"], atol=1e-9)
-
-
-@pytest.mark.parametrize("name", SAMPLES)
-def test_shipped_step_holds_attitude(
-    examples: Path, aircraft: Aircraft, flight: Flight, guess: ParameterBatch, name: str
-) -> None:
-    """The shipped step against a fiftieth of it: within 1e-4 rad in all angles on every example flight."""
-    sample = load_trajectory(examples / f"{name}.csv")
-    coarse, fine = (
-        simulate(aircraft, flight, sample, model=guess, step_s=step, lattice=(2, 6)).trajectory.euler
-        for step in (STEP_S, STEP_S / 50)
-    )
-    assert np.abs(coarse - fine).max() < 1e-4
 
 
 def test_stiff_joints_tend_to_the_rigid_model(
