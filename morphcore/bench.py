@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore import warm_up
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
@@ -32,7 +33,7 @@ from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.simulate.trim import Trim, trimmed_state
 from morphcore.threads import use_threads
-from morphcore.warm_up import warm_up
+from morphcore.warming import warm_up
 
 Array = NDArray[np.float64]
 Figures = dict[str, Any]
