@@ -1,25 +1,29 @@
 """MorphID's numeric library: equivalent models of sweep-morphing aircraft from sample flights.
 
->>> from morphcore import load_aircraft, load_flight, load_trajectory, identify  # doctest: +SKIP
+The functions ``identify`` and ``simulate`` share their names with the rooms that hold them, and win: import
+what lies inside a room by ``from morphcore.identify.swarm import ...``.
 """
 
 from __future__ import annotations
 
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
 from morphcore.identify import Identification, IdentifyResult, identification_from_document, identify
+from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.warm_up import warm_up
+from morphcore.warming import warm_up
 
 __all__ = [
     "Aircraft",
     "Flight",
     "Identification",
     "IdentifyResult",
+    "Simulation",
     "Trajectory",
     "identification_from_document",
     "identify",
     "load_aircraft",
     "load_flight",
     "load_trajectory",
+    "simulate",
     "warm_up",
 ]

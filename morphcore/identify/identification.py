@@ -130,6 +130,10 @@ class Identification:
         """The identified model at any step, with its fit, uncertainty and cost."""
         return identify_result(self, decode(checkpoint))
 
+    def best_so_far(self, checkpoint: bytes) -> IdentifyResult:
+        """Give the result without uncertainty and timing, fast: someone waits for a cancelled search."""
+        return identify_result(self, decode(checkpoint), judged=False)
+
     # one step each
 
     def _baseline(self, stop: Stop | None) -> SearchState:

@@ -133,23 +133,27 @@ def parameters_document(batch: ParameterBatch) -> dict[str, Any]:
     }
 
 
-def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
-    """Fly the best point so far against all samples and judge it."""
+def identify_result(run: Identification, state: SearchState, *, judged: bool = True) -> IdentifyResult:
+    """Fly the best point so far against all samples; if ``judged``, with its uncertainty and cost too."""
     start, space = run.settings.start, run.space
     rigid_model = run.chain(run.model.aircraft, run.model.flight, 1)
     rigid_cases = sample_cases(rigid_model, run.samples, run.settings.step_s)
     rigid = _attitudes(rigid_model, physical_guess(rigid_model), rigid_cases, start)
     both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
-    judged = None
-    if space.dimension and np.isfinite(state.best_cost):
+    certainty = None
+    if judged and space.dimension and np.isfinite(state.best_cost):
 
         def errors(points: Array) -> Array:
             return residuals(run.model, space.decode(points), run.training, start)
 
         residual, jacobian = differences(state.best[None, :], space.upper, errors)
-        judged = uncertainty(space, state.best, residual[0], jacobian[0])
+        certainty = uncertainty(space, state.best, residual[0], jacobian[0])
     best = space.decode(state.best)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
+
+    def flight_time(model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...]) -> float | None:
+        return _flight_time(model, batch, cases[longest], start) if judged else None
+
     settings = run.search
     return IdentifyResult(
         model=run.model,
@@ -158,7 +162,7 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
             SampleFit(case, r[0], pair[0], pair[1])
             for case, r, pair in zip(run.cases, rigid, both, strict=True)
         ),
-        uncertainty=judged,
+        uncertainty=certainty,
         search={
             "method": settings.method,
             "seed": settings.seed,
@@ -170,10 +174,8 @@ def identify_result(run: Identification, state: SearchState) -> IdentifyResult:
             "history": list(state.history),
         },
         cost={
-            "rigid_flight_s": _flight_time(
-                rigid_model, physical_guess(rigid_model), rigid_cases[longest], start
-            ),
-            "equivalent_flight_s": _flight_time(run.model, best, run.cases[longest], start),
+            "rigid_flight_s": flight_time(rigid_model, physical_guess(rigid_model), rigid_cases),
+            "equivalent_flight_s": flight_time(run.model, best, run.cases),
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
         },

@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# pyswarms configures the root logger and opens report.log in the working directory on import; neither is its
-# to do
+# pyswarms configures the root logger and opens report.log in the working directory, on import and with every
+# handler that it makes; neither is its to do
 with mock.patch.object(logging.config, "dictConfig"):
     from pyswarms.backend import compute_pbest, compute_position, compute_velocity
     from pyswarms.backend.handlers import BoundaryHandler, VelocityHandler
     from pyswarms.backend.swarms import Swarm
+
+    VELOCITIES = VelocityHandler("unmodified")
+    POSITIONS = BoundaryHandler("nearest")
 
 
 @dataclass(frozen=True)
@@ -84,8 +87,8 @@ def next_swarm(state: SwarmState, settings: SwarmSettings, cost: Array) -> Swarm
     others = np.random.get_state(legacy=True)  # noqa: NPY002 - pyswarms knows no other
     np.random.set_state(state.random)  # noqa: NPY002
     try:
-        swarm.velocity = compute_velocity(swarm, None, VelocityHandler("unmodified"), unit)
-        position = compute_position(swarm, unit, BoundaryHandler("nearest"))
+        swarm.velocity = compute_velocity(swarm, None, VELOCITIES, unit)
+        position = compute_position(swarm, unit, POSITIONS)
         random = np.random.get_state(legacy=True)  # noqa: NPY002
     finally:
         np.random.set_state(others)  # noqa: NPY002

@@ -58,7 +58,7 @@ class IdentificationWork:
 
     def best_so_far(self, checkpoint: bytes) -> Outcome:
         """Give the best model found so far, without plots: drawing them takes seconds."""
-        document: Document = self._run.result(checkpoint).to_document()
+        document: Document = self._run.best_so_far(checkpoint).to_document()
         return Outcome(document=document, artifacts={"result.json": json.dumps(document, indent=1).encode()})
 
 
