@@ -126,8 +126,10 @@ class Spline:
 class Tabulated:
     """A measured history, interpolated differentiably and without overshoot beside flat parts.
 
-    Akima (1970), with the weights of makima: exact for a parabola on even steps, and local, so that the
-    corner of a ramp does not ring through the history as it would in a cubic spline.
+    Akima (1970), with the weights of makima: exact where the rate is constant, and local, so that
+    the corner of a ramp does not ring through the history as it would in a cubic spline. (Where the rate
+    changes, the rate is right to about 2 per cent on the 10 ms rows of the examples, which moves the attitude
+    by 2e-6 rad; see tests/simulate/test_schedule.py.)
     """
 
     time_s: Array

@@ -151,7 +151,6 @@ def random_state(rng: np.random.Generator, model: ChainModel, particles: int, *,
     """States (p, state_rows) of order one in attitude, rates and joints, moving at about ``speed`` m/s."""
     n = model.coordinates
     state = initial_state(
-        model,
         quaternion=quaternion_from_euler(*rng.uniform(-1.2, 1.2, size=(3, particles))),
         omega_B=rng.normal(size=(particles, 3)),
         velocity_B=speed * np.array([1.0, 0.0, 0.05]) + rng.normal(size=(particles, 3)),

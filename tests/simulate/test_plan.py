@@ -1,0 +1,143 @@
+"""What all flights of a sample share: the time grid and the lattice along the morph."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from morphcore.aero.operator import lattice_operator
+from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
+from morphcore.simulate.schedule import ConstantRate, Hold
+from tests.models.chains import Parabola, odd_aircraft, small_model
+from tests.simulate.flights import example_model, fly_trimmed, sample, sample_plan, sample_schedules
+
+
+@settings(max_examples=50, deadline=None)
+@given(rows=st.integers(3, 400), spacing=st.floats(1e-4, 0.5), start=st.floats(-5.0, 5.0))
+def test_even_samples_are_hit(rows, spacing, start):
+    """Evenly spaced output times are rows of the grid, whose steps are no longer than they may be."""
+    times = start + spacing * np.arange(rows)
+    grid = time_grid(times)
+    np.testing.assert_allclose(grid.times_s[grid.at], times, atol=1e-9)
+    assert grid.step_s <= STEP_S * (1.0 + 1e-8)
+    assert grid.steps * (grid.step_s + 1e-12) >= times[-1] - times[0]
+    assert grid.steps == grid.at[-1]
+
+
+def test_rounded_times_count_as_even():
+    """Times written with few digits still are one grid."""
+    times = np.round(np.arange(50) / 30.0, 8)
+    assert time_grid(times).at is not None
+
+
+def test_uneven_samples_get_a_grid_of_their_own():
+    """Where rows are unevenly spaced the grid covers them, and the attitude is to be interpolated."""
+    times = np.array([0.0, 0.013, 0.02, 0.05, 0.0503])
+    grid = time_grid(times)
+    assert grid.at is None
+    assert grid.times_s[0] == 0.0
+    assert grid.times_s[-1] == pytest.approx(times[-1], abs=1e-15)
+    assert grid.step_s <= STEP_S
+
+
+def table_error(model, schedules, duration_s):
+    """Largest error of the interpolated operators, relative to the largest element of each kind of row."""
+    plan = flight_plan(model, schedules, time_grid(np.linspace(0.0, duration_s, 41), duration_s / 40))
+    hinged = np.array([s.hinge is not None for s in model.aircraft.surfaces])
+    worst = 0.0
+    for row in range(plan.grid.steps + 1):
+        matrices, strips = plan.table.between(row, row + 1)
+        exact = lattice_operator(model.lattice, tuple(plan.angles[row] * hinged))
+        worst = max(worst, float(np.abs(strips[0] - exact.strips).max()))
+        for kind in range(5):
+            found, right = matrices[0, kind:-4:5], exact.matrix[kind:-4:5]
+            worst = max(worst, float(np.abs(found - right).max() / np.abs(right).max()))
+    return worst
+
+
+@pytest.mark.parametrize(
+    "schedules",
+    [
+        (ConstantRate(0.0, 1.2, 2.0), ConstantRate(0.0, 1.2, 2.0)),
+        (ConstantRate(0.0, 0.6, 1.5), ConstantRate(0.5, 0.0, 1.0, start_s=0.7)),
+        (Hold(0.3), Hold(0.5)),
+    ],
+)
+def test_interpolated_lattice(schedules):
+    """Cubics between nodes 25 mrad apart give the lattice of any angle to 1e-3 of its largest elements.
+
+    The worst are where an inboard wake leg passes control points, and corners of the path. What that does
+    to a flight is the next test's.
+    """
+    assert table_error(example_model(3), schedules, 2.0) < 1e-3
+
+
+def test_the_tables_spacing_does_not_show_in_the_attitude():
+    """A table five times finer moves the attitude of the quickest sample by less than 2e-6 rad."""
+    model, name = example_model(2), "train_asymmetric"
+    plan = sample_plan(model, name, STEP_S)
+    fine = flight_plan(model, sample_schedules(name), plan.grid, node_spacing_rad=0.005)
+    difference = fly_trimmed(model, plan).euler - fly_trimmed(model, fine).euler
+    assert np.abs(difference).max() < 2e-6
+
+
+def test_hinge_rows_are_the_surfaces_motion():
+    """Pose, rate and origin of odd hinges: differences in time of the pose give the twist rows.
+
+    R' = R [w x], p' = R v, with [w; v] = S rate in link axes.
+    """
+    rng = np.random.default_rng(0)
+    model = small_model(odd_aircraft(rng), example_model(1).flight, 2)
+    probe = 1e-6
+    schedules = [Parabola(*row) for row in rng.normal(size=(5, 3)) * [0.4, 1.0, 2.0]]
+    rows = flight_plan(model, schedules, time_grid(np.array([0.0, probe, 2 * probe]))).hinges
+    for s, surface in enumerate(model.aircraft.surfaces):
+        R, p = (rows[:, s, :9].reshape(-1, 3, 3), rows[:, s, 16:])
+        twist = rows[1, s, 9:15] * rows[1, s, 15]
+        spin = R[1].T @ (R[2] - R[0]) / (2 * probe)
+        np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], twist[:3], atol=1e-8)
+        np.testing.assert_allclose(R[1].T @ (p[2] - p[0]) / (2 * probe), twist[3:], atol=1e-8)
+        if surface.hinge is None:
+            np.testing.assert_array_equal(twist, 0.0)
+
+
+def test_mean_accelerations_add_up_to_the_rates():
+    """Over a whole sample the mean accelerations make the rates exactly, jumps of the schedule included."""
+    model = example_model(1)
+    plan = sample_plan(model, "train_rate_0.8", STEP_S)
+    summed = plan.rates[0] + plan.grid.step_s * np.cumsum(plan.mean_accelerations, axis=0)
+    np.testing.assert_allclose(summed, plan.rates[1:], atol=1e-12)
+    assert plan.rates.max() == pytest.approx(1.0 / 1.15, rel=2e-3)  # a radian, ramps inside its 1.25 s
+    assert sample("train_rate_0.8").time_s.size == plan.grid.at.size
+
+
+def test_changing_wind_reaches_the_flight():
+    """A gust given as a function of time is in the plan and moves the aircraft; before it nothing happens."""
+    model = example_model(1)
+    grid = time_grid(np.linspace(0.0, 0.4, 41))
+
+    def gust(times):
+        return np.outer(times > 0.2, [0.0, 0.0, -3.0])
+
+    calm = flight_plan(model, [Hold(), Hold()], grid)
+    blown = flight_plan(model, [Hold(), Hold()], grid, air_velocity_N=gust)
+    still, moved = fly_trimmed(model, calm).states, fly_trimmed(model, blown).states
+    before = grid.times_s < 0.2
+    np.testing.assert_allclose(moved[before], still[before], atol=1e-12)
+    assert moved[-1, 0, 12] < still[-1, 0, 12] - 0.03  # carried up
+
+
+def test_no_hinge_no_angle():
+    """Angles given for fixed surfaces are not looked at."""
+    rng = np.random.default_rng(1)
+    aircraft = odd_aircraft(rng)
+    model = small_model(aircraft, example_model(1).flight, 1)
+    fixed = [s.hinge is None for s in aircraft.surfaces]
+    plans = []
+    for angle in (0.0, 0.7):
+        schedules = [Hold(angle if f else 0.2) for f in fixed]
+        plans.append(flight_plan(model, schedules, time_grid(np.array([0.0, 0.01, 0.02]))))
+    np.testing.assert_array_equal(plans[0].table.matrices, plans[1].table.matrices)
+    np.testing.assert_array_equal(plans[0].hinges, plans[1].hinges)
