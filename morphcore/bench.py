@@ -15,7 +15,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore import warm_up
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
