@@ -127,21 +127,29 @@ def identify(
 
 @app.command()
 @reports_errors
-def bench(as_json: AsJson = False) -> None:
+def bench(
+    quick: Annotated[bool, typer.Option("--quick", help="Half a minute instead of some.")] = False,
+    samples: Annotated[
+        Path | None, typer.Option(help="Folder with aircraft.json, flight.json and the example flights.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
     """Measure this machine: speed of the batch, of the lattice, of the identification."""
     from worker import numerics
 
     numerics.prepare_environment(numerics.usable_cores())
-    from morphcore.bench import run_benchmarks
+    from morphcore.bench import benchmark_table, run_benchmarks
+    from morphcore.errors import MorphError
 
-    figures: dict[str, Any] = run_benchmarks()
+    try:
+        figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples)
+    except MorphError as error:
+        raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
     if as_json:
         print_json(figures)
         return
-    for name, value in _flat(figures):
-        stdout().print(
-            f"{name:<56} {value:.4g}" if isinstance(value, float) else f"{name:<56} {value}", markup=False
-        )
+    for what, value in benchmark_table(figures):
+        stdout().print(f"{what:<60} {value}", markup=False)
 
 
 @jobs.command("ls")
@@ -263,16 +271,6 @@ def _print_error(error: dict[str, Any]) -> None:
     stderr().print(
         f"error {error.get('code', '')}: {where}{detail}{hint}", style="red", markup=False, soft_wrap=True
     )
-
-
-def _flat(figures: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    rows: list[tuple[str, Any]] = []
-    for key, value in figures.items():
-        if isinstance(value, dict):
-            rows.extend(_flat(value, f"{prefix}{key}."))
-        else:
-            rows.append((f"{prefix}{key}", value))
-    return rows
 
 
 if __name__ == "__main__":

@@ -112,7 +112,15 @@ def meter() -> Iterator[Meter]:
 def fit_table(result: Document) -> Table:
     """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
     title = "Fit: J in rad² (rigid, first guess, identified); RMS of φ, θ, ψ in mrad"
-    table = Table(title=title, box=SIMPLE_HEAD, padding=(0, 1), collapse_padding=True, pad_edge=False)
+    held_out = any(row["role"] != "train" for row in result["fit"])
+    table = Table(
+        title=title,
+        caption="* held out: not fitted" if held_out else None,
+        box=SIMPLE_HEAD,
+        padding=(0, 1),
+        collapse_padding=True,
+        pad_edge=False,
+    )
     table.add_column("sample", no_wrap=True)
     for name in ("rigid", "guess", "identified", "ratio", "φ", "θ", "ψ"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -124,7 +132,7 @@ def fit_table(result: Document) -> Table:
             else None
         )
         table.add_row(
-            str(row["sample"]) + ("" if row["role"] == "train" else " (held out)"),
+            str(row["sample"]) + ("" if row["role"] == "train" else " *"),
             *(_short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
             "" if ratio is None else f"{ratio:.1e}",
             *("" if rms[angle] is None else f"{1e3 * rms[angle]:.2f}" for angle in ("phi", "theta", "psi")),

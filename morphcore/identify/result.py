@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from morphcore.frames import wrap_angle
 from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, sample_cases, shared_trims
 from morphcore.identify.polish import differences
+from morphcore.identify.settings import ModelSettings
 from morphcore.identify.state import SearchState
 from morphcore.identify.uncertainty import Uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
+from morphcore.models.parameters_document import parameters_document
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -93,11 +95,17 @@ class IdentifyResult:
     uncertainty: Uncertainty | None
     search: dict[str, Any]
     cost: dict[str, float | None]
+    settings: ModelSettings
 
     def to_document(self) -> dict[str, Any]:
         """JSON form with the names that the API fixes."""
         return {
-            "model": parameters_document(self.parameters),
+            "model": parameters_document(self.parameters)
+            | {
+                "lattice": {"chordwise": self.settings.chordwise, "spanwise": self.settings.spanwise},
+                "step_s": self.settings.step_s,
+                "start": self.settings.start,
+            },
             "fit": [fit.to_document() for fit in self.fits],
             "uncertainty": {"standard_error": {}, "correlation": [], "unidentifiable": []}
             if self.uncertainty is None
@@ -109,28 +117,6 @@ class IdentifyResult:
     def curves(self) -> dict[str, Any]:
         """Time histories of all samples for plots and tables."""
         return {"samples": [fit.to_curves() for fit in self.fits]}
-
-
-def parameters_document(batch: ParameterBatch) -> dict[str, Any]:
-    """JSON form of one parameter set; with separate wings the lists of each wing stand in a list."""
-
-    def per_wing(values: Array) -> list[Any]:
-        lists: list[Any] = values[0].tolist()
-        return lists[0] if len(lists) == 1 else lists
-
-    return {
-        "links_per_wing": batch.links,
-        "separate_wings": batch.division.shape[1] > 1,
-        "division": per_wing(batch.division),
-        "stiffness_nm_rad": per_wing(batch.stiffness),
-        "damping_nms_rad": per_wing(batch.damping),
-        "aero": {
-            "lift_factor": float(batch.lift_factor[0]),
-            "centre_shift_m": float(batch.centre_shift[0]),
-            "profile_drag": float(batch.profile_drag[0]),
-            "lag_s": float(batch.lag[0]),
-        },
-    }
 
 
 def identify_result(run: Identification, state: SearchState, *, judged: bool = True) -> IdentifyResult:
@@ -179,6 +165,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
         },
+        settings=run.settings,
     )
 
 

@@ -13,6 +13,7 @@ from morphcore.frames import axis_rotation
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.kernels.aba import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.simulate.kernels.interpolate import blend
 from morphcore.simulate.schedule import Schedule
 
 Array = NDArray[np.float64]
@@ -68,22 +69,15 @@ class OperatorTable:
         nodes = self.matrices.shape[0]
         position = self.position[first:last]
         if nodes == 1:
-            shape = (position.size, *self.matrices.shape[1:])
-            strips = np.broadcast_to(self.strips[0], (position.size, *self.strips.shape[1:]))
-            return np.ascontiguousarray(np.broadcast_to(self.matrices[0], shape)), np.ascontiguousarray(
-                strips
-            )
-        base = np.clip(np.floor(position).astype(np.int64) - 1, 0, nodes - 4)
-        s = position - base
-        weight = np.zeros((position.size, nodes))
-        rows = np.arange(position.size)
-        for i in range(4):  # Lagrange's cubic through four neighbours
-            others = [j for j in range(4) if j != i]
-            weight[rows, base + i] = np.prod([(s - j) / (i - j) for j in others], axis=0)
-        low, high = int(base.min()), int(base.max()) + 4
-        local = weight[:, low:high]
-        matrices = np.tensordot(local, self.matrices[low:high], axes=1)
-        return matrices, np.tensordot(local, self.strips[low:high], axes=1)
+            base = np.zeros(position.size, dtype=np.int64)
+            weights = np.ones((position.size, 1))
+        else:
+            base = np.clip(np.floor(position).astype(np.int64) - 1, 0, nodes - 4)
+            s = position - base
+            # Lagrange's cubic through four neighbours
+            cubic = [np.prod([(s - j) / (i - j) for j in range(4) if j != i], axis=0) for i in range(4)]
+            weights = np.stack(cubic, axis=1)
+        return _blended(self.matrices, weights, base), _blended(self.strips, weights, base)
 
 
 @dataclass(frozen=True)
@@ -106,6 +100,12 @@ class FlightPlan:
     def mean_accelerations(self) -> Array:
         """(steps, s) mean acceleration of the hinges over each step, rad/s^2."""
         return np.diff(self.rates, axis=0) / self.grid.step_s
+
+
+def _blended(nodes: Array, weights: Array, base: NDArray[np.int64]) -> Array:
+    out = np.empty((base.size, *nodes.shape[1:]))
+    blend(weights, base, nodes.reshape(nodes.shape[0], -1), out.reshape(base.size, -1))
+    return out
 
 
 def flight_plan(

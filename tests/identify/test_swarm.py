@@ -67,9 +67,7 @@ def test_stays_in_the_unit_cube_and_starts_at_the_guess() -> None:
 
 
 def test_is_silent(tmp_path: Path) -> None:
-    """Importing and moving the swarm touches no logging handler or level and writes no file (pyswarms alone
-    does).
-    """
+    """Importing and moving the swarm touches no logger and writes no file (pyswarms alone does)."""
     code = (
         "import logging, numpy as np; from morphcore.identify.swarm import *; s = SwarmSettings(4, 2);"
         "state = first_swarm(s, np.full(3, 0.5), 1); next_swarm(state, s, np.ones(4));"

@@ -1,0 +1,23 @@
+"""Interpolation of matrices between nodes."""
+
+from __future__ import annotations
+
+from morphcore.jit import kernel
+
+
+@kernel
+def blend(weights, first, nodes, out):
+    """Weighted sums of neighbouring nodes: out[k] = sum over i of weights[k, i] nodes[first[k] + i].
+
+    weights : (k, i); first : (k,); nodes : (n, m); out : (k, m). Not the library's matrix product, whose
+    threads would fight with ours over a few hundred kilobytes.
+    """
+    for k in range(out.shape[0]):
+        row = out[k]
+        for m in range(row.size):
+            row[m] = 0.0
+        for i in range(weights.shape[1]):
+            weight = weights[k, i]
+            node = nodes[first[k] + i]
+            for m in range(row.size):
+                row[m] += weight * node[m]
