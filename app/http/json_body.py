@@ -13,7 +13,7 @@ from app.errors import MalformedBody, UnsupportedMediaType
 
 MAX_LISTS = 100_000  # a byte of "[" costs sixty of memory
 MAX_OBJECTS = 10_000
-MAX_VALUES = 8_000_000
+MAX_VALUES = 2_000_000  # 300,000 rows of samples; parsing more takes longer than a second
 MAX_KEYS = 100  # of one object; none of ours has more than twenty
 
 
@@ -43,7 +43,7 @@ def parse_json(body: bytes) -> Any:
         raise MalformedBody(
             f"The body holds {objects} objects, {lists} lists and {values} further values.",
             "/samples",  # nothing else in any request can be that large
-            "At most 64 samples of 100000 rows each: send fewer, or leave out rows.",
+            f"At most {MAX_VALUES} numbers in one body: leave out rows (10 ms steps are enough), or upload flights.",
         )
     try:
         return json.loads(body, object_pairs_hook=_object)
