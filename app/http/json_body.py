@@ -43,7 +43,7 @@ def parse_json(body: bytes) -> Any:
         raise MalformedBody(
             f"The body holds {objects} objects, {lists} lists and {values} further values.",
             "/samples",  # nothing else in any request can be that large
-            f"At most {MAX_VALUES} numbers a body: leave out rows (10 ms steps are enough) or upload flights.",
+            f"At most {MAX_VALUES} numbers a body: leave out rows (10 ms steps suffice) or upload flights.",
         )
     try:
         return json.loads(body, object_pairs_hook=_object)

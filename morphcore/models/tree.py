@@ -124,11 +124,13 @@ def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Arra
     section = surface.section_at(stations)
     from_axis = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
     about_centres = np.stack([section.inertia_x, section.inertia_y, section.inertia_z], axis=1)
-    total = np.zeros((6, 6))
+    total: Array = np.zeros((6, 6))
     for i in range(SLICES):
         centre = origin_W + np.array([from_axis, surface.span_sign * (stations[i] - start_m), 0.0])
-        total += lengths[i] * spatial_inertia(float(section.mass[i]), centre, np.diag(about_centres[i]))
-    return total
+        total = total + lengths[i] * spatial_inertia(
+            float(section.mass[i]), centre, np.diag(about_centres[i])
+        )
+    return np.asarray(total)
 
 
 def _root(surface: Surface) -> Array:
