@@ -70,8 +70,9 @@ class AircraftLattice:
 class LatticeOperator:
     """One reduced operator.
 
-    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 2): x of the trailing edge and of the
-    centre of circulation of each strip from the link axis (the elastic axis), m.
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 3): x of the trailing edge and of the
+    centre of circulation of each strip from the link axis (the elastic axis), m; slope dx/dy of its trailing
+    edge in link axes.
     """
 
     matrix: Array
@@ -141,7 +142,7 @@ def _boundary(lattice: AircraftLattice) -> Array:
 def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> LatticeOperator:
     rows, columns = lattice.operator_shape
     matrix = np.zeros((rows, columns))
-    strips = np.zeros((lattice.strips, 2))
+    strips = np.zeros((lattice.strips, 3))
     uniform = circulation[:, ::2].sum(axis=1)  # every strip at the same incidence
     inputs = circulation.shape[1]
     ring = 0
@@ -177,4 +178,5 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
         matrix[row + 4, :inputs] = np.einsum("ijn,ij->jn", jump, chordwise_share * length) / width[:, None]
         strips[strip0 : strip0 + part.spanwise, 0] = middle_x[-1]
         strips[strip0 : strip0 + part.spanwise, 1] = np.sum(bound * middle_x[:-1], axis=0)
+        strips[strip0 : strip0 + part.spanwise, 2] = np.diff(edge_x[-1]) / (part.span_sign * width)
     return LatticeOperator(matrix, strips)

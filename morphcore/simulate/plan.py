@@ -56,7 +56,7 @@ def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
 class OperatorTable:
     """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
 
-    matrices : (nodes, rows, columns); strips : (nodes, strips, 2); position : (steps + 1,) of each grid time
+    matrices : (nodes, rows, columns); strips : (nodes, strips, 3); position : (steps + 1,) of each grid time
     among the nodes, in node spacings.
     """
 
@@ -65,7 +65,7 @@ class OperatorTable:
     position: Array
 
     def between(self, first: int, last: int) -> tuple[Array, Array]:
-        """Operators (k, rows, columns) and strips (k, strips, 2) at the grid times first..last - 1."""
+        """Operators (k, rows, columns) and strips (k, strips, 3) at the grid times first..last - 1."""
         nodes = self.matrices.shape[0]
         position = self.position[first:last]
         if nodes == 1:

@@ -118,8 +118,9 @@ def lane_product(matrix, inputs, outputs):
 def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench):
     """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, and profile drag.
 
-    ``strips`` (n, 2): trailing edge x and circulation centre x of each strip from the link axis, m. ``sums``:
-    13 scratch rows. Profile drag is quadratic in the velocity at the link's centre of drag area.
+    ``strips`` (n, 3): trailing edge x and circulation centre x of each strip from the link axis, m, and the
+    slope dx/dy of the trailing edge. ``sums``: 13 scratch rows. Profile drag is quadratic in the velocity at
+    the link's centre of drag area.
     """
     if not_in_lanes(overlap) or not_in_lanes(outputs) or not_in_lanes(link) or not_in_lanes(twist):
         return
@@ -130,6 +131,7 @@ def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero,
         for l in range(LANES):
             row[l] = 0.0
     number = surface[LINK0] + k
+    slope = strips[surface[STRIP0], 2]  # one for the whole surface: taper is linear
     for j in range(ranges[number, 0], ranges[number, 1]):
         pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
         part = overlap[pair : pair + 2]
@@ -157,12 +159,19 @@ def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero,
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
         ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
         g0, g1, g2 = sums[0, l], sums[1, l], sums[2, l]
-        lift = ux * g0 - wz * g1
+        # a slanted trailing edge cuts spanwise air too; its slope times chord times yaw rate is left out
+        vy_slope = uy * slope
+        wz_slope = wz * slope
+        lift = ux * g0 - wz * g1 - vy_slope * g0 - wz_slope * sums[3, l]
         fz = -density * lift
         fx = density * (uz * g0 + wx * g1 - wy * sums[8, l] - sums[10, l])
         fy = density * (sums[5, l] * wx - sums[12, l])
-        mx = -density * (sums[5, l] * uy + sums[7, l] * wz + ux * g1 - wz * g2)
-        my = density * (sums[5, l] * ux - sums[6, l] * wz + ux * sums[3, l] - wz * sums[4, l])
+        mx = -density * (
+            sums[5, l] * uy + sums[7, l] * wz + ux * g1 - wz * g2 - vy_slope * g1 - wz_slope * sums[4, l]
+        )
+        my = density * (
+            sums[5, l] * ux - sums[6, l] * wz + ux * sums[3, l] - wz * sums[4, l] - vy_slope * sums[3, l]
+        )
         mz = -density * (uz * g1 + wx * g2 - wy * sums[9, l] - sums[11, l])
         my -= aero[1, l] * fz
         mz += aero[1, l] * fy

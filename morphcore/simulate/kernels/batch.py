@@ -21,7 +21,7 @@ def fly(
     Parameters (b blocks, g groups, t steps, s surfaces, n links, j strips)
     ----------
     surfaces : (s, 5); ranges : (b, n, 2); shared : (23,);
-    strips : (t + 1, j, 2); hinges : (t + 1, s, HINGE_ROWS); hinge_accelerations : (t, s); operators : (t + 1,
+    strips : (t + 1, j, 3); hinges : (t + 1, s, HINGE_ROWS); hinge_accelerations : (t, s); operators : (t + 1,
     rows, columns); wind : (t + 1, 3).
     constants : (b, rows, LANES). step : s. state : (b, rows, LANES), advanced in place.
     work : (g, 3, rows, LANES); scratch : (g, rows, LANES); inputs : (g, columns, LANES); outputs : (g, rows,
