@@ -132,7 +132,7 @@ def state_rates(
     count = blocks.shape[0]
     rows, columns = model.lattice.operator_shape
     operators, strips = plan.table.between(row, row + 1)
-    rates = np.empty_like(blocks)
+    rates = np.zeros_like(blocks)  # stays zero for the lag states
     rates_of_blocks(
         model.surfaces, constants.ranges, shared_numbers(model), strips,
         plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1],
