@@ -127,15 +127,14 @@ def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Arra
     total: Array = np.zeros((6, 6))
     for i in range(SLICES):
         centre = origin_W + np.array([from_axis, surface.span_sign * (stations[i] - start_m), 0.0])
-        total = total + lengths[i] * spatial_inertia(
-            float(section.mass[i]), centre, np.diag(about_centres[i])
-        )
+        total += lengths[i] * spatial_inertia(float(section.mass[i]), centre, np.diag(about_centres[i]))
     return np.asarray(total)
 
 
 def _root(surface: Surface) -> Array:
     """The elastic axis at the undeflected surface's root, (3,) in B, m."""
-    return np.array(surface.position_m) + np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+    x, y, z = surface.position_m
+    return np.array([x + surface.elastic_axis_offset_m, y, z])
 
 
 def _pivot(surface: Surface) -> Array:
