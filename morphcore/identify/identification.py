@@ -22,6 +22,7 @@ from morphcore.identify.swarm import first_swarm, next_swarm
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -120,7 +121,8 @@ class Identification:
         state = decode(checkpoint) if checkpoint is not None else None
         while state is None or state.phase != "done":
             begin = self._clock()
-            state = self._baseline(stop) if state is None else self._advance(state, stop)
+            with one_blas_thread():
+                state = self._baseline(stop) if state is None else self._advance(state, stop)
             state = replace(state, wall_s=state.wall_s + self._clock() - begin)
             if self.search.max_seconds is not None and state.wall_s >= self.search.max_seconds:
                 state = replace(state, phase="done")
@@ -128,11 +130,13 @@ class Identification:
 
     def result(self, checkpoint: bytes) -> IdentifyResult:
         """The identified model at any step, with its fit, uncertainty and cost."""
-        return identify_result(self, decode(checkpoint))
+        with one_blas_thread():
+            return identify_result(self, decode(checkpoint))
 
     def best_so_far(self, checkpoint: bytes) -> IdentifyResult:
         """Give the result without uncertainty and timing, fast: someone waits for a cancelled search."""
-        return identify_result(self, decode(checkpoint), judged=False)
+        with one_blas_thread():
+            return identify_result(self, decode(checkpoint), judged=False)
 
     # one step each
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -280,3 +283,27 @@ def test_a_damaged_checkpoint_is_refused() -> None:
 def test_examples_are_what_the_tests_read() -> None:
     """The example flights stand where the documents say."""
     assert (EXAMPLES / "aircraft.json").exists()
+
+
+def test_the_number_of_threads_does_not_change_the_answer() -> None:
+    """One or two threads, of kernels and of linear algebra, give the same model and fit, to the bit."""
+    code = (
+        "import json;"
+        "from morphcore.identify import identification_from_document as begin;"
+        "from tests.identification_request import identification as ask;"
+        "run = begin(ask('train_rate_0.8', links=2, search={'particles': 24, 'generations': 3}), {threads});"
+        "*_, step = run.steps(); found = run.result(step.checkpoint).to_document();"
+        "print(json.dumps([found['model'], found['fit']]))"
+    )
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", code.replace("{threads}", threads)],
+            cwd=EXAMPLES.parent,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": threads, "NUMBA_NUM_THREADS": threads},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in ("1", "2")
+    ]
+    assert answers[0] == answers[1]
