@@ -12,9 +12,9 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.lanes import LANES
-from morphcore.models.kernels.chain import AERO_C, FORCE_C, LINKS_C
+from morphcore.models.kernels.layout import AERO_C, FORCE_C, LINKS_C, joint_rows_of_scratch, state_rows
 from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
-from morphcore.multibody.kernels.aba import LINK_ROWS
+from morphcore.multibody.kernels.articulated import LINK_ROWS
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -89,7 +89,12 @@ class ChainModel:
     @property
     def state_rows(self) -> int:
         """Rows of a state: 13 of the fuselage, angles and rates of the joints, nine of lag a link."""
-        return 13 + 2 * self.coordinates + 9 * self.links
+        return int(state_rows(self.links, self.coordinates)[-1])
+
+    @property
+    def scratch_rows(self) -> int:
+        """Rows of a block's scratch."""
+        return int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
 
     @property
     def relative_chord(self) -> Array:

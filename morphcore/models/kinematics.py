@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges
-from morphcore.multibody.kernels.aba import H_ORIGIN
+from morphcore.multibody.kernels.hinge import H_ORIGIN
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from morphcore.lanes import LANES
 from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
-from morphcore.models.kernels.chain import JOINTS, scratch_rows
+from morphcore.models.kernels.layout import JOINTS
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
 
@@ -105,7 +105,7 @@ def fly_batch(
     groups = max(-(-count // BLOCKS_PER_GROUP), min(count, threads))
     rows, columns = model.lattice.operator_shape
     work = np.zeros((groups, 3, model.state_rows, LANES))
-    scratch = np.zeros((groups, scratch_rows(model.links, model.coordinates), LANES))
+    scratch = np.zeros((groups, model.scratch_rows, LANES))
     inputs, outputs = np.zeros((groups, columns, LANES)), np.zeros((groups, rows, LANES))
     shared = shared_numbers(model)
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
@@ -137,7 +137,7 @@ def state_rates(
         model.surfaces, constants.ranges, shared_numbers(model), strips,
         plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1],
         constants.rows, np.zeros((model.state_rows, LANES)), blocks, np.zeros((count,
-        scratch_rows(model.links, model.coordinates), LANES)), np.zeros((count, columns, LANES)),
+        model.scratch_rows, LANES)), np.zeros((count, columns, LANES)),
         np.zeros((count, rows, LANES)), rates,
     )  # fmt: skip
     return from_lanes(rates, state.shape[0])

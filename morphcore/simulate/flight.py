@@ -22,9 +22,9 @@ from morphcore.models.equivalent import (
     lane_constants,
     physical_guess,
 )
-from morphcore.models.kernels.chain import JOINTS, OMEGA, POSITION, VELOCITY
+from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
 from morphcore.models.kinematics import tip_positions
-from morphcore.multibody.kernels.aba import HINGE_ROWS
+from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule, Tabulated

@@ -12,7 +12,7 @@ from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.frames import axis_rotation
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
-from morphcore.multibody.kernels.aba import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
 from morphcore.simulate.kernels.interpolate import blend
 from morphcore.simulate.schedule import Schedule
 
@@ -146,7 +146,7 @@ def flight_plan(
 
 
 def _hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
-    """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/aba.py."""
+    """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/hinge.py."""
     rows = np.zeros((angle.size, HINGE_ROWS))
     axis_offset = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
     root = np.array(surface.position_m)

@@ -18,7 +18,7 @@ from morphcore.models.equivalent import (
     lane_constants,
     to_lanes,
 )
-from morphcore.models.kernels.chain import FORCE_C, JOINTS, OMEGA
+from morphcore.models.kernels.layout import FORCE_C, JOINTS, OMEGA
 from morphcore.models.kinematics import link_poses
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.plan import FlightPlan

@@ -12,7 +12,8 @@ from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_nor
 from morphcore.geometry.lattice import surface_pose
 from morphcore.lanes import LANES
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants, to_lanes
-from morphcore.models.kernels.chain import S_FREE, accelerations, scratch_rows
+from morphcore.models.kernels.chain import accelerations
+from morphcore.models.kernels.layout import S_FREE
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.plan import FlightPlan
 
@@ -32,7 +33,7 @@ def lane_loads(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, state
     constants: LaneConstants = lane_constants(model, batch, plan.grid.step_s)
     operators, strips = plan.table.between(0, 1)
     rows, columns = model.lattice.operator_shape
-    scratch = np.zeros((scratch_rows(model.links, model.coordinates), LANES))
+    scratch = np.zeros((model.scratch_rows, LANES))
     accelerations(
         model.surfaces, constants.ranges[0], shared_numbers(model), strips[0], plan.hinges[0],
         plan.accelerations[0], operators[0], plan.wind_N[0], constants.rows[0], to_lanes(state[None])[0],

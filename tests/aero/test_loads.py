@@ -10,7 +10,7 @@ import pytest
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2, JONES_MEAN_LAG, lagged_motion
 from morphcore.lanes import LANES
 from morphcore.models.equivalent import chain_model, lag_weights, lane_constants, physical_guess
-from morphcore.multibody.kernels.aba import LINK_ROWS
+from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import lag_advance
 from morphcore.simulate.plan import STEP_S, flight_plan

@@ -14,7 +14,7 @@ import pytest
 
 from morphcore.lanes import LANES
 from morphcore.models.equivalent import lane_constants
-from morphcore.models.kernels.chain import JOINTS
+from morphcore.models.kernels.layout import JOINTS
 from morphcore.models.tree import chain_tree, link_bodies, link_ends
 from morphcore.multibody.dynamics import body_poses, body_twists, forward_dynamics_crba
 from morphcore.simulate.batch import state_rates

@@ -1,8 +1,7 @@
 """Accelerations of the equivalent model's tree: a fuselage with chains of links on hinges, over lanes.
 
-This file fixes how a lane's state, constants and scratch are laid out in rows, and strings the passes
-together: twists from root to tips, air loads, articulated inertias from tips to root, accelerations from root
-to tips.
+Strings the passes together: twists from root to tips, air loads, articulated inertias from tips to root,
+accelerations from root to tips. The rows are those of layout.py.
 """
 
 from __future__ import annotations
@@ -10,40 +9,34 @@ from __future__ import annotations
 from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
 from morphcore.jit import kernel
 from morphcore.lanes import LANES, not_in_lanes
-from morphcore.multibody.kernels.aba import (
+from morphcore.models.kernels.layout import (
+    AERO_C,
+    DENSITY,
+    FUSELAGE,
+    GRAVITY,
+    LINKS_C,
+    S_BASE_ACCELERATION,
+    S_BASE_FORCE,
+    S_BASE_INERTIA,
+    S_CARRIED,
+    S_FACTOR,
+    S_INERTIA,
+    S_SUMS,
+    S_TWIST,
+    constant_rows,
+    joint_rows_of_scratch,
+    link_rows_of_scratch,
+    state_rows,
+)
+from morphcore.multibody.kernels.articulated import LINK_ROWS, accumulate, add_bias, add_link, solve_base
+from morphcore.multibody.kernels.gimbal import (
     JOINT_ROWS,
-    LINK_ROWS,
-    accumulate,
-    add_bias,
-    add_link,
     carry_through_gimbal,
-    carry_through_hinge,
     eliminate_gimbal,
     gimbal_acceleration,
     gimbal_twist,
-    hinge_acceleration,
-    hinge_twist,
-    solve_base,
 )
-
-# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates,
-# and for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones
-# first)
-OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
-# rows of a lane's constants: force and moment in B, then aero (2), links, stiffness, damping, overlap
-FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 8
-# rows of the scratch block before the per-link and per-joint ones
-S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
-S_INERTIA, S_CARRIED, S_FACTOR, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 87, 100, 103, 106
-PER_LINK = 6 + 6 + 6 + 6 + 3  # twist, wrench, bias of a first link, acceleration, effective motion
-PER_COORDINATE = 3  # joint force, added diagonal, joint acceleration
-# indices of the shared numbers
-DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
-
-
-def scratch_rows(links: int, coordinates: int) -> int:
-    """Rows of a block's scratch for a tree of so many links and free coordinates."""
-    return S_FREE + PER_LINK * links + PER_COORDINATE * coordinates + JOINT_ROWS * coordinates // 3
+from morphcore.multibody.kernels.hinge import carry_through_hinge, hinge_acceleration, hinge_twist
 
 
 @kernel
@@ -128,21 +121,10 @@ def accelerations(
     links = ranges.shape[0]
     joints = links - surfaces.shape[0]
     coordinates = 3 * joints
-    w_twist = S_FREE
-    w_wrench = w_twist + 6 * links
-    w_bias = w_wrench + 6 * links
-    w_acceleration = w_bias + 6 * links
-    w_effective = w_acceleration + 6 * links
-    w_tau = w_effective + 3 * links
-    w_added = w_tau + coordinates
-    w_joint_acceleration = w_added + coordinates
-    w_joint = w_joint_acceleration + coordinates
-    s_q = JOINTS
-    s_v = s_q + coordinates
-    s_slow = s_v + coordinates
-    s_fast = s_slow + 3 * links
-    s_previous = s_fast + 3 * links
-    c_overlap = LINKS_C + LINK_ROWS * links + 2 * coordinates
+    w_twist, w_wrench, w_bias, _, w_effective = link_rows_of_scratch(links)
+    _, _, _, w_joint, _ = joint_rows_of_scratch(links, coordinates)
+    s_q, s_v, s_slow, s_fast, s_previous, _ = state_rows(links, coordinates)
+    _, _, c_overlap = constant_rows(links, coordinates)
     overlap = constants[c_overlap:]
     aero = constants[AERO_C : AERO_C + 2]
     density = shared[DENSITY]
@@ -210,14 +192,8 @@ def accelerations(
 @kernel
 def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates):
     """Articulated-body pass over the twists, wrenches and joint forces in the scratch block."""
-    w_twist = S_FREE
-    w_wrench = w_twist + 6 * links
-    w_bias = w_wrench + 6 * links
-    w_acceleration = w_bias + 6 * links
-    w_tau = w_acceleration + 6 * links + 3 * links
-    w_added = w_tau + coordinates
-    w_joint_acceleration = w_added + coordinates
-    w_joint = w_joint_acceleration + coordinates
+    w_twist, w_wrench, w_bias, w_acceleration, _ = link_rows_of_scratch(links)
+    w_tau, w_added, w_joint_acceleration, w_joint, _ = joint_rows_of_scratch(links, coordinates)
     base_inertia = scratch[S_BASE_INERTIA : S_BASE_INERTIA + 21]
     base_force = scratch[S_BASE_FORCE : S_BASE_FORCE + 6]
     base_acceleration = scratch[S_BASE_ACCELERATION : S_BASE_ACCELERATION + 6]

@@ -26,16 +26,16 @@ import math
 
 from morphcore.jit import kernel
 from morphcore.lanes import LANES, not_in_lanes
-from morphcore.models.kernels.chain import (
+from morphcore.models.kernels.chain import accelerations, base_rates, clear
+from morphcore.models.kernels.layout import (
     JOINTS,
     LINKS_C,
-    PER_LINK,
     S_FREE,
-    accelerations,
-    base_rates,
-    clear,
+    constant_rows,
+    joint_rows_of_scratch,
+    state_rows,
 )
-from morphcore.multibody.kernels.aba import LINK_ROWS
+from morphcore.multibody.kernels.articulated import LINK_ROWS
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -135,12 +135,8 @@ def stage(
     """Rates k of one stage of the W-method; ``first`` is zero in stage 1 and k1 in stage 2."""
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
-    w_tau = S_FREE + PER_LINK * links
-    w_added = w_tau + coordinates
-    w_joint_acceleration = w_added + coordinates
-    s_q = JOINTS
-    s_v = s_q + coordinates
-    s_slow = s_v + coordinates
+    _, _, w_joint_acceleration, _, _ = joint_rows_of_scratch(links, coordinates)
+    s_q, s_v, s_slow, _, _, _ = state_rows(links, coordinates)
     accelerations(
         surfaces,
         ranges,
@@ -180,14 +176,11 @@ def step_block(
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
-    w_tau = S_FREE + PER_LINK * links
-    w_added = w_tau + coordinates
-    s_q = JOINTS
-    s_v = s_q + coordinates
-    s_slow = s_v + coordinates
-    c_stiffness = LINKS_C + LINK_ROWS * links
+    w_tau, w_added, _, _, _ = joint_rows_of_scratch(links, coordinates)
+    s_q, s_v, s_slow, s_fast, s_previous, _ = state_rows(links, coordinates)
+    c_stiffness, c_damping, _ = constant_rows(links, coordinates)
     stiffness = constants[c_stiffness : c_stiffness + coordinates]
-    damping = constants[c_stiffness + coordinates : c_stiffness + 2 * coordinates]
+    damping = constants[c_damping : c_damping + coordinates]
     tau, added = scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates]
 
     joint_forces(stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
@@ -198,7 +191,7 @@ def step_block(
     )  # fmt: skip
     advance(state[:s_slow], first[:s_slow], step, middle[:s_slow])
     for link in range(links):
-        slow, fast, previous = s_slow + 3 * link, s_slow + 3 * (links + link), s_slow + 3 * (2 * links + link)
+        slow, fast, previous = s_slow + 3 * link, s_fast + 3 * link, s_previous + 3 * link
         lag_advance(
             constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * (link + 1)],
             scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6],
@@ -234,15 +227,12 @@ def instant_rates(
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
-    w_tau = S_FREE + PER_LINK * links
-    w_added = w_tau + coordinates
-    s_q = JOINTS
-    s_v = s_q + coordinates
-    s_slow = s_v + coordinates
-    c_stiffness = LINKS_C + LINK_ROWS * links
+    w_tau, w_added, _, _, _ = joint_rows_of_scratch(links, coordinates)
+    s_q, s_v, s_slow, _, _, _ = state_rows(links, coordinates)
+    c_stiffness, c_damping, _ = constant_rows(links, coordinates)
     joint_forces(
         constants[c_stiffness : c_stiffness + coordinates],
-        constants[c_stiffness + coordinates : c_stiffness + 2 * coordinates],
+        constants[c_damping : c_damping + coordinates],
         state[s_q:s_v], state[s_v:s_slow], 0.0,
         scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
     )  # fmt: skip

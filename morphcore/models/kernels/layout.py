@@ -1,0 +1,54 @@
+"""How a lane's state, constants and scratch are laid out in rows."""
+
+from __future__ import annotations
+
+from morphcore.jit import inlined
+from morphcore.multibody.kernels.articulated import LINK_ROWS
+from morphcore.multibody.kernels.gimbal import JOINT_ROWS
+
+# rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates,
+# and for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones
+# first)
+OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
+# rows of a lane's constants: force and moment in B, then aero (2), links, stiffness, damping, overlap
+FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 8
+# rows of the scratch block before the per-link and per-joint ones
+S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
+S_INERTIA, S_CARRIED, S_FACTOR, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 87, 100, 103, 106
+# indices of the shared numbers
+DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
+
+
+@inlined
+def state_rows(links: int, coordinates: int) -> tuple[int, int, int, int, int, int]:
+    """First rows of joint angles and rates, slow and fast lag, followed motion; and the state's end."""
+    rates = JOINTS + coordinates
+    slow = rates + coordinates
+    return JOINTS, rates, slow, slow + 3 * links, slow + 6 * links, slow + 9 * links
+
+
+@inlined
+def constant_rows(links: int, coordinates: int) -> tuple[int, int, int]:
+    """First rows of stiffness, damping and overlap among a lane's constants."""
+    stiffness = LINKS_C + LINK_ROWS * links
+    return stiffness, stiffness + coordinates, stiffness + 2 * coordinates
+
+
+@inlined
+def link_rows_of_scratch(links: int) -> tuple[int, int, int, int, int]:
+    """First scratch rows of the links' twists, wrenches, biases, accelerations and effective motions."""
+    return S_FREE, S_FREE + 6 * links, S_FREE + 12 * links, S_FREE + 18 * links, S_FREE + 24 * links
+
+
+@inlined
+def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int, int]:
+    """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the scratch's end."""
+    first = S_FREE + 27 * links
+    gimbals = first + 3 * coordinates
+    return (
+        first,
+        first + coordinates,
+        first + 2 * coordinates,
+        gimbals,
+        gimbals + JOINT_ROWS * (coordinates // 3),
+    )

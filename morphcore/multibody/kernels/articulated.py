@@ -1,0 +1,280 @@
+"""Articulated bodies over lanes: what links, gimbals and hinges have in common.
+
+Featherstone (2008), table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics), with the three
+revolutes of a gimbal joined into one joint of three degrees of freedom, which is the same by elimination of
+its massless frames.
+
+Rows of the lane arrays ((rows, LANES), see lanes.py):
+
+- twist, spatial acceleration, wrench, bias force: 6 rows, angular part first, in link axes at the link's
+  origin;
+- inertia: 21 rows: angular block A (00 01 02 11 12 22), coupling block B (row by row, 9), linear block L (as
+  A).
+"""
+
+from __future__ import annotations
+
+from morphcore.jit import inlined, kernel
+from morphcore.lanes import LANES, not_in_lanes
+
+# mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area, weights of the lag (4)
+LINK_ROWS = 14
+
+
+@inlined
+def congruence(r00, r01, r02, r10, r11, r12, r20, r21, r22, a00, a01, a02, a11, a12, a22):
+    """R A R^T of a symmetric A: its six distinct elements."""
+    t00, t01, t02 = (
+        r00 * a00 + r01 * a01 + r02 * a02,
+        r00 * a01 + r01 * a11 + r02 * a12,
+        r00 * a02 + r01 * a12 + r02 * a22,
+    )
+    t10, t11, t12 = (
+        r10 * a00 + r11 * a01 + r12 * a02,
+        r10 * a01 + r11 * a11 + r12 * a12,
+        r10 * a02 + r11 * a12 + r12 * a22,
+    )
+    t20, t21, t22 = (
+        r20 * a00 + r21 * a01 + r22 * a02,
+        r20 * a01 + r21 * a11 + r22 * a12,
+        r20 * a02 + r21 * a12 + r22 * a22,
+    )
+    return (
+        t00 * r00 + t01 * r01 + t02 * r02,
+        t00 * r10 + t01 * r11 + t02 * r12,
+        t00 * r20 + t01 * r21 + t02 * r22,
+        t10 * r10 + t11 * r11 + t12 * r12,
+        t10 * r20 + t11 * r21 + t12 * r22,
+        t20 * r20 + t21 * r21 + t22 * r22,
+    )
+
+
+@inlined
+def rotated_block(r00, r01, r02, r10, r11, r12, r20, r21, r22, b0, b1, b2, b3, b4, b5, b6, b7, b8):
+    """R B R^T of a general 3 x 3 B, row by row."""
+    t00, t01, t02 = (
+        r00 * b0 + r01 * b3 + r02 * b6,
+        r00 * b1 + r01 * b4 + r02 * b7,
+        r00 * b2 + r01 * b5 + r02 * b8,
+    )
+    t10, t11, t12 = (
+        r10 * b0 + r11 * b3 + r12 * b6,
+        r10 * b1 + r11 * b4 + r12 * b7,
+        r10 * b2 + r11 * b5 + r12 * b8,
+    )
+    t20, t21, t22 = (
+        r20 * b0 + r21 * b3 + r22 * b6,
+        r20 * b1 + r21 * b4 + r22 * b7,
+        r20 * b2 + r21 * b5 + r22 * b8,
+    )
+    return (
+        t00 * r00 + t01 * r01 + t02 * r02, t00 * r10 + t01 * r11 + t02 * r12, t00 * r20 + t01 * r21 + t02 *
+        r22, t10 * r00 + t11 * r01 + t12 * r02, t10 * r10 + t11 * r11 + t12 * r12, t10 * r20 + t11 * r21 + t12
+        * r22, t20 * r00 + t21 * r01 + t22 * r02, t20 * r10 + t21 * r11 + t22 * r12, t20 * r20 + t21 * r21 +
+        t22 * r22,
+    )  # fmt: skip
+
+
+@inlined
+def shifted_inertia(
+    px, py, pz, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, b6, b7, b8, l0, l1, l2, l3, l4, l5
+):
+    """Blocks A and B of an articulated inertia moved from a point at p to the origin; L stays.
+
+    B' = B + p x L; A' = A - B [p x] + [p x] B'^T; Featherstone (2008), table 2.1 applied to I' = X^T I X.
+    """
+    n0, n1, n2 = b0 + py * l2 - pz * l1, b1 + py * l4 - pz * l3, b2 + py * l5 - pz * l4
+    n3, n4, n5 = b3 + pz * l0 - px * l2, b4 + pz * l1 - px * l4, b5 + pz * l2 - px * l5
+    n6, n7, n8 = b6 + px * l1 - py * l0, b7 + px * l3 - py * l1, b8 + px * l4 - py * l2
+    return (
+        a0 + py * (b2 + n2) - pz * (b1 + n1),
+        a1 + pz * b0 - px * b2 + py * n5 - pz * n4,
+        a2 + px * b1 - py * b0 + py * n8 - pz * n7,
+        a3 + pz * (b3 + n3) - px * (b5 + n5),
+        a4 + px * b4 - py * b3 + pz * n6 - px * n8,
+        a5 + px * (b7 + n7) - py * (b6 + n6),
+        n0, n1, n2, n3, n4, n5, n6, n7, n8,
+    )  # fmt: skip
+
+
+@inlined
+def carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l):
+    """Rotate by R and move by p the articulated inertia and force of one lane, in place."""
+    a0, a1, a2, a3, a4, a5 = congruence(
+        r00, r01, r02, r10, r11, r12, r20, r21, r22,
+        inertia[0, l], inertia[1, l], inertia[2, l], inertia[3, l], inertia[4, l], inertia[5, l],
+    )  # fmt: skip
+    b0, b1, b2, b3, b4, b5, b6, b7, b8 = rotated_block(
+        r00, r01, r02, r10, r11, r12, r20, r21, r22,
+        inertia[6, l], inertia[7, l], inertia[8, l], inertia[9, l], inertia[10, l], inertia[11, l],
+        inertia[12, l], inertia[13, l], inertia[14, l],
+    )  # fmt: skip
+    l0, l1, l2, l3, l4, l5 = congruence(
+        r00, r01, r02, r10, r11, r12, r20, r21, r22,
+        inertia[15, l], inertia[16, l], inertia[17, l], inertia[18, l], inertia[19, l], inertia[20, l],
+    )  # fmt: skip
+    a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, b6, b7, b8 = shifted_inertia(
+        px, py, pz, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, b6, b7, b8, l0, l1, l2, l3, l4, l5
+    )
+    inertia[0, l], inertia[1, l], inertia[2, l] = a0, a1, a2
+    inertia[3, l], inertia[4, l], inertia[5, l] = a3, a4, a5
+    inertia[6, l], inertia[7, l], inertia[8, l] = b0, b1, b2
+    inertia[9, l], inertia[10, l], inertia[11, l] = b3, b4, b5
+    inertia[12, l], inertia[13, l], inertia[14, l] = b6, b7, b8
+    inertia[15, l], inertia[16, l], inertia[17, l] = l0, l1, l2
+    inertia[18, l], inertia[19, l], inertia[20, l] = l3, l4, l5
+    m0, m1, m2 = force[0, l], force[1, l], force[2, l]
+    f0, f1, f2 = force[3, l], force[4, l], force[5, l]
+    g0 = r00 * f0 + r01 * f1 + r02 * f2
+    g1 = r10 * f0 + r11 * f1 + r12 * f2
+    g2 = r20 * f0 + r21 * f1 + r22 * f2
+    force[0, l] = r00 * m0 + r01 * m1 + r02 * m2 + py * g2 - pz * g1
+    force[1, l] = r10 * m0 + r11 * m1 + r12 * m2 + pz * g0 - px * g2
+    force[2, l] = r20 * m0 + r21 * m1 + r22 * m2 + px * g1 - py * g0
+    force[3, l], force[4, l], force[5, l] = g0, g1, g2
+
+
+@kernel
+def add_link(link, twist, wrench, inertia, force):
+    """Add a flat link's rigid inertia and its bias force v x* I v - wrench to what it carries already."""
+    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(wrench):
+        return
+    if not_in_lanes(inertia) or not_in_lanes(force):
+        return
+    for l in range(LANES):
+        m, mx, my = link[0, l], link[1, l], link[2, l]
+        ixx, iyy, izz, ixy = link[3, l], link[4, l], link[5, l], link[6, l]
+        wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
+        ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
+        inertia[0, l] += ixx
+        inertia[1, l] += ixy
+        inertia[3, l] += iyy
+        inertia[5, l] += izz
+        inertia[8, l] += my
+        inertia[11, l] -= mx
+        inertia[12, l] -= my
+        inertia[13, l] += mx
+        inertia[15, l] += m
+        inertia[18, l] += m
+        inertia[20, l] += m
+        # momentum at the origin: angular (hx, hy, hz), linear (gx, gy, gz)
+        hx = ixx * wx + ixy * wy + my * uz
+        hy = ixy * wx + iyy * wy - mx * uz
+        hz = izz * wz + mx * uy - my * ux
+        gx = m * ux - my * wz
+        gy = m * uy + mx * wz
+        gz = m * uz + my * wx - mx * wy
+        force[0, l] += wy * hz - wz * hy + uy * gz - uz * gy - wrench[0, l]
+        force[1, l] += wz * hx - wx * hz + uz * gx - ux * gz - wrench[1, l]
+        force[2, l] += wx * hy - wy * hx + ux * gy - uy * gx - wrench[2, l]
+        force[3, l] += wy * gz - wz * gy - wrench[3, l]
+        force[4, l] += wz * gx - wx * gz - wrench[4, l]
+        force[5, l] += wx * gy - wy * gx - wrench[5, l]
+
+
+@kernel
+def add_bias(inertia, bias, force):
+    """force += I c."""
+    if not_in_lanes(inertia) or not_in_lanes(bias) or not_in_lanes(force):
+        return
+    for l in range(LANES):
+        a0, a1, a2, b0, b1, b2 = bias[0, l], bias[1, l], bias[2, l], bias[3, l], bias[4, l], bias[5, l]
+        force[0, l] += (
+            inertia[0, l] * a0 + inertia[1, l] * a1 + inertia[2, l] * a2
+            + inertia[6, l] * b0 + inertia[7, l] * b1 + inertia[8, l] * b2
+        )  # fmt: skip
+        force[1, l] += (
+            inertia[1, l] * a0 + inertia[3, l] * a1 + inertia[4, l] * a2
+            + inertia[9, l] * b0 + inertia[10, l] * b1 + inertia[11, l] * b2
+        )  # fmt: skip
+        force[2, l] += (
+            inertia[2, l] * a0 + inertia[4, l] * a1 + inertia[5, l] * a2
+            + inertia[12, l] * b0 + inertia[13, l] * b1 + inertia[14, l] * b2
+        )  # fmt: skip
+        force[3, l] += (
+            inertia[6, l] * a0 + inertia[9, l] * a1 + inertia[12, l] * a2
+            + inertia[15, l] * b0 + inertia[16, l] * b1 + inertia[17, l] * b2
+        )  # fmt: skip
+        force[4, l] += (
+            inertia[7, l] * a0 + inertia[10, l] * a1 + inertia[13, l] * a2
+            + inertia[16, l] * b0 + inertia[18, l] * b1 + inertia[19, l] * b2
+        )  # fmt: skip
+        force[5, l] += (
+            inertia[8, l] * a0 + inertia[11, l] * a1 + inertia[14, l] * a2
+            + inertia[17, l] * b0 + inertia[19, l] * b1 + inertia[20, l] * b2
+        )  # fmt: skip
+
+
+@kernel
+def accumulate(inertia, force, total_inertia, total_force):
+    """Add a surface's articulated inertia and force to the fuselage's."""
+    if (
+        not_in_lanes(inertia)
+        or not_in_lanes(force)
+        or not_in_lanes(total_inertia)
+        or not_in_lanes(total_force)
+    ):
+        return
+    for i in range(21):
+        for l in range(LANES):
+            total_inertia[i, l] += inertia[i, l]
+    for i in range(6):
+        for l in range(LANES):
+            total_force[i, l] += force[i, l]
+
+
+@kernel
+def solve_base(inertia, force, factor, acceleration):
+    """Base acceleration from I a = -p, by L D L^T; ``factor`` holds 21 scratch rows."""
+    if not_in_lanes(inertia) or not_in_lanes(force) or not_in_lanes(factor) or not_in_lanes(acceleration):
+        return
+    for l in range(LANES):  # into the lower triangle, row by row
+        factor[0, l] = inertia[0, l]
+        factor[1, l], factor[2, l] = inertia[1, l], inertia[3, l]
+        factor[3, l], factor[4, l], factor[5, l] = inertia[2, l], inertia[4, l], inertia[5, l]
+        factor[6, l], factor[7, l], factor[8, l] = inertia[6, l], inertia[9, l], inertia[12, l]
+        factor[9, l] = inertia[15, l]
+        factor[10, l], factor[11, l], factor[12, l] = inertia[7, l], inertia[10, l], inertia[13, l]
+        factor[13, l], factor[14, l] = inertia[16, l], inertia[18, l]
+        factor[15, l], factor[16, l], factor[17, l] = inertia[8, l], inertia[11, l], inertia[14, l]
+        factor[18, l], factor[19, l], factor[20, l] = inertia[17, l], inertia[19, l], inertia[20, l]
+    for i in range(6):
+        row = i * (i + 1) // 2
+        for j in range(i):
+            col = j * (j + 1) // 2
+            for k in range(j):
+                a, b = factor[row + k], factor[col + k]
+                d = factor[k * (k + 1) // 2 + k]
+                c = factor[row + j]
+                for l in range(LANES):
+                    c[l] -= a[l] * b[l] * d[l]
+            c = factor[row + j]
+            d = factor[col + j]
+            for l in range(LANES):
+                c[l] /= d[l]
+        e = factor[row + i]
+        for k in range(i):
+            a = factor[row + k]
+            d = factor[k * (k + 1) // 2 + k]
+            for l in range(LANES):
+                e[l] -= a[l] * a[l] * d[l]
+    for i in range(6):
+        row = i * (i + 1) // 2
+        x = acceleration[i]
+        p = force[i]
+        for l in range(LANES):
+            x[l] = -p[l]
+        for k in range(i):
+            a, y = factor[row + k], acceleration[k]
+            for l in range(LANES):
+                x[l] -= a[l] * y[l]
+    for i in range(6):
+        d, x = factor[i * (i + 1) // 2 + i], acceleration[i]
+        for l in range(LANES):
+            x[l] /= d[l]
+    for i in range(5, -1, -1):
+        x = acceleration[i]
+        for k in range(i + 1, 6):
+            a, y = factor[k * (k + 1) // 2 + i], acceleration[k]
+            for l in range(LANES):
+                x[l] -= a[l] * y[l]

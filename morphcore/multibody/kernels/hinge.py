@@ -1,0 +1,81 @@
+"""Hinges of prescribed motion in the articulated-body pass (Featherstone 2008, section 9.2)."""
+
+from __future__ import annotations
+
+from morphcore.jit import kernel
+from morphcore.lanes import LANES, not_in_lanes
+from morphcore.multibody.kernels.articulated import carry_lane
+
+# rotation W -> B (9), motion subspace S of the hinge in W (6), rate, origin of the first link in B (3)
+HINGE_ROWS = 19
+H_SUBSPACE, H_RATE, H_ORIGIN = 9, 15, 16
+
+
+@kernel
+def hinge_twist(twist_base, hinge, acceleration, twist, bias):
+    """Twist of a surface's first link and its acceleration but for the base's: hinge motion is prescribed."""
+    if not_in_lanes(twist_base) or not_in_lanes(twist) or not_in_lanes(bias):
+        return
+    r00, r01, r02 = hinge[0], hinge[1], hinge[2]
+    r10, r11, r12 = hinge[3], hinge[4], hinge[5]
+    r20, r21, r22 = hinge[6], hinge[7], hinge[8]
+    rate = hinge[15]
+    jx, jy, jz = hinge[9] * rate, hinge[10] * rate, hinge[11] * rate
+    kx, ky, kz = hinge[12] * rate, hinge[13] * rate, hinge[14] * rate
+    ex, ey, ez = hinge[9] * acceleration, hinge[10] * acceleration, hinge[11] * acceleration
+    fx, fy, fz = hinge[12] * acceleration, hinge[13] * acceleration, hinge[14] * acceleration
+    px, py, pz = hinge[16], hinge[17], hinge[18]
+    for l in range(LANES):
+        ax, ay, az = twist_base[0, l], twist_base[1, l], twist_base[2, l]
+        bx = twist_base[3, l] + ay * pz - az * py
+        by = twist_base[4, l] + az * px - ax * pz
+        bz = twist_base[5, l] + ax * py - ay * px
+        wx = r00 * ax + r10 * ay + r20 * az + jx
+        wy = r01 * ax + r11 * ay + r21 * az + jy
+        wz = r02 * ax + r12 * ay + r22 * az + jz
+        ux = r00 * bx + r10 * by + r20 * bz + kx
+        uy = r01 * bx + r11 * by + r21 * bz + ky
+        uz = r02 * bx + r12 * by + r22 * bz + kz
+        twist[0, l], twist[1, l], twist[2, l] = wx, wy, wz
+        twist[3, l], twist[4, l], twist[5, l] = ux, uy, uz
+        bias[0, l] = wy * jz - wz * jy + ex
+        bias[1, l] = wz * jx - wx * jz + ey
+        bias[2, l] = wx * jy - wy * jx + ez
+        bias[3, l] = wy * kz - wz * ky + uy * jz - uz * jy + fx
+        bias[4, l] = wz * kx - wx * kz + uz * jx - ux * jz + fy
+        bias[5, l] = wx * ky - wy * kx + ux * jy - uy * jx + fz
+
+
+@kernel
+def carry_through_hinge(hinge, inertia, force):
+    """Express what a surface carries, in place, in B at the fuselage reference point."""
+    if not_in_lanes(inertia) or not_in_lanes(force):
+        return
+    r00, r01, r02 = hinge[0], hinge[1], hinge[2]
+    r10, r11, r12 = hinge[3], hinge[4], hinge[5]
+    r20, r21, r22 = hinge[6], hinge[7], hinge[8]
+    px, py, pz = hinge[16], hinge[17], hinge[18]
+    for l in range(LANES):
+        carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l)
+
+
+@kernel
+def hinge_acceleration(base, hinge, bias, acceleration):
+    """Acceleration of a surface's first link from the base's."""
+    if not_in_lanes(base) or not_in_lanes(bias) or not_in_lanes(acceleration):
+        return
+    r00, r01, r02 = hinge[0], hinge[1], hinge[2]
+    r10, r11, r12 = hinge[3], hinge[4], hinge[5]
+    r20, r21, r22 = hinge[6], hinge[7], hinge[8]
+    px, py, pz = hinge[16], hinge[17], hinge[18]
+    for l in range(LANES):
+        ax, ay, az = base[0, l], base[1, l], base[2, l]
+        bx = base[3, l] + ay * pz - az * py
+        by = base[4, l] + az * px - ax * pz
+        bz = base[5, l] + ax * py - ay * px
+        acceleration[0, l] = r00 * ax + r10 * ay + r20 * az + bias[0, l]
+        acceleration[1, l] = r01 * ax + r11 * ay + r21 * az + bias[1, l]
+        acceleration[2, l] = r02 * ax + r12 * ay + r22 * az + bias[2, l]
+        acceleration[3, l] = r00 * bx + r10 * by + r20 * bz + bias[3, l]
+        acceleration[4, l] = r01 * bx + r11 * by + r21 * bz + bias[4, l]
+        acceleration[5, l] = r02 * bx + r12 * by + r22 * bz + bias[5, l]
