@@ -31,7 +31,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.simulate.trim import Trim, trimmed_state
-from morphcore.threads import use_threads
+from morphcore.threads import thread_count, use_threads
 from morphcore.warming import warm_up
 
 Array = NDArray[np.float64]
@@ -138,7 +138,7 @@ def run_benchmarks(
         flight=load_flight(folder / "flight.json"),
         samples={name: load_trajectory(folder / f"{name}.csv") for name in ACCURACY_SAMPLES},
         effort=effort or (QUICK if quick else FULL),
-        threads=numba.get_num_threads(),
+        threads=thread_count(),
         clock=clock,
     )
     try:

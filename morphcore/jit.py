@@ -1,11 +1,13 @@
-"""The one numba decorator of the project, with its flags explained once.
+"""The numba decorators of the project, with their flags explained once.
 
 - ``error_model="numpy"``: division by zero gives inf instead of raising; the check would keep the compiler
   from turning lane loops into vector instructions.
-- ``fastmath`` allows contraction to fused multiply-add and reordering of sums. ``nnan``/``ninf`` are left
-  out: a diverged flight must stay recognisable as such.
-- ``nogil``: heartbeats and cancellation keep running beside a kernel.
-- ``cache``: compiled code is kept beside the source, or in ``NUMBA_CACHE_DIR``.
+- ``fastmath`` holds nothing that changes a rounding. With contraction to fused multiply-add, results depended
+  in their last bits on what had been inlined into what, hence on whether code came from the compiler or its
+  cache; and it gained nothing measurable. ``nnan`` and ``ninf`` are left out too: a diverged flight must stay
+  recognisable as such.
+- ``nogil``: kernels run side by side in plain threads, and heartbeats and cancellation go on beside them.
+- ``cache``, of entries: compiled code is kept beside the source, or in ``NUMBA_CACHE_DIR``.
 - ``boundscheck=False``: shapes are checked once, in the typed shells.
 
 With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the same tests.
@@ -18,19 +20,20 @@ from typing import Any
 
 import numba
 
-FAST_MATH = {"contract", "reassoc", "arcp", "nsz"}
+FAST_MATH = {"nsz"}
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a numeric kernel: arrays in, ``out`` last, no allocation, no exceptions."""
+    """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
+
+    It is cached as part of the entries that call it.
+    """
+    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True)(function)
+
+
+def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a kernel that Python calls; cached."""
     return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True)(function)
-
-
-def parallel_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile the one kind of kernel that spreads blocks of lanes over threads with ``prange``."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True, parallel=True)(
-        function
-    )
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,18 +1,55 @@
-"""Threads: how many the kernels use, and one only for the linear algebra beside them."""
+"""Threads: a pool for the kernels, and one thread only for the linear algebra beside them.
+
+Kernels release the interpreter's lock, so plain Python threads run them side by side. Numba's own parallel
+loops would need a threading layer that survives forks and tolerates callers in several threads; plain threads
+do both.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from functools import cache
 
-import numba
 from threadpoolctl import ThreadpoolController
 
 
+class _Setting:
+    """How many threads the kernels of this process use."""
+
+    threads = 0
+
+
+def thread_count() -> int:
+    """Threads that kernels use: as ``use_threads`` said, else NUMBA_NUM_THREADS, else the usable cores."""
+    if _Setting.threads == 0:
+        _Setting.threads = int(os.environ.get("NUMBA_NUM_THREADS", "0")) or usable_cores()
+    return _Setting.threads
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
+
+
 def use_threads(count: int) -> None:
-    """Let the calling thread's kernels run on so many threads, at most those that numba was started with."""
-    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    numba.set_num_threads(max(1, min(count, most)))
+    """Let the kernels of this process run on so many threads."""
+    _Setting.threads = max(1, count)
+
+
+def in_threads(work: Callable[[int], None], parts: int) -> None:
+    """Do ``work(0)`` .. ``work(parts - 1)``, side by side if there are threads; raise the first error."""
+    threads = min(thread_count(), parts)
+    if threads <= 1:
+        for part in range(parts):
+            work(part)
+        return
+    list(_pool(os.getpid(), thread_count()).map(work, range(parts)))
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
@@ -23,6 +60,11 @@ def one_blas_thread() -> AbstractContextManager[object]:
     """
     limit: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
     return limit
+
+
+@cache
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:  # noqa: ARG001 - a forked child needs a pool of its own
+    return ThreadPoolExecutor(threads, thread_name_prefix="morphcore")
 
 
 @cache

@@ -6,7 +6,6 @@ import itertools
 import json
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
@@ -15,16 +14,17 @@ from morphcore.bench import Effort, benchmark_swarm, benchmark_table, run_benchm
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import load_aircraft, load_flight
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.threads import thread_count
 
 SMALLEST = Effort(particles=17, rounds=1, singles=1, links=(1, 2), refinement=2)
 
 
 def test_figures_follow_from_the_times() -> None:
     """With a clock that ticks one second a look, every time is known, and so is every factor made of them."""
-    threads = numba.get_num_threads()
+    threads = thread_count()
     ticks = itertools.count()
     figures = run_benchmarks(effort=SMALLEST, clock=lambda: float(next(ticks)))
-    assert numba.get_num_threads() == threads, "the caller's threads are as before"
+    assert thread_count() == threads, "the caller's threads are as before"
     json.dumps(figures, allow_nan=False)
     flights_s, batch = figures["settings"]["flight_s"], figures["batch"]
     assert flights_s == pytest.approx(5.49 + 2.49 + 1.74)

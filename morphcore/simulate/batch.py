@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +15,7 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, t
 from morphcore.models.kernels.layout import JOINTS
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
+from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]
 Stop = Callable[[], bool]
@@ -101,8 +103,9 @@ def fly_batch(
     particles = state.shape[0]
     blocks = to_lanes(state)
     count = blocks.shape[0]
-    threads = numba.get_num_threads()
-    groups = max(-(-count // BLOCKS_PER_GROUP), min(count, threads))
+    threads = thread_count()
+    bounds = _groups(count, threads)
+    groups = bounds.size - 1
     rows, columns = model.lattice.operator_shape
     work = np.zeros((groups, 3, model.state_rows, LANES))
     scratch = np.zeros((groups, model.scratch_rows, LANES))
@@ -115,13 +118,29 @@ def fly_batch(
             raise Interrupted
         last = min(first + length, plan.grid.steps)
         operators, strips = plan.table.between(first, last + 1)
+        hinges, wind_N = plan.hinges[first : last + 1], plan.wind_N[first : last + 1]
+        accelerations = plan.mean_accelerations[first:last]
         record = np.empty((last - first, record_rows, count, LANES))
-        fly(
-            model.surfaces, constants.ranges, shared, strips, plan.hinges[first : last + 1],
-            plan.mean_accelerations[first:last], operators, plan.wind_N[first : last + 1], constants.rows,
-            plan.grid.step_s, blocks, work, scratch, inputs, outputs, record,
+        common = (
+            model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, wind_N,
+            constants.rows, plan.grid.step_s, blocks,
         )  # fmt: skip
+        own = (work, scratch, inputs, outputs)
+        in_threads(partial(_fly_group, bounds, common, own, record), groups)
         yield Chunk(first + 1, record.reshape(last - first, record_rows, -1)[..., :particles])
+
+
+def _fly_group(
+    bounds: NDArray[np.int64], common: tuple[Any, ...], own: tuple[Array, ...], record: Array, group: int
+) -> None:
+    fly(bounds[group], bounds[group + 1], *common, *(array[group] for array in own), record)
+
+
+def _groups(blocks: int, threads: int) -> NDArray[np.int64]:
+    """First blocks of the groups, and the end: whole rounds of the threads, none beyond the cache."""
+    rounds = -(-blocks // (BLOCKS_PER_GROUP * threads))
+    groups = min(blocks, threads * rounds)
+    return np.arange(groups + 1) * blocks // groups
 
 
 def state_rates(
@@ -133,11 +152,17 @@ def state_rates(
     rows, columns = model.lattice.operator_shape
     operators, strips = plan.table.between(row, row + 1)
     rates = np.zeros_like(blocks)  # stays zero for the lag states
-    rates_of_blocks(
-        model.surfaces, constants.ranges, shared_numbers(model), strips,
-        plan.hinges[row : row + 1], plan.accelerations[row], operators, plan.wind_N[row : row + 1],
-        constants.rows, np.zeros((model.state_rows, LANES)), blocks, np.zeros((count,
-        model.scratch_rows, LANES)), np.zeros((count, columns, LANES)),
-        np.zeros((count, rows, LANES)), rates,
+    bounds = _groups(count, thread_count())
+    common = (
+        model.surfaces, constants.ranges, shared_numbers(model), strips, plan.hinges[row : row + 1],
+        plan.accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
+        np.zeros((model.state_rows, LANES)), blocks,
     )  # fmt: skip
+
+    def group_rates(group: int) -> None:
+        scratch = np.zeros((model.scratch_rows, LANES))
+        inputs, outputs = np.zeros((columns, LANES)), np.zeros((rows, LANES))
+        rates_of_blocks(bounds[group], bounds[group + 1], *common, scratch, inputs, outputs, rates)
+
+    in_threads(group_rates, bounds.size - 1)
     return from_lanes(rates, state.shape[0])

@@ -8,7 +8,6 @@ import sys
 from dataclasses import replace
 from itertools import pairwise
 
-import numba
 import numpy as np
 import pytest
 
@@ -18,6 +17,7 @@ from morphcore.models.kernels.layout import JOINTS
 from morphcore.models.tree import chain_tree, link_bodies, link_ends
 from morphcore.multibody.dynamics import body_poses, body_twists, forward_dynamics_crba
 from morphcore.simulate.batch import state_rates
+from morphcore.threads import thread_count, use_threads
 from tests.models.chains import (
     airless,
     example_aircraft,
@@ -146,12 +146,12 @@ def test_lanes_are_independent_and_order_does_not_matter():
     np.testing.assert_array_equal(full_rates(particles, order), together[order])
     for alone in (0, LANES, particles - 1):
         np.testing.assert_array_equal(full_rates(particles, np.array([alone]))[0], together[alone])
-    threads = numba.get_num_threads()
+    threads = thread_count()
     try:
-        numba.set_num_threads(1)
+        use_threads(1)
         np.testing.assert_array_equal(full_rates(particles), together)
     finally:
-        numba.set_num_threads(threads)
+        use_threads(threads)
 
 
 def test_padding_lanes_are_harmless():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from morphcore.models.equivalent import lane_constants, physical_guess
 from morphcore.simulate.batch import BLOCKS_PER_GROUP, LONGEST_CHUNK, Interrupted, fly_batch
 from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold, Tabulated
+from morphcore.threads import thread_count, use_threads
 from tests.models.chains import random_batch
 from tests.simulate.flights import (
     SAMPLES,
@@ -61,12 +61,12 @@ def test_company_does_not_matter(flown):
 
 def test_threads_do_not_matter(flown):
     """One thread and all of them give the same bits."""
-    threads = numba.get_num_threads()
+    threads = thread_count()
     try:
-        numba.set_num_threads(1)
+        use_threads(1)
         np.testing.assert_array_equal(again(flown, np.arange(flown[1].particles)), flown[3].states)
     finally:
-        numba.set_num_threads(threads)
+        use_threads(threads)
 
 
 def test_chunks_are_short_and_stop_is_asked(flown):

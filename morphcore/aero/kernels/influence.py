@@ -8,10 +8,10 @@ wake is a horseshoe of three edges and two legs. The point index is innermost an
 from __future__ import annotations
 
 from morphcore.aero.kernels.vortex import leg_velocity, segment_velocity
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel, kernel
 
 
-@kernel
+@entry_kernel
 def ring_influence(
     points,
     corners,

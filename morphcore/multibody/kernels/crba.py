@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 from morphcore.multibody.kernels.spatial import add_force_to_parent, add_inertia_to_parent
 
 
-@kernel
+@entry_kernel
 def composite_mass_matrix(
     parent, axis, sign, offset_P, inertia, coordinate, rotation, composite, scratch, out
 ):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 from morphcore.multibody.kernels.spatial import inertia_times, motion_to_child
 
 
-@kernel
+@entry_kernel
 def poses_in_base(parent, offset_P, rotation, out_R, out_r):
     """Attitude R_BX (b, 3, 3) and origin r_B (b, 3), m, of every body in the base's frame B."""
     for body in range(parent.size):
@@ -29,7 +29,7 @@ def poses_in_base(parent, offset_P, rotation, out_R, out_r):
                 out_r[body, i] = total
 
 
-@kernel
+@entry_kernel
 def body_velocities(parent, axis, sign, offset_P, rotation, rate, base_velocity, out):
     """Spatial velocity (b, 6) of every body in its axes from joint rates (b,) and the base's velocity."""
     for body in range(parent.size):
@@ -41,7 +41,7 @@ def body_velocities(parent, axis, sign, offset_P, rotation, rate, base_velocity,
             out[body, axis[body]] += sign[body] * rate[body]
 
 
-@kernel
+@entry_kernel
 def kinetic_energy(inertia, velocity, scratch):
     """Kinetic energy of all bodies, J. Featherstone (2008), equation 2.67; ``scratch`` is (1, 6)."""
     total = 0.0
@@ -52,7 +52,7 @@ def kinetic_energy(inertia, velocity, scratch):
     return total
 
 
-@kernel
+@entry_kernel
 def momentum_about_base(inertia, velocity, R_BX, r_B, scratch, out):
     """Angular momentum about the base's origin and linear momentum, (6,), in B; ``scratch`` is (1, 6)."""
     for i in range(6):
@@ -71,7 +71,7 @@ def momentum_about_base(inertia, velocity, R_BX, r_B, scratch, out):
                 ]
 
 
-@kernel
+@entry_kernel
 def mass_and_moment(inertia, R_BX, r_B, out):
     """Total mass, kg, and first moment of mass about the base's origin in B, kg m, as (4,)."""
     for i in range(4):

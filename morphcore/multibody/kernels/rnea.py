@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 from morphcore.multibody.kernels.spatial import (
     add_cross_force,
     add_cross_motion,
@@ -12,7 +12,7 @@ from morphcore.multibody.kernels.spatial import (
 )
 
 
-@kernel
+@entry_kernel
 def joint_forces(
     parent,
     axis,

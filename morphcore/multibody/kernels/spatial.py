@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel, kernel
 
 
 @kernel
@@ -27,7 +27,7 @@ def axis_rotation(axis, angle, out):
     out[k, j] = s
 
 
-@kernel
+@entry_kernel
 def joint_rotations(axis, sign, angle, out):
     """R_PC of every body, (b, 3, 3), from joint coordinates (b,) in rad; the base's is the identity."""
     for body in range(axis.size):

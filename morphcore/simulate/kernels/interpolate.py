@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 
 
-@kernel
+@entry_kernel
 def blend(weights, first, nodes, out):
     """Weighted sums of neighbouring nodes: out[k] = sum over i of weights[k, i] nodes[first[k] + i].
 
