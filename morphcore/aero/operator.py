@@ -56,11 +56,6 @@ class AircraftLattice:
         )
 
     @property
-    def strip_width_m(self) -> Array:
-        """(strips,) widths of all strips."""
-        return np.concatenate([np.diff(lattice.strip_edges_m) for lattice in self.lattices])
-
-    @property
     def strip_chord_m(self) -> Array:
         """(strips,) chords at mid strip."""
         return np.concatenate([lattice.strip_chord_m for lattice in self.lattices])

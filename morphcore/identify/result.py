@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
-from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, sample_cases, shared_trims
+from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
 from morphcore.identify.polish import differences
 from morphcore.identify.settings import ModelSettings
 from morphcore.identify.state import SearchState
@@ -123,8 +123,8 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     """Fly the best point so far against all samples; if ``judged``, with its uncertainty and cost too."""
     start, space = run.settings.start, run.space
     rigid_model = run.chain(run.model.aircraft, run.model.flight, 1)
-    rigid_cases = sample_cases(rigid_model, run.samples, run.settings.step_s)
-    rigid = _attitudes(rigid_model, physical_guess(rigid_model), rigid_cases, start)
+    # a plan knows the lattice and the hinges, not the links: both models fly the same ones
+    rigid = _attitudes(rigid_model, physical_guess(rigid_model), run.cases, start)
     both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
     certainty = None
     if judged and space.dimension and np.isfinite(state.best_cost):
@@ -137,8 +137,8 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     best = space.decode(state.best)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
-    def flight_time(model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...]) -> float | None:
-        return _flight_time(model, batch, cases[longest], start) if judged else None
+    def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
+        return _flight_time(model, batch, run.cases[longest], start) if judged else None
 
     settings = run.search
     return IdentifyResult(
@@ -160,8 +160,8 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "history": list(state.history),
         },
         cost={
-            "rigid_flight_s": flight_time(rigid_model, physical_guess(rigid_model), rigid_cases),
-            "equivalent_flight_s": flight_time(run.model, best, run.cases),
+            "rigid_flight_s": flight_time(rigid_model, physical_guess(rigid_model)),
+            "equivalent_flight_s": flight_time(run.model, best),
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
         },

@@ -12,7 +12,14 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.lanes import LANES
-from morphcore.models.kernels.layout import AERO_C, FORCE_C, LINKS_C, joint_rows_of_scratch, state_rows
+from morphcore.models.kernels.layout import (
+    AERO_C,
+    FORCE_C,
+    LINKS_C,
+    MOMENT_C,
+    joint_rows_of_scratch,
+    state_rows,
+)
 from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 
@@ -179,7 +186,7 @@ class LaneConstants:
     def set_thrust(self, force_B: Array, moment_B: Array) -> None:
         """Write the constant force and moment in B, each (p, 3), N and N m."""
         self.rows[:, FORCE_C : FORCE_C + 3] = to_lanes(force_B)
-        self.rows[:, FORCE_C + 3 : FORCE_C + 6] = to_lanes(moment_B)
+        self.rows[:, MOMENT_C : MOMENT_C + 3] = to_lanes(moment_B)
 
 
 def to_lanes(values: Array) -> Array:
