@@ -55,11 +55,6 @@ class AircraftLattice:
             -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
 
-    @property
-    def strip_chord_m(self) -> Array:
-        """(strips,) chords at mid strip."""
-        return np.concatenate([lattice.strip_chord_m for lattice in self.lattices])
-
 
 @dataclass(frozen=True)
 class LatticeOperator:

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Side = Literal["right", "left"]
 
 AXES = ("x", "y", "z")
+RANGE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly at the stop
 DEFAULT_HINGE_RANGE_RAD = 1.3  # either way from unswept; at more the wing lies along the fuselage
 
 
@@ -34,6 +35,11 @@ class Hinge:
     def axis_index(self) -> int:
         """0, 1 or 2 for x, y, z."""
         return AXES.index(self.axis)
+
+    def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
+        """Rows of a history of angles (k,) that lie beyond the hinge's range."""
+        low, high = self.min_rad - RANGE_TOLERANCE_RAD, self.max_rad + RANGE_TOLERANCE_RAD
+        return np.flatnonzero((angle_rad < low) | (angle_rad > high))
 
 
 @dataclass(frozen=True)

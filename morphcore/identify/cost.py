@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 
 DIVERGED_ANGLE = 3.0  # rad of error charged for every angle of a row that a diverged flight never reached
 ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
-HINGE_TOLERANCE_RAD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -63,11 +62,7 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
     for surface in aircraft.surfaces:
         angle = sample.sweep(surface.side)
         if surface.hinge is not None:
-            low, high = (
-                surface.hinge.min_rad - HINGE_TOLERANCE_RAD,
-                surface.hinge.max_rad + HINGE_TOLERANCE_RAD,
-            )
-            bad = np.flatnonzero((angle < low) | (angle > high))
+            bad = surface.hinge.beyond_range(angle)
             if bad.size:
                 raise InvalidInput(
                     f"sweep {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",

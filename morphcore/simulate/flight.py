@@ -36,7 +36,6 @@ Array = NDArray[np.float64]
 OUTPUT_STEP_S = 0.01  # as the example flights
 LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # there flap and lag of a gimbal turn about the same axis
 LARGEST_SPEED_RATIO = 10.0  # of the airspeed at the start: no glide gets there
-HINGE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly at the stop
 LARGEST_ROWS = 200_000  # of a trajectory
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would run a cell that begins so
 
@@ -207,7 +206,7 @@ def _require_hinge_ranges(aircraft: Aircraft, plan: FlightPlan) -> None:
         if surface.hinge is None:
             continue
         low, high = surface.hinge.min_rad, surface.hinge.max_rad
-        outside = np.flatnonzero((angle < low - HINGE_TOLERANCE_RAD) | (angle > high + HINGE_TOLERANCE_RAD))
+        outside = surface.hinge.beyond_range(angle)
         if outside.size:
             raise InvalidInput(
                 f"the hinge of {surface.name} is driven to {angle[outside[0]]:.4g} rad at "
