@@ -162,7 +162,10 @@ class Attempt:
         if reason is StopReason.CANCEL:
             return self._finish(JobStatus.CANCELLED, outcome=self._best_so_far())
         if reason is StopReason.DEADLINE:
-            hint = "raise search.max_seconds, or search with fewer particles, generations or links"
+            hint = (
+                "raise search.max_seconds, or ask for less: fewer particles, generations or links, "
+                "a shorter flight"
+            )
             error = _error("deadline_exceeded", "the job did not end before its deadline", hint=hint)
             return self._finish(JobStatus.EXPIRED, outcome=self._best_so_far(), error=error)
         raise StaleClaim

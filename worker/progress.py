@@ -22,8 +22,12 @@ class Pace:
         self._first: tuple[float, float, float] | None = None  # time s, flights, fraction
 
     def progress(self, step: Step) -> Document:
-        """Give the step's progress with ``flights_per_s`` and ``eta_s`` (None while unknown)."""
+        """Give the step's progress with ``flights_per_s`` and ``eta_s`` (None while unknown).
+
+        Work that counts no flights has no rate.
+        """
         now = self._clock()
+        counted = "flights" in step.progress
         flights = float(step.progress.get("flights", 0))
         fraction = float(step.progress.get("fraction", 0.0))
         if self._first is None:
@@ -32,6 +36,6 @@ class Pace:
         elapsed_s, done = now - begun_at, fraction - fraction_before
         return {
             **step.progress,
-            "flights_per_s": (flights - flights_before) / elapsed_s if elapsed_s > 0.0 else None,
+            "flights_per_s": (flights - flights_before) / elapsed_s if counted and elapsed_s > 0.0 else None,
             "eta_s": elapsed_s * (1.0 - fraction) / done if done > 0.0 else None,
         }

@@ -46,9 +46,10 @@ class Step:
 
     Parameters
     ----------
-    progress : what the user sees: ``fraction`` (0..1), ``generation``, ``best_cost``, ``flights``,
-        ``phase`` and ``message``.
-    checkpoint : complete state; work begun from it goes on to the bit-identical end.
+    progress : what the user sees: ``fraction`` (0..1), ``phase`` and ``message``; of a search also
+        ``generation``, ``best_cost`` and ``flights``.
+    checkpoint : complete state; work begun from it goes on to the bit-identical end. Empty where there is
+        nothing to go on from: the next attempt begins anew.
     """
 
     progress: Document
@@ -84,8 +85,11 @@ class Work(Protocol):
     def outcome(self, checkpoint: bytes) -> Outcome:
         """Give the result at the last step's checkpoint, with everything that belongs to it."""
 
-    def best_so_far(self, checkpoint: bytes) -> Outcome:
-        """Give the result at any checkpoint, within a second: someone waits for the job to end."""
+    def best_so_far(self, checkpoint: bytes) -> Outcome | None:
+        """Give the result at any checkpoint, within a second: someone waits for the job to end.
+
+        None for work that has nothing to show before its end.
+        """
 
 
 Begin = Callable[[Document, int], Work]
