@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from morphcore.geometry.aircraft import aircraft_from_document, flight_from_document
+from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.trajectory import Trajectory
@@ -39,5 +40,5 @@ def warm_up(threads: int | None = None) -> None:
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
     sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
-    model = chain_model(aircraft, flight, 2, chordwise=1, spanwise=4)
+    model = chain_model(aircraft, flight, 2, LatticeSettings(chordwise=1, spanwise=4))
     costs(model, physical_guess(model), sample_cases(model, [sample]), "trim")

@@ -13,6 +13,7 @@ from morphcore import bench
 from morphcore.bench import Effort, benchmark_swarm, benchmark_table, run_benchmarks
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import load_aircraft, load_flight
+from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.threads import thread_count
 
@@ -50,7 +51,10 @@ def test_figures_follow_from_the_times() -> None:
 def test_swarm_is_the_same_every_time(examples: Path) -> None:
     """The benchmark's parameter sets depend on the seed alone, lie on the simplex and around the guess."""
     model = chain_model(
-        load_aircraft(examples / "aircraft.json"), load_flight(examples / "flight.json"), 3, chordwise=1
+        load_aircraft(examples / "aircraft.json"),
+        load_flight(examples / "flight.json"),
+        3,
+        LatticeSettings(chordwise=1),
     )
     one, same, other = (benchmark_swarm(model, 500, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.stiffness, same.stiffness)

@@ -23,11 +23,23 @@ Range = Annotated[
 ]
 
 
+class VortexCore(Strict):
+    """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
+
+    law: Literal["line", "smoothed"] = "line"
+    fraction: Annotated[float, Field(gt=0.0, le=0.5)] | None = Field(
+        default=None,
+        description="Core radius over the smaller side of a panel (line, 0.1 when left out) or over the mean "
+        "chord of the surface (smoothed, 0.05 when left out).",
+    )
+
+
 class Lattice(Strict):
-    """Panels of each wing's vortex lattice."""
+    """Panels of each wing's vortex lattice, and the core of its vortices."""
 
     chordwise: int = Field(default=4, ge=1, le=8)
     spanwise: int = Field(default=10, ge=4, le=20)
+    core: VortexCore = VortexCore()
 
 
 class Bounds(Strict):

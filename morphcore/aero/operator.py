@@ -29,7 +29,13 @@ from numpy.typing import NDArray
 from morphcore.aero.kernels.loads import OUTPUTS
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
+from morphcore.geometry.lattice import (
+    DEFAULT_LATTICE,
+    LatticeSettings,
+    SurfaceLattice,
+    surface_lattice,
+    surface_pose,
+)
 
 Array = NDArray[np.float64]
 
@@ -39,9 +45,10 @@ BODY_AFT = (-1.0, 0.0, 0.0)  # direction of the frozen wake in B: the free strea
 
 @dataclass(frozen=True)
 class AircraftLattice:
-    """The undeformed lattices of all surfaces and their numbering."""
+    """The undeformed lattices of all surfaces, what was asked of them, and their numbering."""
 
     aircraft: Aircraft
+    settings: LatticeSettings
     lattices: tuple[SurfaceLattice, ...]
     table: RingTable
     strip0: tuple[int, ...]
@@ -69,12 +76,13 @@ class LatticeOperator:
     strips: Array
 
 
-def aircraft_lattice(aircraft: Aircraft, chordwise: int, spanwise: int) -> AircraftLattice:
-    """Lattices of ``chordwise`` x ``spanwise`` panels on every surface."""
-    lattices = tuple(surface_lattice(surface, chordwise, spanwise) for surface in aircraft.surfaces)
+def aircraft_lattice(aircraft: Aircraft, settings: LatticeSettings = DEFAULT_LATTICE) -> AircraftLattice:
+    """Lattices of the same settings on every surface."""
+    panels = (settings.chordwise, settings.spanwise)
+    lattices = tuple(surface_lattice(surface, *panels) for surface in aircraft.surfaces)
     strip0 = tuple(int(n) for n in np.cumsum([0] + [lattice.spanwise for lattice in lattices[:-1]]))
     return AircraftLattice(
-        aircraft, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices)
+        aircraft, settings, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices)
     )
 
 
@@ -98,7 +106,9 @@ def lattice_operator(
         normals.append(R_BW[:, 2])
     groups = (controls, fronts, sides)
     points = np.concatenate([part for group in groups for part in group])
-    velocity = influence(points, np.concatenate(corners), lattice.table, wake_direction_B, mach=mach)
+    velocity = influence(
+        points, np.concatenate(corners), lattice.table, wake_direction_B, lattice.settings.core, mach
+    )
     normal = np.concatenate(
         [
             np.repeat(n[None, :], part.shape[0], axis=0)

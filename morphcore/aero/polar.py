@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.vlm import (
-    VORTEX_CORE,
     EdgeForces,
     RingTable,
     edge_forces,
@@ -21,7 +20,14 @@ from morphcore.aero.vlm import (
 )
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.lattice import CHORDWISE_PANELS, SPANWISE_PANELS, surface_lattice, surface_pose
+from morphcore.geometry.lattice import (
+    DEFAULT_CORE,
+    DEFAULT_LATTICE,
+    LatticeSettings,
+    VortexCore,
+    surface_lattice,
+    surface_pose,
+)
 
 Array = NDArray[np.float64]
 
@@ -60,8 +66,7 @@ def steady_polar(
     *,
     beta_rad: float = 0.0,
     hinge_rad: Sequence[float] = (),
-    panels: tuple[int, int] = (CHORDWISE_PANELS, SPANWISE_PANELS),
-    core: float = VORTEX_CORE,
+    lattice: LatticeSettings = DEFAULT_LATTICE,
     mach: float = 0.0,
 ) -> SteadyLoads:
     """Loads at an angle of attack and of sideslip, without profile drag.
@@ -70,16 +75,16 @@ def steady_polar(
     ----------
     airspeed, density : m/s and kg/m^3.
     hinge_rad : coordinate of each hinged surface in the aircraft's order; empty for all at zero.
-    panels : chordwise and spanwise panels of every surface.
-    core, mach : as in ``influence``.
+    lattice : panels of every surface and core of their vortices. mach : as in ``influence``.
     """
     hinges = iter(_hinge_angles(aircraft, hinge_rad))
+    panels = (lattice.chordwise, lattice.spanwise)
     lattices = [surface_lattice(surface, *panels) for surface in aircraft.surfaces]
     corners, controls = [], []
-    for surface, lattice in zip(aircraft.surfaces, lattices, strict=True):
+    for surface, part in zip(aircraft.surfaces, lattices, strict=True):
         R_BW, r_B = surface_pose(surface, next(hinges) if surface.hinge else 0.0)
-        corners.append(lattice.ring_corners_W.reshape(-1, 3) @ R_BW.T + r_B)
-        controls.append(lattice.control_points_W.reshape(-1, 3) @ R_BW.T + r_B)
+        corners.append(part.ring_corners_W.reshape(-1, 3) @ R_BW.T + r_B)
+        controls.append(part.control_points_W.reshape(-1, 3) @ R_BW.T + r_B)
     corners_B, controls_B = np.concatenate(corners), np.concatenate(controls)
     table = ring_table(lattices)
 
@@ -87,12 +92,14 @@ def steady_polar(
         [np.cos(alpha_rad) * np.cos(beta_rad), np.sin(beta_rad), np.sin(alpha_rad) * np.cos(beta_rad)]
     )
     flow_B = airspeed * stream_B
-    circulation, edges = steady_edges(corners_B, controls_B, table, flow_B, density, core=core, mach=mach)
+    circulation, edges = steady_edges(
+        corners_B, controls_B, table, flow_B, density, core=lattice.core, mach=mach
+    )
 
     force_B = edges.force_B.sum(axis=0)
     up_B = np.array([np.sin(alpha_rad), 0.0, -np.cos(alpha_rad)])
     right_B = np.cross(stream_B, up_B)
-    load_n = 0.5 * density * airspeed**2 * sum(lattice.area_m2 for lattice in lattices)
+    load_n = 0.5 * density * airspeed**2 * sum(part.area_m2 for part in lattices)
     panel_lift = edges.panel_force_B @ up_B
     strip_lift = tuple(
         panel_lift[table.panel_surface == index].reshape(panels).sum(axis=0) for index in range(len(lattices))
@@ -118,7 +125,7 @@ def steady_edges(
     flow_B: Array,
     density: float,
     *,
-    core: float = VORTEX_CORE,
+    core: VortexCore = DEFAULT_CORE,
     mach: float = 0.0,
 ) -> tuple[Array, EdgeForces]:
     """Circulations (r,) and forces of a lattice at rest in a uniform stream, its wake along the stream.

@@ -22,16 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from morphcore.aero.kernels.influence import ring_influence
 from morphcore.errors import InvalidInput, UnsupportedRegime
 from morphcore.geometry.aircraft import MACH_LIMIT
-from morphcore.geometry.lattice import SurfaceLattice
+from morphcore.geometry.lattice import DEFAULT_CORE, SurfaceLattice, VortexCore
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-# Core radius as a fraction of the smaller side of a panel (2.5 per cent of the chord at four rows). Control
-# points lie half a panel from their own ring's edges: Vatistas's factor there is 1 - (0.1 / 0.5)^4 / 2, so it
-# moves the self-influence by less than 1e-3, while a leg that strikes a control point induces no more than
-# gamma / (2 sqrt(2) pi core).
-VORTEX_CORE = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,8 @@ class RingTable:
     edge_panel : (e, 2) the panels that carry the edge's force in equal parts (one panel twice at root, tip,
         fronts).
     leg_start, leg_plus, leg_minus : (l,) trailing-edge corner and rings of each wake leg.
-    edge_panel_size, leg_panel_size : (e,), (l,) smaller side of the surface's panels, m, for the core.
+    edge_surface, leg_surface : (e,), (l,) surface of each edge and leg.
+    panel_size_m, mean_chord_m : (s,) of each surface, to which the two laws of the core are referred.
     ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
     panel_surface, panel_row, panel_strip : (r,) surface, row and strip (within the surface) of each panel.
     panel_side : (r,) +1 on right surfaces, -1 on left ones.
@@ -66,8 +61,10 @@ class RingTable:
     leg_start: IntArray
     leg_plus: IntArray
     leg_minus: IntArray
-    edge_panel_size: Array
-    leg_panel_size: Array
+    edge_surface: IntArray
+    leg_surface: IntArray
+    panel_size_m: Array
+    mean_chord_m: Array
     ring_corner: IntArray
     panel_surface: IntArray
     panel_row: IntArray
@@ -89,6 +86,10 @@ class RingTable:
     def edges(self) -> int:
         """Number of bound edges."""
         return int(self.edge_start.size)
+
+    def core_radius_m(self, core: VortexCore) -> Array:
+        """Radius (s,) of a core on every surface, m."""
+        return core.radius_fraction * (self.panel_size_m if core.law == "line" else self.mean_chord_m)
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def influence(
     corners_B: ArrayLike,
     table: RingTable,
     wake_direction_B: ArrayLike,
-    core: float = VORTEX_CORE,
+    core: VortexCore = DEFAULT_CORE,
     mach: float = 0.0,
 ) -> Array:
     """Velocity that every ring of unit circulation, with its straight wake, induces at every point.
@@ -134,7 +135,7 @@ def influence(
     ----------
     points_B : (p, 3) m. corners_B : (c, 3) ring corners in the order of the table, m.
     wake_direction_B : (3,) direction of the free stream, from nose to tail; any length.
-    core : core radius as a fraction of the smaller side of each surface's panels, above 0.
+    core : law and size of the vortices' cores.
     mach : of the free stream. Goethert's rule: the geometry is stretched along the free stream by 1 / beta,
         beta^2 = 1 - mach^2, and the velocity along it by 1 / beta.
 
@@ -145,10 +146,8 @@ def influence(
     Raises
     ------
     UnsupportedRegime : the Mach number is beyond 0.7.
-    InvalidInput : the core is not above 0.
+    InvalidInput : the corners are not those of the table.
     """
-    if core <= 0.0:
-        raise InvalidInput(f"the vortex core is {core:g}, not above 0", hint="leave it out for the default")
     u_B = np.asarray(wake_direction_B, dtype=np.float64)
     u_B = u_B / np.sqrt(u_B @ u_B)
     stretch = 1.0 / _beta(mach)
@@ -159,6 +158,7 @@ def influence(
     if stretch > 1.0:
         points += (stretch - 1.0) * (points @ u_B)[:, None] * u_B
         corners += (stretch - 1.0) * (corners @ u_B)[:, None] * u_B
+    radius = table.core_radius_m(core)
     out = np.empty((3, table.rings, points.shape[0]))
     ring_influence(
         np.ascontiguousarray(points.T),
@@ -167,11 +167,12 @@ def influence(
         table.edge_end,
         table.edge_plus,
         table.edge_minus,
-        core * table.edge_panel_size,
+        radius[table.edge_surface],
         table.leg_start,
         table.leg_plus,
         table.leg_minus,
-        core * table.leg_panel_size,
+        radius[table.leg_surface],
+        core.law == "smoothed",
         u_B,
         np.empty((3, points.shape[0])),
         out,
@@ -290,8 +291,10 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
         "leg_start": corners[-1],
         "leg_plus": leg_plus,
         "leg_minus": leg_minus,
-        "edge_panel_size": np.full(start.size, lattice.panel_size_m),
-        "leg_panel_size": np.full(strips + 1, lattice.panel_size_m),
+        "edge_surface": np.full(start.size, index),
+        "leg_surface": np.full(strips + 1, index),
+        "panel_size_m": np.array([lattice.panel_size_m]),
+        "mean_chord_m": np.array([lattice.mean_chord_m]),
         "ring_corner": np.stack([quarter.ravel() for quarter in quarters], axis=1),
         "panel_surface": np.full(rows * strips, index),
         "panel_row": row,

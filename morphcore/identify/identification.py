@@ -96,9 +96,7 @@ class Identification:
 
     def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
-        return chain_model(
-            aircraft, flight, links, chordwise=self.settings.chordwise, spanwise=self.settings.spanwise
-        )
+        return chain_model(aircraft, flight, links, self.settings.lattice)
 
     @cached_property
     def cases(self) -> tuple[SampleCase, ...]:

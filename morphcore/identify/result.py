@@ -102,7 +102,7 @@ class IdentifyResult:
         return {
             "model": parameters_document(self.parameters)
             | {
-                "lattice": {"chordwise": self.settings.chordwise, "spanwise": self.settings.spanwise},
+                "lattice": self.settings.lattice.to_document(),
                 "step_s": self.settings.step_s,
                 "start": self.settings.start,
             },

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
+from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
 from morphcore.identify.swarm import SwarmSettings
 from morphcore.models.equivalent import MOST_LINKS
@@ -33,8 +34,7 @@ class ModelSettings:
     separate_wings: bool = False
     aero_coefficients: tuple[str, ...] = AERO_COEFFICIENTS
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    chordwise: int = 4
-    spanwise: int = 10
+    lattice: LatticeSettings = DEFAULT_LATTICE
     step_s: float = STEP_S
     start: StartMode = "trim"
 
@@ -56,7 +56,6 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
     """Read the model's part of a request."""
     fields = Fields(document, pointer)
     default = ModelSettings()
-    lattice = fields.optional_child("lattice")
     bounds = fields.optional_child("bounds")
     pairs = {name: _pair(bounds, name) for name in BOUND_NAMES if bounds.has(name)}
     bounds.done()
@@ -67,12 +66,10 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
         separate_wings=fields.flag("separate_wings", default=False),
         aero_coefficients=tuple(fields.raw("aero_coefficients", list(AERO_COEFFICIENTS))),
         bounds=pairs,
-        chordwise=lattice.whole("chordwise", default=default.chordwise, least=1, most=8),
-        spanwise=lattice.whole("spanwise", default=default.spanwise, least=4, most=20),
+        lattice=lattice_settings(fields.raw("lattice", {}), f"{pointer}/lattice"),
         step_s=fields.number("step_s", default=default.step_s, least=5e-4, most=0.01),
         start=fields.choice("start", ("trim", "given")) if fields.has("start") else "trim",  # type: ignore[arg-type]
     )
-    lattice.done()
     fields.done()
     return settings
 

@@ -11,6 +11,7 @@ from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_ME
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.lanes import LANES
 from morphcore.models.kernels.layout import (
     AERO_C,
@@ -117,7 +118,7 @@ class ChainModel:
 
 
 def chain_model(
-    aircraft: Aircraft, flight: Flight, links_per_wing: int, *, chordwise: int = 4, spanwise: int = 10
+    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: LatticeSettings = DEFAULT_LATTICE
 ) -> ChainModel:
     """The equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
 
@@ -131,14 +132,14 @@ def chain_model(
             pointer="/model/links_per_wing",
             hint=f"give a whole number in 1..{MOST_LINKS}",
         )
-    lattice = aircraft_lattice(aircraft, chordwise, spanwise)
+    lattices = aircraft_lattice(aircraft, lattice)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0 in zip(aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True):
+    for surface, part, strip0 in zip(aircraft.surfaces, lattices.lattices, lattices.strip0, strict=True):
         count = links_per_wing if surface.flexible else 1
         rows.append([link, count, strip0, part.spanwise, pair])
         link += count
         pair += count * part.spanwise
-    return ChainModel(aircraft, flight, lattice, links_per_wing, np.array(rows, dtype=np.int64))
+    return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
 
 
 def physical_guess(model: ChainModel, division: Array | None = None, *, wing_sets: int = 1) -> ParameterBatch:

@@ -15,6 +15,7 @@ from morphcore.aero.environment import Environment, air_velocity
 from morphcore.errors import FlightDiverged, InvalidInput
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import (
     ChainModel,
     ParameterBatch,
@@ -66,7 +67,7 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     start: StartMode = "trim",
     environment: Environment | None = None,
     rng: np.random.Generator | None = None,
-    lattice: tuple[int, int] = (4, 10),
+    lattice: LatticeSettings = DEFAULT_LATTICE,
 ) -> Simulation:
     """Fly one aircraft through prescribed hinge motions.
 
@@ -79,7 +80,7 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     output_step_s : s between the rows of the trajectory. step_s : longest time step, s.
     start : "trim" for straight level flight of this model, "given" for the flight's measured start.
     environment : gust and turbulence on top of the flight's wind. rng : source of the turbulence.
-    lattice : panels of each surface, along the chord and along the span.
+    lattice : panels of each surface and core of their vortices.
 
     Raises
     ------
@@ -132,9 +133,8 @@ def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
 
 
 def _model(
-    aircraft: Aircraft, flight: Flight, model: Literal["rigid"] | ParameterBatch, lattice: tuple[int, int]
+    aircraft: Aircraft, flight: Flight, model: Literal["rigid"] | ParameterBatch, lattice: LatticeSettings
 ) -> tuple[ParameterBatch, ChainModel]:
-    chordwise, spanwise = lattice
     if isinstance(model, ParameterBatch):
         if model.particles != 1:
             raise InvalidInput(
@@ -142,14 +142,14 @@ def _model(
                 pointer="/model",
                 hint="choose one with ParameterBatch.select, or fly them together with fly_batch",
             )
-        return model, chain_model(aircraft, flight, model.links, chordwise=chordwise, spanwise=spanwise)
+        return model, chain_model(aircraft, flight, model.links, lattice)
     if model != "rigid":
         raise InvalidInput(
             f"model is {model!r}",
             pointer="/model",
             hint='give "rigid" or the parameters of an equivalent model',
         )
-    chain = chain_model(aircraft, flight, 1, chordwise=chordwise, spanwise=spanwise)
+    chain = chain_model(aircraft, flight, 1, lattice)
     return physical_guess(chain), chain
 
 

@@ -174,7 +174,8 @@ class FreshModel:
 
         corners = place(self.corners)
         stream_B, mach = wind_B - motion.twist_B[3:], flight.mach or 0.0
-        at_controls = influence(place(self.controls), corners, table, stream_B, mach=mach)
+        core = self.model.lattice.settings.core
+        at_controls = influence(place(self.controls), corners, table, stream_B, core, mach)
         circulation = solve_circulation(
             at_controls, panel_normals(corners, table), wind_B - velocity(self.controls)
         )
@@ -182,7 +183,7 @@ class FreshModel:
         if lag is not None:
             slow, fast = self.lagged(circulation, lag, blend)
             lagged = (1.0 - JONES_A1 - JONES_A2) * circulation + JONES_A1 * slow + JONES_A2 * fast
-        at_edges = influence(edge_midpoints(corners, table), corners, table, stream_B, mach=mach)
+        at_edges = influence(edge_midpoints(corners, table), corners, table, stream_B, core, mach)
         forces = edge_forces(
             corners,
             table,

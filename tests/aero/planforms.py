@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.polar import steady_edges
-from morphcore.aero.vlm import VORTEX_CORE, RingTable, ring_table
+from morphcore.aero.vlm import RingTable, ring_table
 from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
-from morphcore.geometry.lattice import surface_lattice
+from morphcore.geometry.lattice import DEFAULT_CORE, VortexCore, surface_lattice
 
 Array = NDArray[np.float64]
 Warp = Callable[[Array], Array]
@@ -78,7 +78,7 @@ def elliptic(semi_span: float) -> Warp:
 
 
 def lift_and_drag(
-    wing: Lattice, alpha_rad: float, area: float, *, core: float = VORTEX_CORE, mach: float = 0.0
+    wing: Lattice, alpha_rad: float, area: float, *, core: VortexCore = DEFAULT_CORE, mach: float = 0.0
 ) -> tuple[float, float, Array]:
     """Lift and induced drag coefficients and the circulations (r,) at 1 m/s."""
     flow_B = -np.array([np.cos(alpha_rad), 0.0, np.sin(alpha_rad)])

@@ -10,11 +10,17 @@ import pytest
 from morphcore.aero.polar import steady_polar
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, load_aircraft
+from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from tests.aero.planforms import EXAMPLES, straight_wings
 
 ALPHA = 0.0623
 MIRROR_FORCE = np.array([1.0, -1.0, 1.0])
 MIRROR_MOMENT = -MIRROR_FORCE
+
+
+def with_core(fraction: float) -> LatticeSettings:
+    """The default lattice with a core of another size."""
+    return LatticeSettings(core=VortexCore(fraction=fraction))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +77,7 @@ def test_no_singularity_in_the_whole_sweep(aircraft, left_share, beta):
 def test_core_does_not_matter(aircraft, sweep):
     """A core ten times smaller changes lift by less than 1e-3, unswept and fully swept."""
     lifts = [
-        steady_polar(aircraft, 150.0, 1.225, ALPHA, hinge_rad=(sweep, sweep), core=core).lift_n
+        steady_polar(aircraft, 150.0, 1.225, ALPHA, hinge_rad=(sweep, sweep), lattice=with_core(core)).lift_n
         for core in (0.1, 0.01)
     ]
     assert lifts[0] == pytest.approx(lifts[1], rel=1e-3)
@@ -90,7 +96,7 @@ def test_core_holds_where_a_leg_strikes_a_control_point(core, low, high):
     def peak(offset: float) -> float:
         rear = replace(front, name="rear", position_m=(-0.5, offset, 0.0))
         # at this angle the wake stays in the plane of the rear wing
-        loads = steady_polar(replace(wings, surfaces=(front, rear)), 1.0, 1.0, 1e-9, core=core)
+        loads = steady_polar(replace(wings, surfaces=(front, rear)), 1.0, 1.0, 1e-9, lattice=with_core(core))
         return float(np.abs(loads.circulation).max())
 
     struck = max(

@@ -14,6 +14,7 @@ from morphcore.aero.vlm import (
     solve_circulation,
 )
 from morphcore.errors import InvalidInput, UnsupportedRegime
+from morphcore.geometry.lattice import VortexCore
 from tests.aero.planforms import Lattice, lattice, straight_wings
 
 STREAM_B = np.array([-0.98, -0.05, -0.17])
@@ -44,7 +45,7 @@ def test_rings_by_the_textbook(wing):
     1e-9.
     """
     points = np.array([[0.3, 0.5, -0.4], [-0.5, -0.9, 0.3], [0.02, 0.4, 0.31]])
-    velocity_B = influence(points, wing.corners_B, wing.table, STREAM_B, core=1e-3)
+    velocity_B = influence(points, wing.corners_B, wing.table, STREAM_B, core=VortexCore(fraction=1e-3))
     wake = 1e5 * STREAM_B / np.linalg.norm(STREAM_B)
     table = wing.table
     for ring in range(table.rings):
@@ -66,7 +67,9 @@ def test_induced_velocity_has_no_sources(wing):
     step = 1e-4
     centre = np.array([0.05, 0.4, -0.15])
     points = np.concatenate([[centre + sign * step * np.eye(3)[a] for sign in (1, -1)] for a in range(3)])
-    velocity_B = influence(points, wing.corners_B, wing.table, STREAM_B, core=1e-3).sum(axis=1)
+    velocity_B = influence(points, wing.corners_B, wing.table, STREAM_B, core=VortexCore(fraction=1e-3)).sum(
+        axis=1
+    )
     gradient = np.stack([velocity_B[:, 2 * a] - velocity_B[:, 2 * a + 1] for a in range(3)], axis=1) / (
         2 * step
     )
@@ -157,6 +160,6 @@ def test_what_has_no_meaning_is_refused(wing):
     with pytest.raises(UnsupportedRegime, match=r"Mach 0\.75"):
         influence(wing.controls_B, wing.corners_B, wing.table, STREAM_B, mach=0.75)
     with pytest.raises(InvalidInput, match="core"):
-        influence(wing.controls_B, wing.corners_B, wing.table, STREAM_B, core=0.0)
+        influence(wing.controls_B, wing.corners_B, wing.table, STREAM_B, core=VortexCore(fraction=0.0))
     with pytest.raises(InvalidInput, match="corners"):
         influence(wing.controls_B, wing.corners_B[:-1], wing.table, STREAM_B)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from morphcore.frames import quaternion_from_euler
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, load_aircraft, load_flight
+from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.multibody.dynamics import Motion
 from morphcore.simulate.batch import initial_state
@@ -20,7 +21,7 @@ from morphcore.simulate.schedule import HingeMotion
 Array = NDArray[np.float64]
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SMALL_LATTICE = {"chordwise": 1, "spanwise": 3}  # where the air is not what a test is about
+SMALL_LATTICE = LatticeSettings(chordwise=1, spanwise=3)  # where the air is not what a test is about
 
 
 @dataclass(frozen=True)
@@ -192,4 +193,4 @@ def motion_of(model: ChainModel, hinges: Array, state: Array) -> Motion:
 
 def small_model(aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
     """A chain model whose lattice is not looked at."""
-    return chain_model(aircraft, flight, links, **SMALL_LATTICE)
+    return chain_model(aircraft, flight, links, SMALL_LATTICE)

@@ -14,6 +14,7 @@ from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.errors import FlightDiverged, InvalidInput, TrimNotFound
 from morphcore.frames import euler_rates
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
+from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.simulate.flight import simulate, write_trajectory_csv
@@ -22,9 +23,10 @@ from morphcore.simulate.schedule import ConstantRate, Hold, Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 
 SAMPLES = ("train_rate_0.2", "train_rate_0.5", "train_rate_0.8", "train_asymmetric")
+COARSE = LatticeSettings(chordwise=2, spanwise=6)
 EASY = {
     "duration_s": 1.0,
-    "lattice": (2, 6),
+    "lattice": COARSE,
 }  # a short flight over a coarse lattice: the laws do not need more
 MORPH = ConstantRate(0.0, 0.5, 0.8, start_s=0.1)
 
@@ -44,7 +46,7 @@ def flight(examples: Path) -> Flight:
 @pytest.fixture(scope="module")
 def guess(aircraft: Aircraft, flight: Flight) -> ParameterBatch:
     """Three links a wing, from beam theory."""
-    return physical_guess(chain_model(aircraft, flight, 3, chordwise=2, spanwise=6))
+    return physical_guess(chain_model(aircraft, flight, 3, COARSE))
 
 
 def _history(trajectory: Trajectory, *names: str) -> NDArray[np.float64]:
@@ -74,7 +76,7 @@ def test_channels_agree_with_one_another(
     Central differences over 10 ms rows err by h^2/6 of the third derivative: 1e-3 of the largest rate here.
     """
     sample = load_trajectory(examples / f"{name}.csv")
-    flown = simulate(aircraft, flight, sample, model=guess, lattice=(2, 6)).trajectory
+    flown = simulate(aircraft, flight, sample, model=guess, lattice=COARSE).trajectory
     np.testing.assert_allclose(flown.time_s, sample.time_s, atol=1e-12)
     np.testing.assert_allclose(flown.sweep_left, sample.sweep_left, atol=1e-12)
     np.testing.assert_allclose(flown.sweep_right, sample.sweep_right, atol=1e-12)
@@ -91,7 +93,7 @@ def test_channels_agree_with_one_another(
 def test_tips_are_where_the_links_put_them(aircraft: Aircraft, flight: Flight, guess: ParameterBatch) -> None:
     """Tip columns against the poses of all links at the hinge angles themselves."""
     flown = simulate(aircraft, flight, [ConstantRate(0.6, 0.9, 0.8), Hold(0.3)], model=guess, **EASY)
-    chain = chain_model(aircraft, flight, 3, chordwise=2, spanwise=6)
+    chain = chain_model(aircraft, flight, 3, COARSE)
     plan = flight_plan(chain, [Hold(0.6), Hold(0.3)], time_grid([0.0, 0.01, 0.02]))
     tips_B = tip_positions(chain, guess, plan.hinges[0], flown.trim.q_joint)[0]
     assert flown.trajectory.extra["tip_right_z"][0] == pytest.approx(tips_B[0, 2], abs=1e-12)
@@ -122,7 +124,7 @@ def test_stiff_joints_tend_to_the_rigid_model(
     Without profile drag: that acts at the middle of each link, and a rigid wing is one long link.
     """
     guess = replace(guess, profile_drag=np.zeros(1))
-    one_link = physical_guess(chain_model(aircraft, flight, 1, chordwise=2, spanwise=6))
+    one_link = physical_guess(chain_model(aircraft, flight, 1, COARSE))
     stiff = replace(guess, stiffness=1e6 * guess.stiffness, damping=1e6 * guess.damping)
     schedules = [MORPH, Hold()]
     rigid = simulate(
@@ -189,8 +191,8 @@ def test_a_sample_is_followed_as_its_schedules_are(
         "left": Tabulated(sample.time_s, sample.sweep_left),
         "right": Tabulated(sample.time_s, sample.sweep_right),
     }
-    one = simulate(aircraft, flight, sample, lattice=(2, 6)).trajectory
-    other = simulate(aircraft, flight, schedules, duration_s=sample.duration_s, lattice=(2, 6)).trajectory
+    one = simulate(aircraft, flight, sample, lattice=COARSE).trajectory
+    other = simulate(aircraft, flight, schedules, duration_s=sample.duration_s, lattice=COARSE).trajectory
     np.testing.assert_array_equal(one.euler, other.euler)
 
 

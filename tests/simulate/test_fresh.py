@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
+from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.multibody.dynamics import forward_dynamics_crba
 from morphcore.simulate.fresh import FreshModel, fly_fresh
@@ -97,7 +98,7 @@ def test_given_start():
 
 def test_fresh_flight_is_of_second_order():
     """Halving the fresh flight's own step divides its error by about four; at 5 ms it is below 0.1 mrad."""
-    model = chain_model(example_aircraft(), example_flight(), 2, chordwise=1, spanwise=4)
+    model = chain_model(example_aircraft(), example_flight(), 2, LatticeSettings(chordwise=1, spanwise=4))
     fresh = FreshModel(model, physical_guess(model))
     start, state = fresh.trimmed(np.zeros(2))
     schedules = [sample_schedules("train_rate_0.8")[0], Hold()]
@@ -116,7 +117,7 @@ def test_fresh_flight_is_of_second_order():
 
 def test_wind_carries_the_fresh_flight_along():
     """In steady wind the aircraft flies as in still air, seen from the air."""
-    calm = chain_model(example_aircraft(), example_flight(), 2, chordwise=1, spanwise=4)
+    calm = chain_model(example_aircraft(), example_flight(), 2, LatticeSettings(chordwise=1, spanwise=4))
     blown = replace(calm, flight=replace(calm.flight, wind_N=np.array([5.0, -3.0, 1.0])))
     schedules, grid = sample_schedules("train_asymmetric"), time_grid(np.linspace(0.0, 0.5, 51))
     places, attitudes = [], []

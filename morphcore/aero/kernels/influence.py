@@ -7,7 +7,12 @@ wake is a horseshoe of three edges and two legs. The point index is innermost an
 
 from __future__ import annotations
 
-from morphcore.aero.kernels.vortex import leg_velocity, segment_velocity
+from morphcore.aero.kernels.vortex import (
+    leg_velocity,
+    segment_velocity,
+    smoothed_leg_velocity,
+    smoothed_segment_velocity,
+)
 from morphcore.jit import entry_kernel, kernel
 
 
@@ -24,6 +29,7 @@ def ring_influence(
     leg_plus,
     leg_minus,
     leg_core,
+    smoothed,
     wake,
     scratch,
     out,
@@ -37,6 +43,7 @@ def ring_influence(
     edge_plus, edge_minus : (e,) ring whose circulation runs along the edge and the one against it, -1 for
         none.
     leg_start : (l,) corner index on the trailing edge; leg_plus, leg_minus, leg_core : (l,) as for edges.
+    smoothed : whether the law of the core is "smoothed", else "line".
     wake : (3,) unit vector of the free stream. scratch : (3, p).
     out : (3, r, p) velocity, 1/m.
     """
@@ -49,18 +56,31 @@ def ring_influence(
         start, end = edge_start[edge], edge_end[edge]
         px, py, pz = corners[start, 0], corners[start, 1], corners[start, 2]
         ex, ey, ez = corners[end, 0] - px, corners[end, 1] - py, corners[end, 2] - pz
-        core4 = edge_core[edge] ** 4
-        for p in range(count):
-            u[p], v[p], w[p] = segment_velocity(px - x[p], py - y[p], pz - z[p], ex, ey, ez, core4)
+        # the law is chosen outside the loops over the points, which stay without a branch
+        if smoothed:
+            core2 = edge_core[edge] ** 2
+            for p in range(count):
+                u[p], v[p], w[p] = smoothed_segment_velocity(
+                    px - x[p], py - y[p], pz - z[p], ex, ey, ez, core2
+                )
+        else:
+            core4 = edge_core[edge] ** 4
+            for p in range(count):
+                u[p], v[p], w[p] = segment_velocity(px - x[p], py - y[p], pz - z[p], ex, ey, ez, core4)
         _gather(scratch, edge_plus[edge], edge_minus[edge], out)
     # wake legs
     ux, uy, uz = wake[0], wake[1], wake[2]
     for leg in range(leg_start.size):
         start = leg_start[leg]
         px, py, pz = corners[start, 0], corners[start, 1], corners[start, 2]
-        core4 = leg_core[leg] ** 4
-        for p in range(count):
-            u[p], v[p], w[p] = leg_velocity(px - x[p], py - y[p], pz - z[p], ux, uy, uz, core4)
+        if smoothed:
+            core2 = leg_core[leg] ** 2
+            for p in range(count):
+                u[p], v[p], w[p] = smoothed_leg_velocity(px - x[p], py - y[p], pz - z[p], ux, uy, uz, core2)
+        else:
+            core4 = leg_core[leg] ** 4
+            for p in range(count):
+                u[p], v[p], w[p] = leg_velocity(px - x[p], py - y[p], pz - z[p], ux, uy, uz, core4)
         _gather(scratch, leg_plus[leg], leg_minus[leg], out)
 
 

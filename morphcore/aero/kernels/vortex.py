@@ -1,12 +1,18 @@
-"""Velocity induced by straight vortices, regularised by a core.
+"""Velocity induced by straight vortices, regularised by a core of one of two laws.
 
-Both laws are written without the difference of nearly equal numbers of the textbook form (Katz & Plotkin
-2001, equation 10.115), which on the vortex's extension, where the true velocity vanishes, divides rounding
-noise by the squared distance from the line and ends in 0/0. On a straight wing every edge lies in line with
-its neighbours.
+Segments and semi-infinite legs are written without the difference of nearly equal numbers of the textbook
+form (Katz & Plotkin 2001, equation 10.115), which on the vortex's extension, where the true velocity
+vanishes, divides rounding noise by the squared distance from the line and ends in 0/0. On a straight wing
+every edge lies in line with its neighbours.
 
-The core is Vatistas's (Vatistas, Kozel & Mih 1991, n = 2): a factor h^2 / sqrt(h^4 + core^4), with h the
-distance from the vortex's *line*, so that a vortex cut in two induces what the whole one does.
+"Line" is the core of Vatistas (Vatistas, Kozel & Mih 1991, n = 2): a factor h^2 / sqrt(h^4 + core^4), with h
+the distance from the vortex's *line*, so that a vortex cut in two induces what the whole one does.
+
+"Smoothed" adds a cut-off to the denominator of the product form,
+``(|a| + |b|) / (|a||b| (|a||b| + a.b) + core^2 l^2)`` (van Garrel 2003, ECN-C--03-079, whose cut-off has no
+unit; the l^2 of the segment's length makes it a length, as in OpenFAST's OLAF). Beside the middle of a long
+vortex it is a factor h^2 / (h^2 + 2 core^2), which at four cores still takes 11 per cent ("line": 0.2), and a
+vortex cut in two does not induce what the whole one does.
 """
 
 from __future__ import annotations
@@ -22,7 +28,7 @@ TINY = 1e-150
 
 @inlined
 def segment_velocity(ax, ay, az, ex, ey, ez, core4):
-    """Velocity (3 components, 1/m of unit circulation) of a segment from P + a to P + a + e, at a point P.
+    """Velocity (3 components, 1/m of unit circulation) of a segment from P + a to P + a + e, at P; "line".
 
     ``a`` runs from the point to the segment's start, ``e`` from start to end, m; ``core4`` is the core radius
     to the fourth, m^4. Circulation is right-handed about ``e``.
@@ -49,7 +55,7 @@ def segment_velocity(ax, ay, az, ex, ey, ez, core4):
 
 @inlined
 def leg_velocity(ax, ay, az, ux, uy, uz, core4):
-    """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along u from P + a, at P.
+    """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along u from P + a; "line".
 
     ``u`` is a unit vector. Circulation is right-handed about ``u``; arguments as in ``segment_velocity``.
     """
@@ -63,4 +69,41 @@ def leg_velocity(ax, ay, az, ux, uy, uz, core4):
     above = a - along if beside else cross2
     below = 1.0 if beside else a + along
     k = above / (FOUR_PI * (a + TINY) * below * root)
+    return -k * cx, -k * cy, -k * cz
+
+
+@inlined
+def smoothed_segment_velocity(ax, ay, az, ex, ey, ez, core2):
+    """Velocity (3 components, 1/m of unit circulation) of a segment as in ``segment_velocity``; "smoothed".
+
+    ``core2`` is the core radius squared, m^2.
+    """
+    bx, by, bz = ax + ex, ay + ey, az + ez
+    cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
+    cross2 = cx * cx + cy * cy + cz * cz
+    length2 = ex * ex + ey * ey + ez * ez
+    a = sqrt(ax * ax + ay * ay + az * az)
+    b = sqrt(bx * bx + by * by + bz * bz)
+    ab = a * b + TINY
+    dot = ax * bx + ay * by + az * bz
+    # ab + dot, alongside (dot < 0) without cancellation; see segment_velocity
+    total = cross2 / (ab - dot) if dot <= 0.0 else ab + dot
+    k = (a + b) / (FOUR_PI * (ab * total + core2 * length2 + TINY))
+    return -k * cx, -k * cy, -k * cz
+
+
+@inlined
+def smoothed_leg_velocity(ax, ay, az, ux, uy, uz, core2):
+    """Velocity (3 components, 1/m of unit circulation) of a leg as in ``leg_velocity``; "smoothed".
+
+    The limit of the segment e = l u for l -> infinity: b -> l, ab + dot -> l (a + a.u), cross -> l (u x a):
+    numerator and denominator both grow as l^2 and leave ``(u x -a) / (a (a + a.u) + core^2) / 4 pi``.
+    """
+    cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
+    cross2 = cx * cx + cy * cy + cz * cz
+    a = sqrt(ax * ax + ay * ay + az * az)
+    along = ax * ux + ay * uy + az * uz
+    # a + along, downstream of the start (along < 0) without cancellation
+    total = cross2 / (a - along + TINY) if along <= 0.0 else a + along
+    k = 1.0 / (FOUR_PI * (a * total + core2))
     return -k * cx, -k * cy, -k * cz
