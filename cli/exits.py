@@ -27,14 +27,24 @@ class CommandError(Exception):
     code : exit code.
     hint : what to do about it.
     pointer : JSON pointer to the offending field, "" when there is none.
+    given_by : the option or file that filled in that field, "" when unknown.
     """
 
-    def __init__(self, message: str, *, code: Exit = Exit.FAILED, hint: str = "", pointer: str = "") -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: Exit = Exit.FAILED,
+        hint: str = "",
+        pointer: str = "",
+        given_by: str = "",
+    ) -> None:
         super().__init__(message)
         self.message = message
         self.code = code
         self.hint = hint
         self.pointer = pointer
+        self.given_by = given_by
 
     def to_document(self) -> dict[str, str | int]:
         """Give the error as the JSON that ``--json`` prints."""
@@ -42,5 +52,6 @@ class CommandError(Exception):
             "error": self.message,
             "pointer": self.pointer,
             "hint": self.hint,
+            "given_by": self.given_by,
             "exit_code": int(self.code),
         }

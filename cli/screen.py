@@ -50,24 +50,42 @@ def print_json(document: object) -> None:
 
 
 def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
-    """Print a command's error as a sentence (JSON with ``--json``) and exit with its code."""
+    """Print a command's error as a sentence (JSON where the answer would be JSON) and exit with its code."""
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return command(*args, **kwargs)
         except CommandError as error:
-            if kwargs.get("as_json"):
+            if kwargs.get("as_json") or str(kwargs.get("json_out")) == "-":
                 sys.stderr.write(json.dumps(error.to_document()) + "\n")
             else:
-                console = stderr()
-                where = f"{error.pointer}: " if error.pointer else ""
-                console.print(f"error: {where}{error.message}", style="red", markup=False, soft_wrap=True)
-                if error.hint:
-                    console.print(f"       {error.hint}", markup=False, soft_wrap=True)
+                _print_error(error)
             raise typer.Exit(int(error.code)) from None
 
     return wrapped
+
+
+def _print_error(error: CommandError) -> None:
+    console = stderr()
+    where = f"{error.pointer}: " if error.pointer else ""
+    console.print(f"error: {where}{error.message}", style="red", markup=False, soft_wrap=True)
+    for line in error.hint.splitlines():
+        console.print(f"       {line}", markup=False, soft_wrap=True)
+    if error.given_by:
+        console.print(f"       given by {error.given_by}", markup=False, soft_wrap=True)
+
+
+def print_job_error(error: Document, given_by: str = "") -> None:
+    """Print why a job failed, and the option or file at fault where it is known."""
+    where = f"{error['pointer']}: " if error.get("pointer") else ""
+    detail = error.get("detail") or error.get("message") or ""
+    hint = f" ({error['hint']})" if error.get("hint") else ""
+    console = stderr()
+    line = f"error {error.get('code', '')}: {where}{detail}{hint}"
+    console.print(line, style="red", markup=False, soft_wrap=True)
+    if given_by:
+        console.print(f"       given by {given_by}", markup=False, soft_wrap=True)
 
 
 class Meter:
@@ -133,7 +151,7 @@ def fit_table(result: Document) -> Table:
         )
         table.add_row(
             str(row["sample"]) + ("" if row["role"] == "train" else " *"),
-            *(_short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
+            *(short(row[key]) for key in ("J_rigid", "J_initial", "J_identified")),
             "" if ratio is None else f"{ratio:.1e}",
             *("" if rms[angle] is None else f"{1e3 * rms[angle]:.2f}" for angle in ("phi", "theta", "psi")),
         )
@@ -143,7 +161,7 @@ def fit_table(result: Document) -> Table:
 def model_table(result: Document) -> Table:
     """Show the identified joints, root to tip: stiffness (N m/rad) and damping (N m s/rad)."""
     model = result["model"]
-    corrections = ", ".join(f"{name} {_short(value)}" for name, value in model["aero"].items())
+    corrections = ", ".join(f"{name} {short(value)}" for name, value in model["aero"].items())
     table = Table(
         title=f"Equivalent model, {model['links_per_wing']} links per wing",
         caption=corrections,
@@ -155,8 +173,8 @@ def model_table(result: Document) -> Table:
     damping = model["damping_nms_rad"]
     for joint, stiffness in enumerate(model["stiffness_nm_rad"]):
         own = damping[joint] if joint < len(damping) else damping[-1] if damping else None
-        shown = " ".join(_short(value) for value in own) if isinstance(own, Sequence) else _short(own)
-        table.add_row(str(joint + 1), *(_short(value) for value in stiffness), shown)
+        shown = " ".join(short(value) for value in own) if isinstance(own, Sequence) else short(own)
+        table.add_row(str(joint + 1), *(short(value) for value in stiffness), shown)
     return table
 
 
@@ -188,7 +206,7 @@ def exit_for(status: str) -> Exit:
 def _detail(progress: Document) -> str:
     parts = []
     if progress.get("best_cost") is not None:
-        parts.append(f"cost {_short(progress['best_cost'])}")
+        parts.append(f"cost {short(progress['best_cost'])}")
     if progress.get("flights"):
         parts.append(f"{progress['flights']:,} flights")
     if progress.get("flights_per_s"):
@@ -200,5 +218,6 @@ def _detail(progress: Document) -> str:
     return ", ".join(parts)
 
 
-def _short(value: float | None) -> str:
+def short(value: float | None) -> str:
+    """Give a number with three digits, nothing for None."""
     return "" if value is None else f"{value:.3g}"

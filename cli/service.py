@@ -121,6 +121,13 @@ def _refusal(answer: httpx.Response) -> CommandError:
     return CommandError(
         str(problem.get("detail") or problem.get("title") or f"the service answered {answer.status_code}"),
         code=code,
-        hint=str(problem.get("hint") or ""),
+        hint="\n".join([str(problem.get("hint") or ""), *_further_faults(problem)]).strip(),
         pointer=str(problem.get("pointer") or ""),
     )
+
+
+def _further_faults(problem: Document) -> Iterator[str]:
+    """Give what else is wrong in the request, a line each; the first fault is the problem's own."""
+    for fault in (problem.get("errors") or [])[1:]:
+        hint = f" ({fault['hint']})" if fault.get("hint") else ""
+        yield f"{fault.get('pointer', '')}: {fault.get('detail', '')}{hint}"

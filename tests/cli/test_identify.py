@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from cli import service
 from cli.exits import CommandError, Exit
-from cli.identification import read_json, save_files
+from cli.files import read_json, save_files
 from cli.main import app
 
 RUNNER = CliRunner()

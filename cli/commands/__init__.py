@@ -1,0 +1,1 @@
+"""One file for each command or group of commands; they import what they need when they run."""

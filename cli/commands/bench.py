@@ -1,0 +1,38 @@
+"""``morphid bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cli.commands import options
+from cli.exits import CommandError, Exit
+from cli.screen import print_json, reports_errors, stdout
+
+
+@reports_errors
+def bench(
+    quick: Annotated[bool, typer.Option("--quick", help="Half a minute instead of some.")] = False,
+    samples: Annotated[
+        Path | None, typer.Option(help="Folder with aircraft.json, flight.json and the example flights.")
+    ] = None,
+    as_json: options.AsJson = False,
+) -> None:
+    """Measure this machine: speed of the batch, of the lattice, of the identification."""
+    from worker import numerics
+
+    numerics.prepare_environment(numerics.usable_cores())
+    from morphcore.bench import benchmark_table, run_benchmarks
+    from morphcore.errors import MorphError
+
+    try:
+        figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples)
+    except MorphError as error:
+        raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
+    if as_json:
+        print_json(figures)
+        return
+    for what, value in benchmark_table(figures):
+        stdout().print(f"{what:<60} {value}", markup=False)

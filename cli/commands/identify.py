@@ -1,0 +1,49 @@
+"""``morphid identify``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from cli.commands import options
+from cli.files import require_place
+from cli.screen import fit_table, model_table, reports_errors, stdout
+
+
+@reports_errors
+def identify(
+    aircraft: options.AircraftFile,
+    flight: options.FlightFile,
+    sample: options.Samples,
+    held_out: options.HeldOut = None,
+    links: Annotated[int, typer.Option(min=1, max=8, help="Links per wing.")] = 3,
+    method: options.Method = None,
+    seed: options.Seed = None,
+    particles: options.Particles = None,
+    generations: options.Generations = None,
+    max_seconds: options.MaxSeconds = None,
+    url: options.AtUrl = None,
+    json_out: options.JsonFile = None,
+    plots: options.Plots = None,
+) -> None:
+    """Identify an equivalent model from sample flights."""
+    from cli.running import hand_over, run
+
+    require_place(json_out, "--json")
+    request = options.sample_request("identify", aircraft, flight, sample, held_out or [])
+    request.put("/model/links_per_wing", links, "--links")
+    options.put_search(
+        request,
+        method=method,
+        seed=seed,
+        particles=particles,
+        generations=generations,
+        max_seconds=max_seconds,
+    )
+    hand_over(run(request, url), _show, json_out=json_out, plots=plots)
+
+
+def _show(result: dict[str, Any]) -> None:
+    stdout().print(fit_table(result))
+    stdout().print(model_table(result))

@@ -1,0 +1,99 @@
+"""``morphid jobs``: look after the jobs of a service."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from cli.commands import options
+from cli.screen import (
+    exit_for,
+    fit_table,
+    jobs_table,
+    meter,
+    print_job_error,
+    print_json,
+    reports_errors,
+    stdout,
+)
+
+JobId = Annotated[str, typer.Argument(metavar="JOB", help="Id of the job.")]
+
+jobs = typer.Typer(help="Look after the jobs of a service.", no_args_is_help=True, epilog=options.EXIT_CODES)
+
+
+@jobs.command("ls")
+@reports_errors
+def list_jobs(
+    status: Annotated[str | None, typer.Option(help="Only jobs in this state.")] = None,
+    limit: Annotated[int, typer.Option(min=1, max=100, help="At most so many.")] = 20,
+    url: options.Url = options.DEFAULT_URL,
+    as_json: options.AsJson = False,
+) -> None:
+    """List jobs, the newest first."""
+    from cli.service import Service
+
+    with Service(url) as service:
+        found = service.jobs(status=status, limit=limit)
+    if as_json:
+        print_json(found)
+    else:
+        stdout().print(jobs_table(found))
+
+
+@jobs.command("show")
+@reports_errors
+def show_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+    """Show one job, and its result when there is one."""
+    from cli.service import Service
+
+    with Service(url) as service:
+        found = service.job(job)
+        has_result = found["status"] == "succeeded" or found.get("partial")
+        result = service.result(job) if has_result else None
+    if as_json:
+        print_json({**found, "result": result})
+        return
+    stdout().print(jobs_table([found]))
+    if found.get("error"):
+        print_job_error(found["error"])
+    if result is not None and "fit" in result:
+        stdout().print(fit_table(result))
+
+
+@jobs.command("watch")
+@reports_errors
+def watch_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+    """Follow a job to its end; the exit code tells how it ended. With --json, one line per change."""
+    import json
+
+    from cli.service import Service
+
+    last: dict[str, Any] = {}
+    with Service(url) as service, meter() as bar:
+        for seen in service.watch(job):
+            if as_json and seen != last:
+                stdout().print(json.dumps(seen), markup=False, soft_wrap=True)
+            elif not as_json:
+                bar.show(seen.get("progress"), seen["status"])
+            last = seen
+    if not as_json:
+        stdout().print(jobs_table([last]))
+        if last.get("error"):
+            print_job_error(last["error"])
+    raise typer.Exit(int(exit_for(last["status"])))
+
+
+@jobs.command("cancel")
+@reports_errors
+def cancel_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+    """Ask for a job's end; what it found so far is kept."""
+    from cli.service import Service
+
+    with Service(url) as service:
+        found = service.cancel(job)
+    if as_json:
+        print_json(found)
+    else:
+        stdout().print(jobs_table([found]))

@@ -1,0 +1,86 @@
+"""Read the user's files and write answers, with errors that name the file and what to do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cli.exits import CommandError, Exit
+
+STANDARD_OUTPUT = Path("-")
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file.
+
+    Raises
+    ------
+    CommandError : it is missing or is not JSON; the sentence names the file.
+    """
+    require_file(path)
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandError(f"{path} cannot be read: {error}", code=Exit.INVALID_INPUT) from None
+    except json.JSONDecodeError as error:
+        raise CommandError(
+            f"{path} is not JSON: {error.msg} in line {error.lineno}", code=Exit.INVALID_INPUT
+        ) from None
+
+
+def require_file(path: Path) -> None:
+    """Raise CommandError where there is no such file."""
+    if not path.is_file():
+        raise CommandError(
+            f"there is no file {path}", code=Exit.INVALID_INPUT, hint=f"looked in {Path.cwd()}"
+        )
+
+
+def require_place(path: Path | None, option: str) -> None:
+    """Raise CommandError where a file to be written has no folder: better now than after a search.
+
+    Parameters
+    ----------
+    path : None and ``-`` are always fine.
+    option : the option that names it.
+    """
+    if path is not None and path != STANDARD_OUTPUT and not path.absolute().parent.is_dir():
+        raise CommandError(
+            f"{option} {path}: there is no folder {path.parent}",
+            code=Exit.ENVIRONMENT,
+            hint="make it first, or choose another",
+        )
+
+
+def write_json(document: object, path: Path) -> None:
+    """Write a document for machines and people."""
+    write_bytes((json.dumps(document, indent=1) + "\n").encode(), path)
+
+
+def write_bytes(content: bytes, path: Path) -> None:
+    """Write a file.
+
+    Raises
+    ------
+    CommandError : it cannot be written.
+    """
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise CommandError(f"{path} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None
+
+
+def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
+    """Write plots and curves into a folder and give their paths."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CommandError(f"{folder} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None
+    saved = []
+    for name, content in files.items():
+        target = folder / Path(name).name  # a name from a service must not climb out
+        write_bytes(content, target)
+        saved.append(target)
+    return saved
