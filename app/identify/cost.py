@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.identify.schemas import CostEstimate, EquivalentModel, IdentifyRequest, Search
+from app.identify.schemas import CostEstimate, SamplesRequest, Search, SoughtModel
 from app.schemas.samples import InlineSample
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
@@ -17,9 +17,9 @@ REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured b
 REFERENCE_LINKS = 3
 
 
-def parameter_count(model: EquivalentModel) -> int:
+def parameter_count(model: SoughtModel, links: int) -> int:
     """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections."""
-    joints = model.links_per_wing - 1
+    joints = links - 1
     per_wing = 7 * joints
     return per_wing * (2 if model.separate_wings else 1) + len(model.aero_coefficients)
 
@@ -37,25 +37,25 @@ def _parameter_sets(search: Search, parameters: int) -> int:
     return sets
 
 
-def estimate(request: IdentifyRequest, samples: Sequence[InlineSample]) -> CostEstimate:
-    """Estimate flights and computing time.
+def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample]) -> CostEstimate:
+    """Estimate flights and computing time of one identification.
 
     Parameters
     ----------
+    links
+        Links per wing.
     samples
         The samples with their rows.
     """
-    parameters = parameter_count(request.model)
+    parameters = parameter_count(request.model, links)
     sets = _parameter_sets(request.search, parameters)
     training = [sample for sample in samples if sample.role == "train"]
     flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
-    links = request.model.links_per_wing / REFERENCE_LINKS
-    core_s = flight_s / REAL_TIME_FACTOR * max(links, 1.0)
     return CostEstimate(
         samples=len(samples),
         rows=sum(len(sample.time_s) for sample in samples),
         parameters=parameters,
         flights=sets * len(training),
         flight_s=flight_s,
-        core_s=core_s,
+        core_s=flight_s / REAL_TIME_FACTOR * max(links / REFERENCE_LINKS, 1.0),
     )

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
+from app.schemas.lattice import Lattice, Start, StepS
+from app.schemas.parameters import MAX_LINKS
 from app.schemas.samples import EXAMPLE_SAMPLE, Sample
 
 MAX_SAMPLES = 64
@@ -23,25 +25,6 @@ Range = Annotated[
 ]
 
 
-class VortexCore(Strict):
-    """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
-
-    law: Literal["line", "smoothed"] = "line"
-    fraction: Annotated[float, Field(gt=0.0, le=0.5)] | None = Field(
-        default=None,
-        description="Core radius over the smaller side of a panel (line, 0.1 when left out) or over the mean "
-        "chord of the surface (smoothed, 0.05 when left out).",
-    )
-
-
-class Lattice(Strict):
-    """Panels of each wing's vortex lattice, and the core of its vortices."""
-
-    chordwise: int = Field(default=4, ge=1, le=8)
-    spanwise: int = Field(default=10, ge=4, le=20)
-    core: VortexCore = VortexCore()
-
-
 class Bounds(Strict):
     """Where the search may look; what is left out gets bounds from beam theory around the physical guess."""
 
@@ -54,10 +37,9 @@ class Bounds(Strict):
     lag_s: Range | None = None
 
 
-class EquivalentModel(Strict):
-    """The model whose parameters are sought: wings of rigid links with gimbal joints."""
+class SoughtModel(Strict):
+    """A model whose parameters are sought: wings of rigid links with gimbal joints."""
 
-    links_per_wing: int = Field(default=3, ge=1, le=8)
     separate_wings: bool = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
@@ -68,12 +50,18 @@ class EquivalentModel(Strict):
     )
     bounds: Bounds | None = None
     lattice: Lattice = Lattice()
-    step_s: Annotated[float, Field(ge=0.0005, le=0.01)] | None = Field(
+    step_s: StepS | None = Field(
         default=None, description="Time step; the solver's own choice when left out."
     )
-    start: Literal["trim", "given"] = Field(
+    start: Start = Field(
         default="trim", description="Trim each model by itself, or start from `flight.start`."
     )
+
+
+class EquivalentModel(SoughtModel):
+    """The model whose parameters are sought: wings of rigid links with gimbal joints."""
+
+    links_per_wing: int = Field(default=3, ge=1, le=MAX_LINKS)
 
 
 class Search(Strict):
@@ -107,20 +95,26 @@ EXAMPLE_REQUEST: dict[str, Any] = {
 }
 
 
-class IdentifyRequest(Strict):
-    """Aircraft, flight condition and samples; model and search have good defaults."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
+class SamplesRequest(Strict):
+    """A request to fit models to sample flights."""
 
     aircraft: Aircraft
     flight: Flight
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
-    model: EquivalentModel = EquivalentModel()
+    model: SoughtModel
     search: Search = Search()
 
 
+class IdentifyRequest(SamplesRequest):
+    """Aircraft, flight condition and samples; model and search have good defaults."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
+
+    model: EquivalentModel = EquivalentModel()
+
+
 class CostEstimate(BaseModel):
-    """What an identification would take, to an order of magnitude."""
+    """What a search would take, to an order of magnitude."""
 
     samples: int
     rows: int

@@ -1,22 +1,22 @@
-"""From a parsed request to a job, or to the faults that prevent it."""
+"""From a parsed request to an order, or to the faults that prevent it."""
 
 from __future__ import annotations
 
 from app.database import Session
 from app.documents import Document
 from app.errors import Fault, InvalidRequest
-from app.identify.checks import identify_faults, total_rows_faults
+from app.identify.checks import samples_request_faults, total_rows_faults
 from app.identify.cost import estimate
-from app.identify.schemas import IdentifyRequest, IdentifyValidation
-from app.jobs import store
-from app.jobs.records import Job
+from app.identify.schemas import CostEstimate, IdentifyRequest, SamplesRequest
+from app.jobs.submission import Order, deadline_s
 from app.schemas.samples import InlineSample, UploadedSample
+from app.schemas.vehicle import vehicle_document
 from app.trajectories import repository as trajectories
 
 REPORT_TIME_S = 120.0  # after the search's own time budget: uncertainty, plots, writing
 
 
-def resolve(session: Session, owner: str, request: IdentifyRequest) -> list[InlineSample]:
+def resolve(session: Session, owner: str, request: SamplesRequest) -> list[InlineSample]:
     """Return the samples with their rows, in the order of the request.
 
     Raises
@@ -54,7 +54,7 @@ def _uploaded(session: Session, owner: str, sample: UploadedSample) -> InlineSam
     return InlineSample(name=sample.name or stored.name, role=sample.role, weight=sample.weight, **columns)
 
 
-def checked(session: Session, owner: str, request: IdentifyRequest) -> list[InlineSample]:
+def checked_samples(session: Session, owner: str, request: SamplesRequest) -> list[InlineSample]:
     """Resolve the samples and check everything.
 
     Raises
@@ -63,56 +63,45 @@ def checked(session: Session, owner: str, request: IdentifyRequest) -> list[Inli
         Naming every fault.
     """
     samples = resolve(session, owner, request)
-    faults = identify_faults(request, samples)
+    faults = samples_request_faults(request, samples)
     if faults:
         raise InvalidRequest.of(faults)
     return samples
 
 
-def validate(session: Session, owner: str, request: IdentifyRequest) -> IdentifyValidation:
-    """Make the checks of `submit` and tell what it would cost."""
-    return IdentifyValidation(cost=estimate(request, checked(session, owner, request)))
+def prepare(session: Session, owner: str, request: IdentifyRequest) -> Order[CostEstimate]:
+    """Check the request and make its order.
 
-
-def submit(
-    session: Session,
-    owner: str,
-    request: IdentifyRequest,
-    *,
-    idempotency_key: str | None,
-    max_attempts: int,
-    default_max_seconds: float,
-) -> Job:
-    """Check the request and write its job; publish the job's id after the commit."""
-    samples = checked(session, owner, request)
-    budget_s = request.search.max_seconds
-    return store.create_job(
-        session,
-        owner=owner,
+    Raises
+    ------
+    InvalidRequest
+        Naming every fault.
+    """
+    samples = checked_samples(session, owner, request)
+    links = request.model.links_per_wing
+    return Order(
         operation="identify",
-        request=_document(request, samples),
-        idempotency_key=idempotency_key,
-        max_attempts=max_attempts,
-        max_seconds=default_max_seconds if budget_s is None else budget_s + REPORT_TIME_S,
-        summary=_summary(request, samples),
+        document=samples_document(request, samples),
+        summary={**samples_summary(request, samples), "links_per_wing": links},
+        cost=estimate(request, links, samples),
+        max_seconds=deadline_s(request.search.max_seconds, REPORT_TIME_S),
     )
 
 
-def _document(request: IdentifyRequest, samples: list[InlineSample]) -> Document:
+def samples_document(request: SamplesRequest, samples: list[InlineSample]) -> Document:
     """Build what the worker reads: aircraft and flight as they came, defaults of the rest filled in."""
     return {
-        "aircraft": request.aircraft.model_dump(exclude_unset=True, exclude_none=True),
-        "flight": request.flight.model_dump(exclude_unset=True, exclude_none=True),
+        **vehicle_document(request.aircraft, request.flight),
         "samples": [sample.model_dump() for sample in samples],
         "model": request.model.model_dump(exclude_none=True),
         "search": request.search.model_dump(exclude_none=True),
     }
 
 
-def _summary(request: IdentifyRequest, samples: list[InlineSample]) -> Document:
+def samples_summary(request: SamplesRequest, samples: list[InlineSample]) -> Document:
+    """Build what listings show."""
     return {
         "aircraft": request.aircraft.name,
-        "links_per_wing": request.model.links_per_wing,
         "method": request.search.method,
         "samples": [
             {"name": sample.name, "role": sample.role, "rows": len(sample.time_s)} for sample in samples

@@ -11,7 +11,7 @@ from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
-Operation = Literal["identify"]
+Operation = Literal["identify", "study", "simulate", "optimize"]
 
 
 class Progress(BaseModel):

@@ -1,10 +1,16 @@
-"""Identified models as the endpoints show them."""
+"""Identified models as the endpoints show them, and as other requests use them."""
 
 from __future__ import annotations
 
 from app.database import Session
+from app.documents import Document
+from app.errors import Fault, InvalidRequest, ModelNotFound
 from app.models import repository
+from app.models.checks import known_model_faults
 from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
+from app.schemas.parameters import KnownModel
+
+HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
 
 
 def _shown(model: repository.ModelSummary) -> ModelSummary:
@@ -30,3 +36,33 @@ def get(session: Session, owner: str, model_id: str) -> IdentifiedModel:
     """One model with its document."""
     summary, document = repository.get_model(session, owner, model_id)
     return IdentifiedModel(**_shown(summary).model_dump(), **document)
+
+
+def known_model(session: Session, owner: str, model: KnownModel, pointer: str = "/model") -> Document:
+    """Build the model that a worker flies: ``parameters`` outright, and how they are to be flown.
+
+    Raises
+    ------
+    InvalidRequest
+        The owner has no such model, or the parameters do not fit together.
+    """
+    faults = known_model_faults(model, pointer)
+    if faults:
+        raise InvalidRequest.of(faults)
+    if model.model_id is None:
+        parameters = model.model_dump(include={"parameters"}, exclude_none=True)["parameters"]
+    else:
+        parameters = _identified(session, owner, model.model_id, f"{pointer}/model_id")
+    chosen = model.model_dump(include=set(HOW_IDENTIFIED), exclude_none=True)
+    identified = {name: parameters[name] for name in HOW_IDENTIFIED if parameters.get(name) is not None}
+    return {"parameters": parameters, **identified, **chosen}
+
+
+def _identified(session: Session, owner: str, model_id: str, pointer: str) -> Document:
+    try:
+        _, document = repository.get_model(session, owner, model_id)
+    except ModelNotFound as error:
+        fault = Fault("model_not_found", error.detail, pointer, error.hint)
+        raise InvalidRequest.of([fault]) from None
+    parameters: Document = document["model"]
+    return parameters
