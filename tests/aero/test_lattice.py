@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
+from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import load_aircraft
-from morphcore.geometry.lattice import surface_lattice, surface_pose
+from morphcore.geometry.lattice import (
+    LatticeSettings,
+    VortexCore,
+    lattice_settings,
+    surface_lattice,
+    surface_pose,
+)
 from tests.aero.planforms import EXAMPLES, straight_wings
 
 
@@ -47,3 +54,43 @@ def test_positive_sweep_moves_the_tip_aft():
     R_BW, r_B = surface_pose(right, 0.5)
     np.testing.assert_array_equal(r_B, right.position_m)
     np.testing.assert_allclose(R_BW @ [0, 3, 0], (-3 * np.sin(0.5), 3 * np.cos(0.5), 0), rtol=1e-15)
+
+
+def test_settings_survive_their_document():
+    """Settings read back from their document are the same, a default fraction as the number that it is."""
+    chosen = LatticeSettings(2, 6, VortexCore("smoothed", 0.07))
+    assert lattice_settings(chosen.to_document()) == chosen
+    assert lattice_settings({}) == LatticeSettings()
+    smoothed = lattice_settings({"core": {"law": "smoothed"}})
+    assert smoothed.core.radius_fraction == 0.05
+    assert lattice_settings(smoothed.to_document()).core == VortexCore("smoothed", 0.05)
+    assert lattice_settings({"core": {"fraction": None}}).core.radius_fraction == 0.1
+
+
+@pytest.mark.parametrize(
+    ("document", "pointer"),
+    [
+        ({"chordwise": 9}, "/x/chordwise"),
+        ({"spanwise": 3}, "/x/spanwise"),
+        ({"core": {"law": "thick"}}, "/x/core/law"),
+        ({"core": {"fraction": 0.0}}, "/x/core/fraction"),
+        ({"core": {"fraction": 0.51}}, "/x/core/fraction"),
+        ({"core": {"fracton": 0.1}}, "/x/core/fracton"),
+        ({"panels": 4}, "/x/panels"),
+    ],
+)
+def test_bad_settings_name_the_field(document, pointer):
+    """What is wrong in a lattice's document is said with a pointer to it and a hint."""
+    with pytest.raises(InvalidInput) as caught:
+        lattice_settings(document, "/x")
+    assert caught.value.pointer == pointer
+    assert caught.value.hint
+
+
+def test_a_core_without_a_law_or_a_size_is_refused():
+    """Laws that there are not, and radii that are not above zero, are errors."""
+    with pytest.raises(InvalidInput, match="law"):
+        VortexCore("thick")
+    for fraction in (0.0, -0.1, float("nan")):
+        with pytest.raises(InvalidInput, match="not above 0"):
+            VortexCore(fraction=fraction)

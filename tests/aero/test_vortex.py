@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from morphcore.aero.kernels.vortex import leg_velocity, segment_velocity
+from morphcore.aero.kernels.vortex import (
+    leg_velocity,
+    segment_velocity,
+    smoothed_leg_velocity,
+    smoothed_segment_velocity,
+)
 from morphcore.jit import kernel
 
+LAWS = ("line", "smoothed")
 TINY_CORE = 1e-9  # of a metre: no core at the distances of these tests
 
 
@@ -20,16 +26,38 @@ def _leg(a, u, core4):
     return leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core4)
 
 
-def segment(start, end, point, core=TINY_CORE):
+@kernel
+def _smoothed_segment(a, e, core2):
+    return smoothed_segment_velocity(a[0], a[1], a[2], e[0], e[1], e[2], core2)
+
+
+@kernel
+def _smoothed_leg(a, u, core2):
+    return smoothed_leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core2)
+
+
+def segment(start, end, point, core=TINY_CORE, law="line"):
     """Velocity at a point of a segment of unit circulation."""
     start, end, point = (np.asarray(v, dtype=float) for v in (start, end, point))
+    if law == "smoothed":
+        return np.array(_smoothed_segment(start - point, end - start, core**2))
     return np.array(_segment(start - point, end - start, core**4))
 
 
-def leg(start, direction, point, core=TINY_CORE):
+def leg(start, direction, point, core=TINY_CORE, law="line"):
     """Velocity at a point of a semi-infinite vortex of unit circulation."""
     start, direction, point = (np.asarray(v, dtype=float) for v in (start, direction, point))
-    return np.array(_leg(start - point, direction / np.linalg.norm(direction), core**4))
+    unit = direction / np.linalg.norm(direction)
+    if law == "smoothed":
+        return np.array(_smoothed_leg(start - point, unit, core**2))
+    return np.array(_leg(start - point, unit, core**4))
+
+
+def product_form(start, end, point, core):
+    """The law "smoothed" as it is printed, a x b and all."""
+    a, b = np.asarray(start) - point, np.asarray(end) - point
+    la, lb, length = np.linalg.norm(a), np.linalg.norm(b), np.linalg.norm(b - a)
+    return (la + lb) * np.cross(a, b) / (la * lb * (la * lb + a @ b) + (core * length) ** 2) / (4 * np.pi)
 
 
 def biot_savart(start, end, point):
@@ -97,11 +125,12 @@ def test_core_spares_the_distance_and_bounds_the_middle():
     assert max(near) > 0.99 / (2 * np.pi * core * np.sqrt(2))
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("point", [(0, 0, 0), (1, 0, 0), (0.5, 0, 0), (2, 0, 0), (-3, 0, 0)])
-def test_nothing_on_the_line(point):
-    """On its own line, ends and middle included, a vortex induces exactly nothing."""
-    assert not segment((0, 0, 0), (1, 0, 0), point, 0.01).any()
-    assert not leg((0, 0, 0), (1, 0, 0), point, 0.01).any()
+def test_nothing_on_the_line(point, law):
+    """On its own line, ends and middle included, a vortex of either law induces exactly nothing."""
+    assert not segment((0, 0, 0), (1, 0, 0), point, 0.01, law).any()
+    assert not leg((0, 0, 0), (1, 0, 0), point, 0.01, law).any()
 
 
 def test_no_cancellation_on_the_extension():
@@ -109,3 +138,71 @@ def test_no_cancellation_on_the_extension():
     h, d = 1e-7, 0.2
     speed = leg((0, 0, 0), (1, 0, 0), (-d, h, 0), core=1e-12)[2]
     assert speed == pytest.approx(h / (8 * np.pi * d**2), rel=1e-10)
+
+
+@pytest.mark.parametrize("core", [TINY_CORE, 0.015, 0.4])
+def test_smoothed_segment_is_the_product_form(core):
+    """The law "smoothed" is the printed product form, at random points within some lengths of the segment.
+
+    The printed form loses what it subtracts, |a||b| + a.b beside the segment: nine digits at these points.
+    """
+    rng = np.random.default_rng(11)
+    start, end = np.array((0.1, -0.2, 0.3)), np.array((1.2, 0.4, -0.1))
+    for point in rng.uniform(-2.0, 2.0, size=(200, 3)):
+        expected = product_form(start, end, point, core)
+        found = segment(start, end, point, core, "smoothed")
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("core", [TINY_CORE, 0.015, 0.4])
+@pytest.mark.parametrize("point", [*POINTS, (0.1, -0.2, 0.301), (-4.4, 0.3, -1.68)])
+def test_smoothed_leg_is_a_long_segment(point, core):
+    """A smoothed leg is the limit of smoothed segments, which near it as distance over length: 1e-7 or less.
+
+    The last two points lie beside the start and, by a core or so, beside the leg.
+    """
+    start, direction = np.array((0.1, -0.2, 0.3)), np.array((-0.9, 0.1, -0.4))
+    far = start + 1e9 * direction / np.linalg.norm(direction)
+    expected = segment(start, far, point, core, "smoothed")
+    found = leg(start, direction, point, core, "smoothed")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-7 * np.abs(expected).max())
+
+
+def test_laws_agree_far_away():
+    """Far from a vortex, or with vanishing cores, its law does not matter.
+
+    What the product form's core takes at a distance R of many lengths is core^2 l^2 / 2 R^4.
+    """
+    start, end, core = np.zeros(3), np.array((0.0, 0.3, 0.0)), 0.015
+    for distance in (3.0, 30.0):
+        point = distance * np.array((0.8, 0.0, 0.6))
+        line, smoothed = (np.linalg.norm(segment(start, end, point, core, law)) for law in LAWS)
+        assert abs(smoothed / line - 1) < 1.1 * (core * 0.3 / distance**2) ** 2 / 2 + 1e-14
+    for point in POINTS:
+        line, smoothed = (leg(start, (1, 0, 0), point, TINY_CORE, law) for law in LAWS)
+        np.testing.assert_allclose(smoothed, line, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_velocity_is_bounded_near_the_line(law):
+    """Passing a vortex at any distance, down to nothing, the velocity is finite and below 1 / (4 core).
+
+    The peaks are 1 / (2 sqrt(2) pi core) of "line" and, with two cores squared in the denominator,
+    1 / (4 sqrt(2) pi core) of "smoothed" beside a long vortex; beside a leg's start, half of 1 / (2 pi core).
+    """
+    core = 0.0075
+    for h in np.append(0.0, np.geomspace(1e-200, 10.0, 300)):
+        for along in (-1.0, -1e-9, 0.0, 1e-9, 0.4, 1.0, 1.0 + 1e-9, 7.0):
+            for speed in (
+                segment((0, 0, 0), (1, 0, 0), (along, h, 0), core, law),
+                leg((0, 0, 0), (1, 0, 0), (along, h, 0), core, law),
+            ):
+                assert np.linalg.norm(speed) < 1 / (4 * core)
+
+
+def test_a_smoothed_core_reaches_further():
+    """Beside the middle of a long vortex "smoothed" is the plane vortex times h^2 / (h^2 + 2 core^2)."""
+    core, ends = 0.015, ((0.0, -500.0, 0.0), (0.0, 500.0, 0.0))
+    for h in (0.0375, 0.06, 0.15):
+        speed = np.linalg.norm(segment(*ends, (h, 0, 0), core, "smoothed"))
+        assert speed == pytest.approx(h / (2 * np.pi * (h**2 + 2 * core**2)), rel=1e-6)

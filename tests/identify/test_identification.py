@@ -238,6 +238,7 @@ def test_paper_preset_is_the_papers_swarm() -> None:
         ({"model": {"links_per_wing": 9}}, "/model/links_per_wing"),
         ({"model": {"link_count": 3}}, "/model/link_count"),
         ({"model": {"lattice": {"chordwise": 0}}}, "/model/lattice/chordwise"),
+        ({"model": {"lattice": {"core": {"law": "soft"}}}}, "/model/lattice/core/law"),
         ({"search": {"method": "magic"}}, "/search/method"),
         ({"search": {"seed": -1}}, "/search/seed"),
         ({"search": {"inertia": 1e400}}, "/search/inertia"),
