@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.aero.operator import LatticeOperator, lattice_operator
-from morphcore.frames import axis_rotation
+from morphcore.errors import InvalidInput
+from morphcore.frames import skew
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
 from morphcore.simulate.kernels.interpolate import blend
-from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.schedule import HingeMotion, Schedule
 
 Array = NDArray[np.float64]
 
@@ -23,6 +25,7 @@ STEP_S = 0.005
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
+RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at its end
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,11 @@ class FlightPlan:
         return np.diff(self.rates, axis=0) / self.grid.step_s
 
 
+def _hinged(aircraft: Aircraft) -> NDArray[np.bool_]:
+    """(s,) which surfaces have a hinge."""
+    return np.array([surface.hinge is not None for surface in aircraft.surfaces])
+
+
 def _blended(nodes: Array, weights: Array, base: NDArray[np.int64]) -> Array:
     out = np.empty((base.size, *nodes.shape[1:]))
     blend(weights, base, nodes.reshape(nodes.shape[0], -1), out.reshape(base.size, -1))
@@ -119,9 +127,74 @@ def flight_plan(
     """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at)."""
     times = grid.times_s
     motions = [schedule.motion(times) for schedule in schedules]
+    angles = np.stack([motion.angle for motion in motions], axis=1)
+    wind_N = None if air_velocity_N is None else air_velocity_N(times)
+    table = _operator_table(model, angles * _hinged(model.aircraft), node_spacing_rad)
+    return _plan(model, grid, motions, table, wind_N)
+
+
+@dataclass(frozen=True)
+class CommonPath:
+    """All hinges of an aircraft at one angle: the lattice over a range of it, for schedules within the range.
+
+    Plans of different schedules share its nodes, so that another one costs no lattice; models that differ in
+    their links alone may share them too.
+
+    low_rad, high_rad : the range. matrices, strips : as of ``OperatorTable``, at equal distances over it.
+    """
+
+    low_rad: float
+    high_rad: float
+    matrices: Array
+    strips: Array
+
+    def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
+        """Prepare a flight in which all hinges follow one schedule.
+
+        Raises
+        ------
+        InvalidInput : the schedule leaves the range.
+        """
+        motion = schedule.motion(grid.times_s)
+        width = self.high_rad - self.low_rad
+        share = (motion.angle - self.low_rad) / width
+        if share.min() < -RANGE_SLACK or share.max() > 1.0 + RANGE_SLACK:
+            raise InvalidInput(
+                f"the schedule runs from {motion.angle.min():g} to {motion.angle.max():g} rad",
+                pointer="/schedule",
+                hint=f"this path's range is {self.low_rad:g}..{self.high_rad:g} rad",
+            )
+        position = share * (self.matrices.shape[0] - 1)
+        table = OperatorTable(self.matrices, self.strips, position)
+        return _plan(model, grid, [motion] * len(model.aircraft.surfaces), table)
+
+
+def common_path(
+    model: ChainModel, low_rad: float, high_rad: float, node_spacing_rad: float = NODE_SPACING_RAD
+) -> CommonPath:
+    """Tabulate the lattice for all hinges alike between two different angles."""
+    mach = model.flight.mach or 0.0
+    count = max(4, int(np.ceil((high_rad - low_rad) / node_spacing_rad)) + 1)
+    rows = np.outer(np.linspace(low_rad, high_rad, count), _hinged(model.aircraft))
+    operators = [lattice_operator(model.lattice, tuple(row), mach=mach) for row in rows]
+    return CommonPath(
+        low_rad,
+        high_rad,
+        np.stack([item.matrix for item in operators]),
+        np.stack([item.strips for item in operators]),
+    )
+
+
+def _plan(
+    model: ChainModel,
+    grid: TimeGrid,
+    motions: Sequence[HingeMotion],
+    table: OperatorTable,
+    wind_N: Array | None = None,
+) -> FlightPlan:
     hinges = np.stack(
         [
-            _hinge_rows(surface, motion.angle, motion.rate)
+            hinge_rows(surface, motion.angle, motion.rate)
             for surface, motion in zip(model.aircraft.surfaces, motions, strict=True)
         ],
         axis=1,
@@ -130,22 +203,12 @@ def flight_plan(
         np.stack([getattr(motion, name) for motion in motions], axis=1)
         for name in ("angle", "rate", "acceleration")
     )
-    hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
-    wind_N = (
-        np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
-    )
-    return FlightPlan(
-        grid,
-        angles,
-        rates,
-        accelerations,
-        hinges,
-        wind_N,
-        _operator_table(model, angles * hinged, node_spacing_rad),
-    )
+    if wind_N is None:
+        wind_N = np.tile(model.flight.wind_N, (grid.steps + 1, 1))
+    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, table)
 
 
-def _hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
+def hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
     """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/hinge.py."""
     rows = np.zeros((angle.size, HINGE_ROWS))
     axis_offset = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
@@ -156,9 +219,12 @@ def _hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
         return rows
     sign, axis = surface.rotation_sign, surface.hinge.axis_index
     pivot = np.array(surface.hinge.position_m)
-    R_BW = np.stack([axis_rotation(axis, sign * value) for value in angle])
+    direction = np.eye(3)[axis]
+    along = np.outer(direction, direction)
+    cosine, sine = np.cos(angle)[:, None, None], (sign * np.sin(angle))[:, None, None]
+    R_BW = along + cosine * (np.eye(3) - along) + sine * skew(direction)  # Rodrigues' formula
     arm_W = root - pivot + axis_offset  # from the hinge axis to the first link's origin, constant in W
-    direction = sign * np.eye(3)[axis]
+    direction = sign * direction
     rows[:, :9] = R_BW.reshape(-1, 9)
     rows[:, H_SUBSPACE : H_SUBSPACE + 3] = direction
     rows[:, H_SUBSPACE + 3 : H_SUBSPACE + 6] = np.cross(direction, arm_W)

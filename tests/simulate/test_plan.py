@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore.aero.operator import lattice_operator
-from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
+from morphcore.errors import InvalidInput
+from morphcore.simulate.plan import STEP_S, common_path, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold
 from tests.models.chains import Parabola, odd_aircraft, small_model
 from tests.simulate.flights import example_model, fly_trimmed, sample, sample_plan, sample_schedules
@@ -141,3 +142,28 @@ def test_no_hinge_no_angle():
         plans.append(flight_plan(model, schedules, time_grid(np.array([0.0, 0.01, 0.02]))))
     np.testing.assert_array_equal(plans[0].table.matrices, plans[1].table.matrices)
     np.testing.assert_array_equal(plans[0].hinges, plans[1].hinges)
+
+
+def test_a_common_path_gives_the_plans_of_single_schedules():
+    """A table over a range of angles serves any schedule within it: same hinges, same lattice to 1e-4.
+
+    Both tables interpolate, between other nodes; what each is off by is the test above's.
+    """
+    model = example_model(2)
+    path = common_path(model, 0.0, 1.0)
+    grid = time_grid(np.linspace(0.0, 2.0, 41))
+    schedules = [ConstantRate(0.0, 1.0, 1.5), ConstantRate(1.0, 0.2, 1.0), Hold(0.4)]
+    for schedule in schedules:
+        alone, shared = flight_plan(model, [schedule, schedule], grid), path.plan(model, schedule, grid)
+        assert shared.table.matrices is path.matrices
+        for name in ("angles", "rates", "accelerations", "hinges", "wind_N"):
+            np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
+        for own, common in zip(alone.table.between(0, 41), shared.table.between(0, 41), strict=True):
+            assert np.abs(own - common).max() < 1e-4 * np.abs(own).max()
+
+
+def test_a_common_path_refuses_what_leaves_its_range():
+    """Beyond its nodes a table would extrapolate; a schedule that goes there is an error."""
+    path = common_path(example_model(1), 0.0, 0.5)
+    with pytest.raises(InvalidInput):
+        path.plan(example_model(1), ConstantRate(0.0, 0.51, 1.0), time_grid(np.linspace(0.0, 1.0, 11)))

@@ -1,0 +1,97 @@
+"""Particle swarm search on the operators of pyswarms, in a loop of our own that can stop, report and resume.
+
+The paper's search: Kennedy & Eberhart (1995) with inertia (Shi & Eberhart 1998), one global best. pyswarms
+draws from numpy's global generator; its state is part of ours, put in place before each use and taken back
+after it, so that a resumed search goes on to the bit.
+"""
+
+from __future__ import annotations
+
+import logging.config
+from dataclasses import dataclass, field
+from typing import Any, cast
+from unittest import mock
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# pyswarms configures the root logger and opens report.log in the working directory, on import and with every
+# handler that it makes; neither is its to do
+with mock.patch.object(logging.config, "dictConfig"):
+    from pyswarms.backend import compute_pbest, compute_position, compute_velocity
+    from pyswarms.backend.handlers import BoundaryHandler, VelocityHandler
+    from pyswarms.backend.swarms import Swarm
+
+    VELOCITIES = VelocityHandler("unmodified")
+    POSITIONS = BoundaryHandler("nearest")
+
+
+@dataclass(frozen=True)
+class SwarmSettings:
+    """Coefficients of the swarm; ``inertia`` 0.7 keeps c1 = c2 = 1 inside the stable region (Trelea 2003)."""
+
+    particles: int = 200
+    generations: int = 100
+    c1: float = 1.0
+    c2: float = 1.0
+    inertia: float = 0.7
+
+
+@dataclass(frozen=True)
+class SwarmState:
+    """A swarm after some generations: (p, d) in the unit cube, costs (p,), the generator's state."""
+
+    position: Array
+    velocity: Array
+    best_position: Array
+    best_cost: Array
+    generation: int
+    random: tuple[Any, ...] = field(repr=False)
+
+    @property
+    def leader(self) -> Array:
+        """(d,) the best position so far."""
+        return np.asarray(self.best_position[int(np.argmin(self.best_cost))])
+
+
+def first_swarm(settings: SwarmSettings, guess: Array, seed: int) -> SwarmState:
+    """A swarm spread evenly over the unit cube, the physical guess (d,) its first particle."""
+    generator = np.random.RandomState(seed % 2**32)  # the kind of generator that pyswarms draws from
+    position = generator.uniform(size=(settings.particles, guess.size))
+    position[0] = guess
+    velocity = generator.uniform(-0.1, 0.1, size=position.shape)
+    unknown = np.full(settings.particles, np.inf)
+    return SwarmState(
+        position,
+        velocity,
+        position.copy(),
+        unknown,
+        0,
+        cast("tuple[Any, ...]", generator.get_state(legacy=True)),
+    )
+
+
+def next_swarm(state: SwarmState, settings: SwarmSettings, cost: Array) -> SwarmState:
+    """The next generation, given the costs (p,) of the present positions."""
+    swarm = Swarm(
+        position=state.position,
+        velocity=state.velocity,
+        options={"c1": settings.c1, "c2": settings.c2, "w": settings.inertia},
+    )
+    swarm.pbest_pos, swarm.pbest_cost, swarm.current_cost = state.best_position, state.best_cost, cost
+    swarm.pbest_pos, swarm.pbest_cost = compute_pbest(swarm)
+    swarm.best_pos = swarm.pbest_pos[int(np.argmin(swarm.pbest_cost))]
+    unit = (np.zeros(state.position.shape[1]), np.ones(state.position.shape[1]))
+    others = np.random.get_state(legacy=True)  # noqa: NPY002 - pyswarms knows no other
+    np.random.set_state(state.random)  # noqa: NPY002
+    try:
+        swarm.velocity = compute_velocity(swarm, None, VELOCITIES, unit)
+        position = compute_position(swarm, unit, POSITIONS)
+        random = np.random.get_state(legacy=True)  # noqa: NPY002
+    finally:
+        np.random.set_state(others)  # noqa: NPY002
+    return SwarmState(
+        position, swarm.velocity, swarm.pbest_pos, swarm.pbest_cost, state.generation + 1, tuple(random)
+    )
