@@ -1,0 +1,64 @@
+"""A service that a test plays, in the place of the network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+
+
+class PlayedService:
+    """Answers like a service: a job that ends after two looks, in the way that the test wants.
+
+    Parameters
+    ----------
+    operation : the only one that it knows.
+    result : of the job.
+    ending : final status.
+    """
+
+    def __init__(self, operation: str, result: dict[str, Any], ending: str = "succeeded") -> None:
+        self.operation = operation
+        self.result = result
+        self.ending = ending
+        self.asked: list[str] = []
+        self.body: dict[str, Any] = {}
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        """Answer one request."""
+        call = f"{request.method} {request.url.path}"
+        self.asked.append(call)
+        if call == f"POST /{self.operation}":
+            self.body = json.loads(request.content)
+        status = "running" if self.asked.count(call) < 2 else self.ending
+        answers = {
+            "POST /trajectories": httpx.Response(201, json={"id": f"traj_{self.asked.count(call)}"}),
+            f"POST /{self.operation}": httpx.Response(202, json=self.job("queued")),
+            "GET /jobs/job_1": httpx.Response(200, json=self.job(status)),
+            "GET /jobs/job_1/result": httpx.Response(200, json=self.result),
+            "GET /jobs/job_1/artifacts": httpx.Response(
+                200, json={"artifacts": [{"name": "convergence.svg"}]}
+            ),
+            "GET /jobs/job_1/artifacts/convergence.svg": httpx.Response(200, content=b"<svg/>"),
+        }
+        return answers.get(call) or httpx.Response(404, json={"title": "There is nothing here"})
+
+    def job(self, status: str) -> dict[str, Any]:
+        """Give the job as it is."""
+        error = (
+            {"code": "diverged", "detail": "it flew apart", "hint": "stiffen it"}
+            if status == "failed"
+            else None
+        )
+        return {
+            "id": "job_1",
+            "status": status,
+            "progress": {"fraction": 0.5},
+            "partial": False,
+            "error": error,
+        }
+
+
+Play = Callable[[PlayedService], PlayedService]

@@ -1,0 +1,37 @@
+"""The command as a whole."""
+
+from __future__ import annotations
+
+import json
+
+from typer.testing import CliRunner
+
+from cli.exits import Exit
+from cli.main import app
+
+RUNNER = CliRunner()
+
+
+def test_no_service_is_a_sentence() -> None:
+    """When nobody listens, the exit code is 5 and the sentence says how to start a service; also as JSON."""
+    ended = RUNNER.invoke(app, ["jobs", "ls", "--url", "http://127.0.0.1:1", "--json"])
+    assert ended.exit_code == Exit.UNREACHABLE
+    assert "morphid serve" in json.loads(ended.stderr)["hint"]
+
+
+def test_listing_jobs_loads_no_compiler() -> None:
+    """The command line starts light: numba, SciPy and matplotlib are not imported for `jobs ls`."""
+    import subprocess
+    import sys
+
+    program = (
+        "import sys\n"
+        "from cli.main import app\n"
+        "try:\n"
+        "    app(['jobs', 'ls', '--url', 'http://127.0.0.1:1'])\n"
+        "except SystemExit as end:\n"
+        "    loaded = {'numba', 'scipy', 'matplotlib', 'numpy', 'fastapi', 'sqlalchemy'} & set(sys.modules)\n"
+        "    sys.exit(f'{end.code} {loaded}' if end.code != 5 or loaded else 0)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
