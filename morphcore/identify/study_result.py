@@ -1,0 +1,71 @@
+"""The result of a study: a row for each number of links, the rigid model beside them, one recommended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from morphcore.identify.study_choice import Recommendation, recommend
+from morphcore.identify.study_row import Document, StudyRow
+from morphcore.identify.study_timing import FLIGHT_S
+
+TIMING_THREADS = 1  # see FlightTiming.round
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """Accuracy and cost of the numbers of links studied, in rising order (the paper's Table 1).
+
+    recommended : one of them, with the reason. rigid : J over the flights of each role (rad^2) and wall time
+    of one flight (s) of the rigid model without corrections. search : how it was sought. cost : what was
+    timed.
+    """
+
+    rows: tuple[StudyRow, ...]
+    recommended: Recommendation
+    rigid: Document
+    search: Document
+    cost: Document
+
+    def row(self, links_per_wing: int) -> StudyRow:
+        """The row of one number of links."""
+        return next(row for row in self.rows if row.links_per_wing == links_per_wing)
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form."""
+        return {
+            "rows": [row.to_document() for row in self.rows],
+            "rigid": self.rigid,
+            "recommended": self.recommended.to_document(),
+            "search": self.search,
+            "cost": self.cost,
+        }
+
+
+def study_result(
+    rows: tuple[StudyRow, ...],
+    *,
+    rigid_flight_s: float | None,
+    plan_s: float | None,
+    rounds: int,
+    search: Document,
+) -> StudyResult:
+    """Put a study's rows together and recommend one."""
+    ordered = tuple(sorted(rows, key=lambda row: row.links_per_wing))
+    first = ordered[0] if ordered else None
+    return StudyResult(
+        rows=ordered,
+        recommended=recommend(ordered),
+        rigid={
+            "J_train": first.J_rigid("train") if first else None,
+            "J_held_out": first.J_rigid("held_out") if first else None,
+            "flight_s": rigid_flight_s,
+        },
+        search=search,
+        cost={
+            "flight_duration_s": FLIGHT_S,
+            "plan_s": plan_s,
+            "rounds": rounds,
+            "threads": TIMING_THREADS,
+        },
+    )

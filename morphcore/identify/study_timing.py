@@ -1,0 +1,103 @@
+"""Wall time of one flight of each model of a study: one at a time, on one thread, the models in turn.
+
+What is timed is what a caller waits for once the lattice along the morph is tabulated: trim and flight. The
+table is the same for all models and timed on its own.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, shared_trims
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.simulate.batch import Interrupted, Stop
+from morphcore.simulate.schedule import Tabulated
+from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.trim import StartMode
+
+Clock = Callable[[], float]
+
+FLIGHT_S = 2.0  # duration of the flight that is timed, as of the paper's morph
+OUTPUT_STEP_S = 0.01
+ROUNDS = 7  # of which medians are taken
+
+
+def timed_flight(samples: Sequence[Trajectory]) -> Trajectory:
+    """A flight of two seconds along the measured sweep that moves most in its first two seconds.
+
+    A shorter sample is held where it ends. The attitudes are not looked at.
+    """
+    times = OUTPUT_STEP_S * np.arange(round(FLIGHT_S / OUTPUT_STEP_S) + 1, dtype=np.float64)
+    rest = np.zeros_like(times)
+    flights = []
+    for sample in samples:
+        start_s = sample.time_s[0]
+        left, right = (
+            Tabulated(sample.time_s, sample.sweep(side)).motion(start_s + times).angle
+            for side in ("left", "right")
+        )
+        flights.append(Trajectory("timed", times, left, right, rest, rest, rest))
+    return max(flights, key=_travel)
+
+
+def _travel(flight: Trajectory) -> float:
+    return float(np.abs(np.diff([flight.sweep_left, flight.sweep_right], axis=1)).sum())
+
+
+@dataclass(frozen=True)
+class FlightTiming:
+    """The flight, and the models that fly it in turn.
+
+    plan_s : wall time of the plan that they share, s.
+    """
+
+    case: SampleCase
+    models: tuple[tuple[ChainModel, ParameterBatch], ...]
+    start: StartMode
+    clock: Clock
+    plan_s: float
+
+    def round(self, stop: Stop | None = None) -> tuple[float, ...]:
+        """Fly every model once; give the wall times, s.
+
+        A single flight is a single block of lanes: it never uses more than one thread.
+        """
+        return tuple(self._fly(model, batch, stop) for model, batch in self.models)
+
+    def _fly(self, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
+        if stop is not None and stop():
+            raise Interrupted
+        begin = self.clock()
+        for case, found in shared_trims(model, batch, (self.case,), self.start):
+            fly_attitudes(model, batch, case, found)
+        return self.clock() - begin
+
+
+def flight_timing(
+    models: Sequence[tuple[ChainModel, ParameterBatch]],
+    samples: Sequence[Trajectory],
+    *,
+    step_s: float,
+    start: StartMode,
+    clock: Clock = time.perf_counter,
+) -> FlightTiming:
+    """Plan the flight and fly every model once: nothing is compiled or loaded while time is taken."""
+    flight = timed_flight(samples)
+    first = models[0][0]
+    # a plan knows the lattice and the hinges, not the links: all models fly the same one
+    (case,) = sample_cases(first, [flight], step_s)
+    timing = FlightTiming(case, tuple(models), start, clock, 0.0)
+    timing.round()
+    begin = clock()
+    sample_cases(first, [flight], step_s)
+    return replace(timing, plan_s=clock() - begin)
+
+
+def medians(rounds: Sequence[Sequence[float]]) -> list[float]:
+    """Median over the rounds of each model's wall time, s."""
+    return [statistics.median(times) for times in zip(*rounds, strict=True)]
