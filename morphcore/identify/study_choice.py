@@ -90,9 +90,9 @@ def _compared(label: str, rows: Sequence[StudyRow], chosen: StudyRow, role: Role
     best = min(rows, key=lambda row: _error(row, role))
     own, other = _error(chosen, role), _error(best, role)
     said = f"{label} {_links(best.links_per_wing)}, "
-    said += f"has {other / own:.2g} times the error" if own > 0.0 else "has an error, this one none"
+    said += f"has {_two_digits(other / own)} times the error" if own > 0.0 else "has an error, this one none"
     if chosen.flight_s and best.flight_s:
-        said += f" and takes {best.flight_s / chosen.flight_s:.2g} times as long to fly"
+        said += f" and takes {_two_digits(best.flight_s / chosen.flight_s)} times as long to fly"
     return [said]
 
 
@@ -104,6 +104,10 @@ def _overfitted(chosen: StudyRow, flown: Sequence[StudyRow]) -> list[str]:
             if fits_better and _error(row, "held_out") > _error(chosen, "held_out"):
                 return [f"With {_links(row.links_per_wing)} the fit is better and the prediction worse"]
     return []
+
+
+def _two_digits(ratio: float) -> str:
+    return f"{float(f'{ratio:.2g}'):g}"  # 110, not 1.1e+02
 
 
 def _links(count: int) -> str:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from morphcore.identify.state import UnreadableCheckpoint
+import numpy as np
+
+from morphcore.checkpoint import UnreadableCheckpoint, pack, unpack
 from morphcore.identify.study_row import StudyRow
 
 Phase = Literal["search", "result", "timing", "done"]
 
-FORMAT = 1  # of the checkpoint; a worker refuses one that it does not know
+VERSION = "study 1"  # of the checkpoint; a worker refuses one that it does not know
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,9 @@ class StudyState:
 
 
 def encode(state: StudyState) -> bytes:
-    """The state as bytes; numbers are written so that they come back exactly."""
-    header = {
-        **vars(state),
-        "format": FORMAT,
-        "rows": [row.to_document() for row in state.rows],
-        "search": None if state.search is None else base64.b64encode(state.search).decode("ascii"),
-    }
-    return json.dumps(header).encode()
+    """The state as bytes."""
+    search = None if state.search is None else np.frombuffer(state.search, dtype=np.uint8)
+    return pack({**vars(state), "search": search}, VERSION)
 
 
 def decode(checkpoint: bytes, links: tuple[int, ...]) -> StudyState:
@@ -58,23 +53,24 @@ def decode(checkpoint: bytes, links: tuple[int, ...]) -> StudyState:
     ------
     UnreadableCheckpoint : the bytes are damaged, of another version, or of another study.
     """
-    try:
-        header = json.loads(checkpoint)
-        if header.pop("format") != FORMAT:
-            raise UnreadableCheckpoint("the checkpoint is of another version", hint="start the study anew")
-        header["links"] = tuple(header["links"])
-        header["rows"] = tuple(StudyRow(**row) for row in header["rows"])
-        header["rounds"] = tuple(tuple(times) for times in header["rounds"])
-        if header["search"] is not None:
-            header["search"] = base64.b64decode(header["search"], validate=True)
-        state = StudyState(**header)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UnreadableCheckpoint(
-            f"the checkpoint cannot be read: {error}", hint="start the study anew"
-        ) from None
+    state = unpack(checkpoint, VERSION, _state)
     if state.links != links:
         raise UnreadableCheckpoint(
             f"the checkpoint is of a study of {list(state.links)} links, not {list(links)}",
             hint="give the request that the study was begun with",
         )
     return state
+
+
+def _state(tree: dict[str, Any]) -> StudyState:
+    """The state out of its tree, in which tuples have become lists and rows dicts."""
+    search = tree.pop("search")
+    return StudyState(
+        **{
+            **tree,
+            "links": tuple(tree["links"]),
+            "rows": tuple(StudyRow(**row) for row in tree["rows"]),
+            "search": None if search is None else search.tobytes(),
+            "rounds": tuple(tuple(times) for times in tree["rounds"]),
+        }
+    )

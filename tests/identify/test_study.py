@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from morphcore import simulate
+from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, ModelSettings, SearchSettings, Step
-from morphcore.identify.state import UnreadableCheckpoint
 from morphcore.identify.study import Study, study, study_from_document
 from morphcore.identify.study_timing import ROUNDS, timed_flight
 from tests.identification_request import identification
