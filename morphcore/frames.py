@@ -39,6 +39,15 @@ def euler_from_quaternion(quaternion: ArrayLike) -> Array:
     return np.stack([phi, theta, psi], axis=-1)
 
 
+def euler_from_rotation(R_NB: ArrayLike) -> Array:
+    """Roll, pitch, yaw in rad, shape (..., 3), of rotations (..., 3, 3); ranges as above."""
+    R = np.asarray(R_NB, dtype=np.float64)
+    phi = np.arctan2(R[..., 2, 1], R[..., 2, 2])
+    theta = np.arcsin(np.clip(-R[..., 2, 0], -1.0, 1.0))
+    psi = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    return np.stack([phi, theta, psi], axis=-1)
+
+
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
     """R_NB, shape (..., 3, 3), of a unit quaternion."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)

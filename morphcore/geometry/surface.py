@@ -15,6 +15,7 @@ Side = Literal["right", "left"]
 
 AXES = ("x", "y", "z")
 RANGE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly at the stop
+SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
 DEFAULT_HINGE_RANGE_RAD = 1.3  # either way from unswept; at more the wing lies along the fuselage
 
 
@@ -102,3 +103,13 @@ class Surface:
         if self.section is not None:
             return self.section.at(chord)
         return solid_box(self.material, chord, self.thickness_m)
+
+    def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array]:
+        """Axial and shear stiffness, N, each (stations,), at distances from the root.
+
+        Of the solid box E A and 5/6 G A (Timoshenko's factor of a rectangle). Section properties given
+        outright do not hold them; they are then those of the rectangle of this thickness that is as stiff in
+        flap, 12 EI_flap / thickness^2: both are far too stiff to matter, but a beam needs them.
+        """
+        axial = 12.0 * self.section_at(distance_m).ei_flap / self.thickness_m**2
+        return axial, SHEAR_FACTOR * axial / (2.0 * (1.0 + self.material.poisson_ratio))

@@ -1,0 +1,363 @@
+"""Chains of geometrically exact beam elements with bodies at their nodes: forces, solves, statics, modes.
+
+The mechanics are in kernels/beam.py; this is their typed shell. Nodes have poses R (n, 3, 3), node axes to
+N, and x (n, 3) in N; twists and their rates (n, 6) [omega; v] in node axes. Forces are force vectors [n; f]
+(n, 6), N m and N, in node axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigh
+
+from morphcore.errors import MorphError
+from morphcore.frames import skew
+from morphcore.multibody.kernels.beam import (
+    MATRIX_SCRATCH,
+    VECTOR_SCRATCH,
+    add_section_forces,
+    beam_forces,
+    beam_tangents,
+    body_forces,
+    condense,
+    eliminate,
+    section_motion,
+    substitute,
+)
+from morphcore.multibody.kernels.poses import move_poses
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Gauss points of an element's inertia: the helix is of second degree, its kinetic energy of fourth
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+GAUSS, GAUSS_WEIGHTS = 0.5 * (1.0 + _POINTS), 0.5 * _WEIGHTS
+MOST_ITERATIONS = 60
+STATIC_TOLERANCE = 1e-11  # rad and m, of the last Newton step
+
+
+class BeamTurnedTooFar(MorphError):
+    """One element turns by more than its logarithm is made for: use more elements."""
+
+    code = "beam_turned_too_far"
+
+
+class StaticsNotFound(MorphError):
+    """Newton's iteration for a beam at rest did not arrive."""
+
+    code = "statics_not_found"
+
+
+@dataclass(frozen=True)
+class Section:
+    """Stiffness and mass of a cross-section in node axes, [rotation; translation].
+
+    stiffness : (6, 6), of moments (N m) to curvatures and twist (rad/m) and of forces (N) to strains.
+    mass : (6, 6) spatial inertia per length about the node axes, kg m, kg and kg/m.
+    """
+
+    stiffness: Array
+    mass: Array
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Elements of one or more open chains, each numbered from its root (e elements, n nodes, g points).
+
+    ends : (e, 2) inner and outer node. rest : (e, 6) logarithm of the unstrained relative pose. stiffness :
+    (e, 6, 6) conjugate to it. damping : (e,) s, of stiffness-proportional damping. mass : (e, g, 6, 6).
+    mass12 : (e, 12, 12) consistent mass matrix at rest. bodies, inertia : (k,), (k, 6, 6) rigid bodies and
+    the nodes they sit on. nodes : n.
+    """
+
+    ends: IntArray
+    rest: Array
+    stiffness: Array
+    damping: Array
+    mass: Array
+    mass12: Array
+    bodies: IntArray
+    inertia: Array
+    nodes: int
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return int(self.ends.shape[0])
+
+
+@dataclass
+class NodePoses:
+    """Where the nodes are: R (n, 3, 3), node axes to N; x (n, 3) m. Scratch that moves in time."""
+
+    R: Array
+    x: Array
+
+    def copy(self) -> NodePoses:
+        """Another one at the same place."""
+        return NodePoses(self.R.copy(), self.x.copy())
+
+    def move(self, increments: Array) -> None:
+        """Move every node by the exponential of its increment (n, 6) in node axes, rad and m."""
+        move_poses(increments, self.R, self.x, np.empty((7, 3)))
+
+
+class BeamWorkspace:
+    """Scratch of one thread for some beams."""
+
+    def __init__(self, beams: Beams) -> None:
+        self.v: Array = np.zeros((VECTOR_SCRATCH, 6))
+        self.m: Array = np.zeros((MATRIX_SCRATCH, 6, 6))
+        self.poses: Array = np.zeros((2, 4, 3))
+        self.strains: Array = np.zeros((beams.elements, 6))
+        self.rates: Array = np.zeros((beams.elements, 6))
+        self.tangents: Array = np.zeros((beams.elements, 12, 12))
+        self.inverses: Array = np.zeros((beams.elements, 6, 6))
+        self.couplings: Array = np.zeros((beams.elements, 6, 6))
+        self.diagonals: Array = np.zeros((beams.nodes, 6, 6))
+
+
+def make_beams(
+    ends: ArrayLike,
+    rest: ArrayLike,
+    sections: Sequence[Sequence[Section]],
+    damping_s: ArrayLike,
+    *,
+    bodies: ArrayLike = (),
+    inertia: ArrayLike = (),
+    nodes: int | None = None,
+) -> Beams:
+    """Integrate elements from their sections at the Gauss points.
+
+    Parameters
+    ----------
+    ends : (e, 2) nodes. rest : (e, 6) logarithms of the relative poses at rest.
+    sections : for each element, one section at each of the three Gauss points.
+    damping_s : (e,) or one number. bodies, inertia : rigid bodies on nodes (k,), (k, 6, 6).
+    nodes : their number, if some carry no element.
+    """
+    end_nodes = np.array(ends, dtype=np.int64).reshape(-1, 2)
+    at_rest = np.array(rest, dtype=np.float64).reshape(-1, 6)
+    count = end_nodes.shape[0]
+    stiffness = np.empty((count, 6, 6))
+    mass = np.empty((count, GAUSS.size, 6, 6))
+    for e in range(count):
+        along = at_rest[e, 3:]
+        length = float(np.sqrt(along @ along))
+        stiffness[e] = np.linalg.inv(element_flexibility(along, [s.stiffness for s in sections[e]]))
+        for g, section in enumerate(sections[e]):
+            mass[e, g] = GAUSS_WEIGHTS[g] * length * section.mass
+    beams = Beams(
+        ends=end_nodes,
+        rest=at_rest,
+        stiffness=stiffness,
+        damping=np.broadcast_to(np.asarray(damping_s, dtype=np.float64), (count,)).copy(),
+        mass=mass,
+        mass12=np.zeros((count, 12, 12)),
+        bodies=np.array(bodies, dtype=np.int64).reshape(-1),
+        inertia=np.array(inertia, dtype=np.float64).reshape(-1, 6, 6),
+        nodes=nodes if nodes is not None else int(end_nodes.max(initial=-1)) + 1,
+    )
+    _integrate_mass(beams)
+    for value in vars(beams).values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    return beams
+
+
+def element_flexibility(along: Array, section_stiffness: Sequence[Array]) -> Array:
+    """Flexibility (6, 6) of an element's relative displacement, in its middle, to loads at its ends.
+
+    A force f and moment m carried through the middle make the moment m - (s - 1/2) along x f at s; the
+    integral of B^T C^-1 B over the length is exact for straight elements, sections varying or not.
+
+    Parameters
+    ----------
+    along : (3,) from inner to outer node at rest, m. section_stiffness : (6, 6) at each Gauss point.
+    """
+    length = float(np.sqrt(along @ along))
+    total = np.zeros((6, 6))
+    for s, weight, stiffness in zip(GAUSS, GAUSS_WEIGHTS, section_stiffness, strict=True):
+        B = np.eye(6)
+        B[:3, 3:] = -(s - 0.5) * skew(along)
+        total += weight * length * B.T @ np.linalg.solve(stiffness, B)
+    return total
+
+
+def node_forces(
+    beams: Beams, work: BeamWorkspace, poses: NodePoses, V: Array, A: Array, gravity_N: Array
+) -> Array:
+    """What strain, inertia and weight ask of the nodes, (n, 6): zero in motion without other loads.
+
+    Raises
+    ------
+    BeamTurnedTooFar : an element turns by more than 1.5 rad.
+    """
+    out = np.zeros((beams.nodes, 6))
+    failed = beam_forces(
+        beams.ends, beams.rest, beams.stiffness, beams.damping, beams.mass, GAUSS, poses.R, poses.x, V, A,
+        gravity_N, work.v, work.poses, work.strains, work.rates, out,
+    )  # fmt: skip
+    if failed >= 0:
+        raise BeamTurnedTooFar(f"element {failed} is bent too far", hint="use more elements")
+    body_forces(beams.bodies, beams.inertia, poses.R, V, A, gravity_N, work.v, out)
+    return out
+
+
+def sections_of(
+    beams: Beams, work: BeamWorkspace, poses: NodePoses, V: Array, elements: IntArray, fractions: Array
+) -> tuple[NodePoses, Array]:
+    """Poses and twists (k, 6) of sections, for the strains of the last `node_forces`.
+
+    elements, fractions : (k,) element and place in it, 0..1; element -1 - i stands for node i itself.
+    """
+    count = elements.size
+    found = NodePoses(np.empty((count, 3, 3)), np.empty((count, 3)))
+    twists = np.empty((count, 6))
+    section_motion(
+        beams.ends, fractions, elements, poses.R, poses.x, V, work.strains, work.rates, work.v, work.poses,
+        found.R, found.x, twists,
+    )  # fmt: skip
+    return found, twists
+
+
+def subtract_section_forces(
+    beams: Beams, work: BeamWorkspace, elements: IntArray, fractions: Array, forces: Array, out: Array
+) -> None:
+    """Subtract from out (n, 6) the nodes' share of force vectors (k, 6) on sections, in section axes."""
+    add_section_forces(beams.ends, fractions, elements, work.strains, forces, work.v, work.poses, out)
+
+
+def factor(
+    beams: Beams,
+    work: BeamWorkspace,
+    of_mass: float,
+    of_rate: float,
+    of_pose: float,
+    on_nodes: Array | None = None,
+) -> None:
+    """Factor of_mass M + of_rate C + of_pose K + on_nodes (n, 6, 6) at the strains of the last `node_forces`.
+
+    Afterwards ``work.diagonals`` holds at every root its chain's condensed matrix.
+    """
+    beam_tangents(
+        beams.rest, beams.stiffness, beams.damping, beams.mass12, work.strains, work.rates,
+        of_mass, of_rate, of_pose, work.v, work.m, work.tangents,
+    )  # fmt: skip
+    work.diagonals[:] = 0.0 if on_nodes is None else on_nodes
+    np.add.at(work.diagonals, beams.bodies, of_mass * beams.inertia)
+    eliminate(beams.ends, work.tangents, work.diagonals, work.inverses, work.couplings, work.m)
+
+
+def reduce_right(beams: Beams, work: BeamWorkspace, right: Array) -> None:
+    """First half of a solve, in place: right sides (n, 6) gathered to the roots."""
+    condense(beams.ends, work.tangents, work.inverses, work.v, right)
+
+
+def expand_solution(beams: Beams, work: BeamWorkspace, right: Array) -> None:
+    """Second half, in place: with the roots' solutions written into their rows, all nodes' solutions."""
+    substitute(beams.ends, work.couplings, right)
+
+
+@dataclass(frozen=True)
+class DeadLoad:
+    """A force vector on a node that keeps its direction in N: moment (3,) N m, force (3,) N."""
+
+    node: int
+    moment_N: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    force_N: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def clamped_equilibrium(
+    beams: Beams,
+    poses: NodePoses,
+    loads: Sequence[DeadLoad] = (),
+    *,
+    follower: Array | None = None,
+    gravity_N: ArrayLike = (0.0, 0.0, 0.0),
+    increments: int = 1,
+) -> NodePoses:
+    """Poses at rest of chains whose roots (nodes that are no element's outer end) are clamped.
+
+    Parameters
+    ----------
+    poses : where Newton's iteration starts. loads : dead loads; follower : (n, 6) loads in node axes.
+    increments : equal steps in which the loads are applied.
+
+    Raises
+    ------
+    StaticsNotFound : the iteration did not arrive. BeamTurnedTooFar.
+    """
+    now, work = poses.copy(), BeamWorkspace(beams)
+    rest = np.zeros((beams.nodes, 6))
+    gravity = np.asarray(gravity_N, dtype=np.float64)
+    roots = np.setdiff1d(np.arange(beams.nodes), beams.ends[:, 1])
+    right: Array = rest
+    for part in np.linspace(0.0, 1.0, increments + 1)[1:]:
+        for _ in range(MOST_ITERATIONS):
+            right = -node_forces(beams, work, now, rest, rest, part * gravity)
+            if follower is not None:
+                right += part * follower
+            turning = np.zeros((beams.nodes, 6, 6))  # a dead load's components change as its node turns
+            for load in loads:
+                for rows, vector_N in ((slice(3), load.moment_N), (slice(3, 6), load.force_N)):
+                    vector = part * now.R[load.node].T @ vector_N
+                    right[load.node, rows] += vector
+                    turning[load.node, rows, :3] -= skew(vector)
+            factor(beams, work, 0.0, 0.0, 1.0, turning)
+            reduce_right(beams, work, right)
+            right[roots] = 0.0
+            expand_solution(beams, work, right)
+            now.move(right * min(1.0, 0.3 / max(float(np.abs(right[:, :3]).max()), 1e-300)))
+            if np.abs(right).max() < STATIC_TOLERANCE:
+                break
+        else:
+            raise StaticsNotFound(
+                f"the last step was {np.abs(right).max():.2g}", hint="apply the load in more increments"
+            )
+    return now
+
+
+def clamped_modes(beams: Beams, count: int) -> tuple[Array, Array]:
+    """Lowest natural frequencies (count,), Hz, and shapes (count, n, 6) of clamped chains at rest."""
+    work = BeamWorkspace(beams)
+    work.strains[:] = beams.rest
+    size = 6 * beams.nodes
+    stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
+    for matrix, weights in ((mass, (1.0, 0.0, 0.0)), (stiffness, (0.0, 0.0, 1.0))):
+        beam_tangents(
+            beams.rest, beams.stiffness, beams.damping, beams.mass12, work.strains, work.rates,
+            *weights, work.v, work.m, work.tangents,
+        )  # fmt: skip
+        for (a, b), block in zip(beams.ends, work.tangents, strict=True):
+            index = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
+            matrix[np.ix_(index, index)] += block
+    free = (6 * np.sort(beams.ends[:, 1])[:, None] + np.arange(6)).ravel()
+    omega2, vectors = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
+    shapes = np.zeros((count, size))
+    shapes[:, free] = vectors.T[:count]
+    return np.sqrt(omega2[:count]) / (2.0 * np.pi), shapes.reshape(count, beams.nodes, 6)
+
+
+def _integrate_mass(beams: Beams) -> None:
+    """Fill in ``mass12``: the kernel's own forces for unit accelerations of each element alone, at rest."""
+    R, x = np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3))
+    zero, unit, none = np.zeros((2, 6)), np.zeros((2, 6)), np.zeros(3)
+    v, scratch = np.zeros((VECTOR_SCRATCH, 6)), np.zeros((2, 4, 3))
+    ends, strain = np.array([[0, 1]]), np.zeros((1, 6))
+    for e in range(beams.elements):
+        R[1], x[1] = np.eye(3), 0.0
+        move_poses(np.stack([np.zeros(6), beams.rest[e]]), R, x, np.empty((7, 3)))
+        for column in range(12):
+            unit[:] = 0.0
+            unit[column // 6, column % 6] = 1.0
+            out = np.zeros((2, 6))
+            beam_forces(
+                ends, beams.rest[e : e + 1], beams.stiffness[e : e + 1], beams.damping[e : e + 1],
+                beams.mass[e : e + 1], GAUSS, R, x, zero, unit, none, v, scratch, strain, strain.copy(), out,
+            )  # fmt: skip
+            beams.mass12[e, :, column] = out.ravel()

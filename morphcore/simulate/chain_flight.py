@@ -1,0 +1,81 @@
+"""One flight of a rigid or an equivalent model, in chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
+from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
+from morphcore.models.kinematics import tip_positions
+from morphcore.multibody.kernels.hinge import HINGE_ROWS
+from morphcore.simulate.batch import Stop, fly_batch
+from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
+from morphcore.simulate.record import FlightRecord, require_sound
+from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.trim import StartMode, trim, trimmed_state
+
+Array = NDArray[np.float64]
+
+LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # there flap and lag of a gimbal turn about the same axis
+
+
+def chain_flight(
+    model: ChainModel,
+    batch: ParameterBatch,
+    schedules: Sequence[Schedule],
+    grid: TimeGrid,
+    at: NDArray[np.int64],
+    *,
+    start: StartMode,
+    air_velocity_N: Callable[[Array], Array] | None,
+    stop: Stop | None,
+) -> Iterator[tuple[float, FlightRecord | None]]:
+    """Fly one parameter set; gives the fraction flown after every chunk, with the record at the end.
+
+    Parameters
+    ----------
+    at : (k,) rows of the grid to report. Others as in `flight.simulate`.
+    """
+    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N)
+    found = trim(model, batch, plan, start=start).require()
+    constants = lane_constants(model, batch, grid.step_s)
+    constants.set_thrust(found.force_B, found.moment_B)
+    state = trimmed_state(model, batch, plan, found)
+    rows, flown = JOINTS + model.coordinates, []
+    for chunk in fly_batch(model, plan, constants, state, record_rows=rows, stop=stop):
+        flown.append(chunk.rows[..., 0])
+        yield chunk.first / grid.steps, None
+    history = np.concatenate(flown)
+    joints = history[:, JOINTS:]
+    require_sound(history[:, VELOCITY:POSITION], history[:, :OMEGA], 2.0, model.flight, grid.times_s)
+    require_sound(history[:, VELOCITY:POSITION], joints, LARGEST_JOINT_ANGLE_RAD, model.flight, grid.times_s)
+    history = history[at]
+    quaternion = history[:, :OMEGA]
+    velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
+    record = FlightRecord(
+        euler=euler_from_quaternion(quaternion),
+        omega_B=history[:, OMEGA:VELOCITY],
+        velocity_N=velocity_N,
+        position_N=history[:, POSITION:JOINTS],
+        angles=plan.angles[at],
+        tips_z=_tips_z(model, batch, plan, history[:, JOINTS:], at),
+        trim=found,
+    )
+    yield 1.0, record
+
+
+def _tips_z(
+    model: ChainModel, batch: ParameterBatch, plan: FlightPlan, q_joint: Array, at: NDArray[np.int64]
+) -> Array:
+    """Tips below their roots along z of B, (k, s), m."""
+    surfaces = len(model.aircraft.surfaces)
+    level = np.zeros((surfaces, HINGE_ROWS))
+    level[:, :9] = np.eye(3).ravel()
+    # in wing axes all times are one batch; the hinge turns them afterwards
+    tips_W = tip_positions(model, batch.select(np.zeros(at.size, dtype=np.int64)), level, q_joint)
+    down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
+    return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))

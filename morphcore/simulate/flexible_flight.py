@@ -1,0 +1,88 @@
+"""One flight of the flexible model, in chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import euler_from_rotation
+from morphcore.models.flexible import FlexibleModel
+from morphcore.simulate.batch import Interrupted, Stop
+from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, fly_flexible, hinge_path
+from morphcore.simulate.flexible_trim import trim_flexible
+from morphcore.simulate.plan import TimeGrid
+from morphcore.simulate.record import FlightRecord, require_sound
+from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.trim import StartMode, Trim
+from morphcore.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+
+CHUNK_STEPS = 100  # steps of the default lattice: about a tenth of a second
+
+
+def flexible_flight(
+    model: FlexibleModel,
+    schedules: Sequence[Schedule],
+    grid: TimeGrid,
+    at: NDArray[np.int64],
+    *,
+    start: StartMode,
+    air_velocity_N: Callable[[Array], Array] | None,
+    stop: Stop | None,
+) -> Iterator[tuple[float, FlightRecord | None]]:
+    """Fly the flexible model; gives the fraction flown after every chunk, with the record at the end.
+
+    Parameters
+    ----------
+    at : (k,) rows of the grid to report. Others as in `flight.simulate`.
+    """
+    times = grid.times_s
+    wind_N = (
+        np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
+    )
+    path = hinge_path(model, schedules, grid)
+    flight = FlexibleFlight(model)
+    with one_blas_thread():
+        trim = trim_flexible(flight, path, wind_N[0], start=start)
+    flight.thrust = np.concatenate([trim.moment_B, trim.force_B])
+    states = fly_flexible(flight, path, grid, wind_N, trim.state)
+    rows: list[Array] = []
+    for first in range(0, grid.steps + 1, CHUNK_STEPS):
+        yield first / grid.steps, None
+        if stop is not None and stop():
+            raise Interrupted
+        with one_blas_thread():
+            rows += [_row(model, state) for state in islice(states, CHUNK_STEPS)]
+    history = np.stack(rows)
+    require_sound(history[:, 6:9], history, np.inf, model.flight, times)
+    history = history[at]
+    record = FlightRecord(
+        euler=history[:, :3],
+        omega_B=history[:, 3:6],
+        velocity_N=history[:, 6:9],
+        position_N=history[:, 9:12],
+        angles=path.angle[at],
+        tips_z=history[:, 12:],
+        trim=Trim(
+            alpha=np.array([trim.alpha]),
+            force_B=trim.force_B[None],
+            moment_B=trim.moment_B[None],
+            q_joint=np.zeros((1, 0)),
+            converged=np.array([True]),
+            residual=np.array([trim.residual]),
+        ),
+    )
+    yield 1.0, record
+
+
+def _row(model: FlexibleModel, state: FlexibleState) -> Array:
+    """Euler angles, omega_B, velocity_N, position_N, and the tips' z of a state."""
+    R_NB, x = state.poses.R[0], state.poses.x
+    tips_B = (x[model.tips] - x[model.roots]) @ R_NB
+    return np.concatenate(
+        [euler_from_rotation(R_NB), state.V[0, :3], R_NB @ state.V[0, 3:], x[0], tips_B[:, 2]]
+    )

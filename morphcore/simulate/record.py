@@ -1,0 +1,79 @@
+"""What every model reports of a flight, and the trajectory made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import FlightDiverged
+from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.simulate.trajectory import Trajectory, checked
+from morphcore.simulate.trim import Trim
+
+Array = NDArray[np.float64]
+
+LARGEST_SPEED_RATIO = 10.0  # of the airspeed at the start: no glide gets there
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """A flown flight at its output times (k times, s surfaces).
+
+    euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
+    point; angles : (k, s) of the hinges, rad; tips_z : (k, s) tips below their roots along z of B, m.
+    trim : the start.
+    """
+
+    euler: Array
+    omega_B: Array
+    velocity_N: Array
+    position_N: Array
+    angles: Array
+    tips_z: Array
+    trim: Trim
+
+
+def require_sound(velocity: Array, others: Array, largest: float, flight: Flight, times: Array) -> None:
+    """Check a flight (k times): all finite, no speed absurd, no |others| (k, m) beyond ``largest``.
+
+    Raises
+    ------
+    FlightDiverged : with the last sound time.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        speed = np.sqrt(np.sum(velocity**2, axis=1))
+        sound = (
+            np.all(np.isfinite(others), axis=1)
+            & (speed < LARGEST_SPEED_RATIO * flight.airspeed_m_s)
+            & (np.abs(others).max(axis=1, initial=0.0) < largest)
+        )
+    if not np.all(sound):
+        raise FlightDiverged(time_s=float(times[max(int(np.argmin(sound)) - 1, 0)]))
+
+
+def recorded_trajectory(aircraft: Aircraft, times: Array, record: FlightRecord) -> Trajectory:
+    """The trajectory, columns as the example flights; each side's wing is its first hinged surface."""
+    columns = np.concatenate([record.omega_B, record.velocity_N, record.position_N], axis=1)
+    names = ("p", "q", "r", "vx", "vy", "vz", "x", "y", "z")
+    extra = {name: column.copy() for name, column in zip(names, columns.T, strict=True)}
+    sweeps = {"left": np.zeros(times.size), "right": np.zeros(times.size)}
+    for side in sweeps:
+        for number, surface in enumerate(aircraft.surfaces):
+            if surface.side == side and surface.hinge is not None:
+                sweeps[side] = record.angles[:, number].copy()
+                extra[f"tip_{side}_z"] = record.tips_z[:, number].copy()
+                break
+    phi, theta, psi = record.euler.T.copy()
+    trajectory = Trajectory(
+        name="simulated",
+        time_s=times,
+        sweep_left=sweeps["left"],
+        sweep_right=sweeps["right"],
+        phi=phi,
+        theta=theta,
+        psi=psi,
+        extra=extra,
+    )
+    return checked(trajectory, "/flight")
