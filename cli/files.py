@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -60,27 +61,27 @@ def write_json(document: object, path: Path) -> None:
 
 
 def write_bytes(content: bytes, path: Path) -> None:
-    """Write a file.
-
-    Raises
-    ------
-    CommandError : it cannot be written.
-    """
-    try:
+    """Write a file; raise CommandError where that cannot be done."""
+    with writing(path):
         path.write_bytes(content)
-    except OSError as error:
-        raise CommandError(f"{path} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None
 
 
 def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
     """Write plots and curves into a folder and give their paths."""
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CommandError(f"{folder} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None
     saved = []
     for name, content in files.items():
         target = folder / Path(name).name  # a name from a service must not climb out
         write_bytes(content, target)
         saved.append(target)
     return saved
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Say what cannot be written, and why, as a CommandError."""
+    try:
+        yield
+    except OSError as error:
+        raise CommandError(f"{path} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None

@@ -13,8 +13,11 @@ from cli.commands.bench import bench
 from cli.commands.database import database
 from cli.commands.identify import identify
 from cli.commands.jobs import jobs
+from cli.commands.optimize import optimize
 from cli.commands.options import EXIT_CODES
 from cli.commands.serve import serve
+from cli.commands.simulate import simulate
+from cli.commands.study import study
 
 app = typer.Typer(
     name="morphid",
@@ -23,7 +26,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-for command in (serve, identify, bench):
+for command in (serve, identify, study, simulate, optimize, bench):
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(jobs, name="jobs")
 app.add_typer(database, name="db")

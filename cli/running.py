@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 
@@ -124,7 +124,7 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
 
 
 def hand_over(
-    answer: Answer, show: Callable[[Document], None], *, json_out: Path | None, plots: Path | None
+    answer: Answer, show: Callable[[Mapping[str, Any]], None], *, json_out: Path | None, plots: Path | None
 ) -> NoReturn:
     """Save the result and its files as the user wants them, show the result, and exit with the answer's code.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
@@ -41,9 +42,10 @@ def identify(
         generations=generations,
         max_seconds=max_seconds,
     )
-    hand_over(run(request, url), _show, json_out=json_out, plots=plots)
+    hand_over(run(request, url), show_model, json_out=json_out, plots=plots)
 
 
-def _show(result: dict[str, Any]) -> None:
+def show_model(result: Mapping[str, Any]) -> None:
+    """Print what came out, for people."""
     stdout().print(fit_table(result))
     stdout().print(model_table(result))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import typer
 
 from cli.commands import options
+from cli.commands.identify import show_model
+from cli.commands.optimize import show_schedule
+from cli.commands.simulate import show_flight
+from cli.commands.study import show_study
 from cli.screen import (
     exit_for,
-    fit_table,
     jobs_table,
     meter,
     print_job_error,
@@ -18,6 +22,12 @@ from cli.screen import (
     stdout,
 )
 
+SHOW_RESULT: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+    "identify": show_model,
+    "study": show_study,
+    "simulate": show_flight,
+    "optimize": show_schedule,
+}
 JobId = Annotated[str, typer.Argument(metavar="JOB", help="Id of the job.")]
 
 jobs = typer.Typer(help="Look after the jobs of a service.", no_args_is_help=True, epilog=options.EXIT_CODES)
@@ -58,8 +68,8 @@ def show_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: option
     stdout().print(jobs_table([found]))
     if found.get("error"):
         print_job_error(found["error"])
-    if result is not None and "fit" in result:
-        stdout().print(fit_table(result))
+    if result is not None and found["operation"] in SHOW_RESULT:
+        SHOW_RESULT[found["operation"]](result)
 
 
 @jobs.command("watch")

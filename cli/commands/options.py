@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from cli.exits import CommandError, Exit
+from cli.files import read_json
 from cli.request import Request
 
 EXIT_CODES = (
@@ -16,33 +20,62 @@ EXIT_CODES = (
 )
 DEFAULT_URL = "http://127.0.0.1:8000"
 
+# groups of options, as a command's help shows them
+flight_option = partial(typer.Option, rich_help_panel="Aircraft and flights")
+model_option = partial(typer.Option, rich_help_panel="Model")
+search_option = partial(typer.Option, rich_help_panel="Search")
+answer_option = partial(typer.Option, rich_help_panel="Where it runs, and where the answer goes")
+
+
+class Core(StrEnum):
+    """What keeps the velocity of a lattice's vortices finite."""
+
+    LINE = "line"
+    SMOOTHED = "smoothed"
+
+
+class Start(StrEnum):
+    """Where a flight starts."""
+
+    TRIM = "trim"
+    GIVEN = "given"
+
+
 # of commands that talk to a service anyway
 Url = Annotated[str, typer.Option(envvar="MORPHID_URL", help="Address of the service.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
-# of operations, which run in this process unless told otherwise
-AircraftFile = Annotated[Path, typer.Option("--aircraft", help="Aircraft, JSON.")]
-FlightFile = Annotated[Path, typer.Option("--flight", help="Flight condition, JSON.")]
-AtUrl = Annotated[str | None, typer.Option("--url", help="Run at this service instead of in this process.")]
-JsonFile = Annotated[
-    Path | None, typer.Option("--json", help="Write the result to this file; `-` prints it.")
-]
-Plots = Annotated[Path | None, typer.Option("--plots", help="Write plots and curves into this folder.")]
-
-# sample flights
-Samples = Annotated[list[Path], typer.Option("--sample", help="Sample flight to fit, CSV; repeat.")]
+AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
+FlightFile = Annotated[Path, flight_option("--flight", help="Flight condition, JSON.")]
+Samples = Annotated[list[Path], flight_option("--sample", help="Sample flight to fit, CSV; repeat.")]
 HeldOut = Annotated[
-    list[Path] | None, typer.Option("--held-out", help="Sample flight to predict, not to fit; repeat.")
+    list[Path] | None, flight_option("--held-out", help="Sample flight to predict, not to fit; repeat.")
 ]
 
-# searches
-Method = Annotated[str | None, typer.Option("--method", help="hybrid, pso or least_squares.")]
-Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Same seed, same answer.")]
-Particles = Annotated[int | None, typer.Option("--particles", min=2, help="Swarm size.")]
-Generations = Annotated[int | None, typer.Option("--generations", min=1, help="Swarm generations.")]
-MaxSeconds = Annotated[
-    float | None, typer.Option("--max-seconds", min=1.0, help="Stop searching after this long.")
+Parameters = Annotated[
+    Path | None, model_option("--parameters", help="Equivalent model: result of an identification, JSON.")
 ]
+Elements = Annotated[
+    int | None, model_option("--elements", min=1, help="Beam elements of each wing of the flexible model.")
+]
+Chordwise = Annotated[int | None, model_option("--chordwise", min=1, help="Lattice panels along the chord.")]
+Spanwise = Annotated[int | None, model_option("--spanwise", min=1, help="Lattice panels along the span.")]
+VortexCore = Annotated[Core | None, model_option("--core", help="Core of the lattice's vortices.")]
+StartAt = Annotated[
+    Start | None, model_option("--start", help="Trim each model by itself, or start as the flight file says.")
+]
+
+Method = Annotated[str | None, search_option("--method", help="hybrid, pso or least_squares.")]
+Seed = Annotated[int | None, search_option("--seed", min=0, help="Same seed, same answer.")]
+Particles = Annotated[int | None, search_option("--particles", min=2, help="Swarm size.")]
+Generations = Annotated[int | None, search_option("--generations", min=1, help="Swarm generations.")]
+MaxSeconds = Annotated[
+    float | None, search_option("--max-seconds", min=1.0, help="Stop searching after this long.")
+]
+
+AtUrl = Annotated[str | None, answer_option("--url", help="Run at this service instead of in this process.")]
+JsonFile = Annotated[Path | None, answer_option("--json", help="Write the result here; `-` prints it.")]
+Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and curves into this folder.")]
 
 
 def sample_request(
@@ -63,8 +96,36 @@ def flight_request(operation: str, aircraft: Path, flight: Path) -> Request:
     return request
 
 
+def put_parameters(request: Request, path: Path) -> None:
+    """Fill in the parameters of an equivalent model: an identification's result, or the model in it.
+
+    Raises
+    ------
+    CommandError : the file holds neither.
+    """
+    found = read_json(path)
+    if isinstance(found, dict):
+        found = found.get("model", found)
+    if not isinstance(found, dict) or "links_per_wing" not in found:
+        raise CommandError(
+            f"--parameters {path}: there is no equivalent model in it",
+            code=Exit.INVALID_INPUT,
+            hint="give the file that `morphid identify --json` wrote, or the `model` in it",
+        )
+    request.put("/model/parameters", found, f"--parameters {path}")
+
+
 def put_search(request: Request, **options: Any) -> None:
     """Fill in how to search; what the user did not choose is left out."""
     request.document.setdefault("search", {})
     for name, value in options.items():
         request.put(f"/search/{name}", value, f"--{name.replace('_', '-')}")
+
+
+def put_lattice(
+    request: Request, pointer: str, *, chordwise: int | None, spanwise: int | None, core: Core | None
+) -> None:
+    """Fill in the vortex lattice at a pointer."""
+    request.put(f"{pointer}/chordwise", chordwise, "--chordwise")
+    request.put(f"{pointer}/spanwise", spanwise, "--spanwise")
+    request.put(f"{pointer}/core/law", core, "--core")
