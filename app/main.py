@@ -23,7 +23,10 @@ from app.jobs.queue import Publisher
 from app.jobs.watch import JobWatcher
 from app.models.endpoints import router as models
 from app.openapi import openapi_document
+from app.optimize.endpoints import router as optimize
 from app.settings import Settings, load_settings
+from app.simulate.endpoints import router as simulate
+from app.study.endpoints import router as study
 from app.trajectories.endpoints import router as trajectories
 from app.version import VERSION
 from app.web.endpoints import mount_static
@@ -33,7 +36,7 @@ from app.web.endpoints import router as web
 def routed_app() -> FastAPI:
     """Return the application with its routes, without settings, database or broker."""
     app = FastAPI(title="MorphID", version=VERSION, docs_url=None, redoc_url=None)
-    for router in (identify, jobs, trajectories, models, health, web):
+    for router in (identify, study, simulate, optimize, jobs, trajectories, models, health, web):
         app.include_router(router)
     mount_static(app)
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]  # FastAPI's documented way

@@ -26,6 +26,9 @@ the fields. Every error is a problem document (RFC 9457) with a stable `code`, a
 """
 TAGS = [
     {"name": "identify", "description": "From sample flights to an equivalent model."},
+    {"name": "study", "description": "How many links a model should have."},
+    {"name": "simulate", "description": "Flights of the rigid, the equivalent and the flexible model."},
+    {"name": "optimize", "description": "Morph schedules that disturb the attitude least."},
     {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
     {"name": "trajectories", "description": "Sample flights as files."},
     {"name": "models", "description": "Identified models."},

@@ -118,7 +118,7 @@ class CostEstimate(BaseModel):
 
     samples: int
     rows: int
-    parameters: int = Field(description="Unknowns of the search.")
+    parameters: int = Field(description="Unknowns of the search, of the largest model in a study.")
     flights: int = Field(description="Flights to be flown: parameter sets times samples.")
     flight_s: float = Field(description="Simulated time of all those flights.")
     core_s: float = Field(description="Computing time on one core.")

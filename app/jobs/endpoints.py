@@ -12,11 +12,11 @@ from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotF
 from app.http.context import OwnerDep, ServiceDep
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
-from app.identify.schemas import IdentifyResult
 from app.jobs import repository, service, store
 from app.jobs.artifacts import media_type
 from app.jobs.event_stream import stream_events, wait_for_end
 from app.jobs.records import JobStatus
+from app.jobs.results import JobResult
 from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
 
 router = APIRouter(tags=["jobs"])
@@ -124,11 +124,14 @@ async def get_job_events(
     "/jobs/{job_id}/result",
     operation_id="get_job_result",
     summary="Get the result of a job",
-    response_model=IdentifyResult,
+    response_model=JobResult,
     responses=documented(InvalidRequest, JobNotFound, ResultNotReady),
 )
 def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
-    """Return the result; of a cancelled or expired job the best so far, marked `"partial": true`."""
+    """Return the result in the form of the job's operation.
+
+    Of a cancelled or expired search it is the best so far, marked `"partial": true`.
+    """
     with app.database.read() as session:
         text = service.result(session, owner, job_id)
     return Response(text, media_type="application/json")

@@ -23,7 +23,11 @@ class Progress(BaseModel):
     phase: str | None = Field(default=None, examples=["swarm"])
     message: str | None = None
     generation: int | None = None
-    best_cost: float | None = Field(default=None, description="Sum of squared angle errors so far, rad^2.")
+    best_cost: float | None = Field(
+        default=None,
+        description="Least cost so far: sum of squared angle errors (identify, study) or attitude variation "
+        "(optimize), rad^2.",
+    )
     flights: int | None = Field(default=None, description="Flights flown so far.")
     flights_per_s: float | None = None
     eta_s: float | None = Field(default=None, description="Estimated time to the end.")
@@ -56,9 +60,13 @@ class RequestSummary(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     aircraft: str | None = None
-    links_per_wing: int | None = None
-    method: str | None = None
+    links_per_wing: int | None = Field(default=None, description="Of the equivalent model.")
+    compared_links: list[int] = Field(default=[], description="Numbers of links per wing of a study.")
+    model: str | None = Field(default=None, description="The model that a simulation flies.")
+    method: str | None = Field(default=None, description="Of the search.")
     samples: list[SampleSummary] = []
+    duration_s: float | None = Field(default=None, description="Of the flight or of the morph.")
+    final_rad: float | None = Field(default=None, description="Sweep at the end of the morph.")
 
 
 class JobLinks(BaseModel):
@@ -89,7 +97,8 @@ class Job(BaseModel):
     priority: int
     request: RequestSummary
     model_id: str | None = Field(
-        description="The identified model, once there is one: GET /models/{model_id}."
+        description="The identified (of a study: the recommended) model, once there is one: "
+        "GET /models/{model_id}."
     )
     last_event: int = Field(description="Number of the newest event.")
     created_at: datetime

@@ -20,6 +20,7 @@ from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
 from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
 from app.jobs.rows import JOB_COLUMNS, get_job, insert_event, job_from_row, transition
+from app.models.left_models import left_model
 from app.models.repository import insert_model
 from app.tables import idempotency_keys, job_checkpoints, job_requests, job_results, jobs
 
@@ -285,7 +286,9 @@ def finish_job(
     }
     if error is not None:
         values["error"] = finite(error)
-    if ending == JobStatus.SUCCEEDED.value and result is not None and claim.operation == "identify":
+    succeeded = ending == JobStatus.SUCCEEDED.value
+    identified = left_model(claim.operation, result) if succeeded and result is not None else None
+    if identified is not None:
         values["model_id"] = new_identifier("model")
     payload = {"error": values["error"]} if error is not None else None
     row = transition(session, *_held_by(claim), event=ending, payload=payload, **values)
@@ -301,16 +304,16 @@ def finish_job(
             )
         )
     store_artifacts(session, claim.job_id, artifacts or {})
-    if row.model_id is not None and result is not None:
+    if identified is not None:
         insert_model(
             session,
             model_id=row.model_id,
             owner=row.owner,
             job_id=row.id,
             request=load_request(session, row.id),
-            result=result,
+            identified=identified,
         )
-    if ending == JobStatus.SUCCEEDED.value:
+    if succeeded:
         session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
     return True
 

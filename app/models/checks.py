@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.errors import Fault
-from app.schemas.parameters import AXES, KnownModel, Parameters
+from app.schemas.parameters import AXES, KnownModel, Parameters, WholeResult
 
 SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
 RAGGED = -1
@@ -23,6 +23,8 @@ def known_model_faults(model: KnownModel, pointer: str = "/model") -> list[Fault
                 "Leave one of them out.",
             )
         ]
+    if isinstance(model.parameters, WholeResult):
+        return list(_parameters_faults(model.parameters.model, f"{pointer}/parameters/model"))
     if model.parameters is not None:
         return list(_parameters_faults(model.parameters, f"{pointer}/parameters"))
     if model.model_id is None:

@@ -31,10 +31,18 @@ class ModelSummary:
 
 
 def insert_model(
-    session: Session, *, model_id: str, owner: str, job_id: str, request: Document, result: Document
+    session: Session, *, model_id: str, owner: str, job_id: str, request: Document, identified: Document
 ) -> None:
-    """Store the model of a successful identification with all that is needed to fly it again."""
-    model = result.get("model") or {}
+    """Store an identified model with all that is needed to fly it again.
+
+    Parameters
+    ----------
+    request
+        Of the job that identified it; its aircraft, flight and options are kept.
+    identified
+        The ``model`` and its ``fit``, see `app.models.left_models`.
+    """
+    model = identified.get("model") or {}
     aircraft = request.get("aircraft") or {}
     links = model.get("links_per_wing")
     name = str(aircraft.get("name") or "aircraft")
@@ -48,10 +56,10 @@ def insert_model(
             document=packed(
                 {
                     "model": model,
-                    "fit": result.get("fit", []),
+                    "fit": identified.get("fit", []),
                     "aircraft": aircraft,
                     "flight": request.get("flight") or {},
-                    "options": request.get("model") or {},
+                    "options": {**(request.get("model") or {}), "links_per_wing": links},
                 }
             ),
             created_at=database_time(),

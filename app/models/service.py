@@ -8,7 +8,7 @@ from app.errors import Fault, InvalidRequest, ModelNotFound
 from app.models import repository
 from app.models.checks import known_model_faults
 from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
-from app.schemas.parameters import KnownModel
+from app.schemas.parameters import KnownModel, WholeResult
 
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
 
@@ -49,18 +49,19 @@ def known_model(session: Session, owner: str, model: KnownModel, pointer: str = 
     faults = known_model_faults(model, pointer)
     if faults:
         raise InvalidRequest.of(faults)
-    if model.model_id is None:
-        parameters = model.model_dump(include={"parameters"}, exclude_none=True)["parameters"]
-    else:
-        parameters = _identified(session, owner, model.model_id, f"{pointer}/model_id")
+    parameters = _parameters(session, owner, model, f"{pointer}/model_id")
     chosen = model.model_dump(include=set(HOW_IDENTIFIED), exclude_none=True)
     identified = {name: parameters[name] for name in HOW_IDENTIFIED if parameters.get(name) is not None}
     return {"parameters": parameters, **identified, **chosen}
 
 
-def _identified(session: Session, owner: str, model_id: str, pointer: str) -> Document:
+def _parameters(session: Session, owner: str, model: KnownModel, pointer: str) -> Document:
+    """Find the parameters: in the request, or in the owner's identified model."""
+    given = model.parameters
+    if given is not None:
+        return (given.model if isinstance(given, WholeResult) else given).model_dump(exclude_none=True)
     try:
-        _, document = repository.get_model(session, owner, model_id)
+        _, document = repository.get_model(session, owner, model.model_id or "")
     except ModelNotFound as error:
         fault = Fault("model_not_found", error.detail, pointer, error.hint)
         raise InvalidRequest.of([fault]) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from app.schemas.fields import Identifier, Strict
 from app.schemas.lattice import Lattice, Start, StepS
@@ -24,6 +24,7 @@ EXAMPLE_PARAMETERS: dict[str, Any] = {
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Shares = Annotated[list[Share], Field(min_length=1, max_length=MAX_LINKS)]
 Stiffness = Annotated[float, Field(ge=0.0, le=1e15)]
+Unread = Annotated[Any, Field(default=None, exclude=True)]
 Joint = Annotated[list[Stiffness], Field(min_length=AXES, max_length=AXES)]
 Joints = Annotated[list[Joint], Field(max_length=MAX_LINKS - 1)]
 
@@ -61,13 +62,34 @@ class Parameters(Strict):
     start: Start | None = None
 
 
+class WholeResult(Strict):
+    """A whole result of an identification: only its `model` is looked at."""
+
+    model: Parameters
+    fit: Unread = None
+    uncertainty: Unread = None
+    search: Unread = None
+    cost: Unread = None
+    partial: Unread = None
+
+
+def _form(value: Any) -> str:
+    whole = "model" in value if isinstance(value, dict) else isinstance(value, WholeResult)
+    return "whole" if whole else "model"
+
+
 class KnownModel(Strict):
     """An equivalent model by its parameters, or by the id of an identified one.
 
     Lattice, step and start are those it was identified with where they are left out.
     """
 
-    parameters: Parameters | None = None
+    parameters: (
+        Annotated[
+            Annotated[Parameters, Tag("model")] | Annotated[WholeResult, Tag("whole")], Discriminator(_form)
+        ]
+        | None
+    ) = Field(default=None, description="The `model` of an identification's result, or the whole result.")
     model_id: Identifier | None = Field(
         default=None,
         description="Instead of `parameters`: an identified model, see GET /models.",

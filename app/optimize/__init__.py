@@ -1,0 +1,1 @@
+"""Optimisation of a morph schedule: the request side."""

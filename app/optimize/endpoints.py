@@ -1,0 +1,27 @@
+"""Endpoints of the optimisation of a morph schedule."""
+
+from __future__ import annotations
+
+from app.http.context import OwnerDep, ServiceDep
+from app.jobs.schemas import Job
+from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.optimize import service
+from app.optimize.schemas import OptimizeRequest, OptimizeValidation
+
+router = OperationRouter("optimize")
+
+
+@router.submission("Find the morph schedule that disturbs the attitude least")
+async def optimize(body: OptimizeRequest, submission: SubmissionDep) -> Job:
+    """Start an optimisation and return its job.
+
+    The schedule found with the equivalent model is compared with the constant rate and with the one found
+    with the rigid model, all three flown in every model.
+    """
+    return await submission.accept(service.prepare, body)
+
+
+@router.validation("Check a request for an optimisation")
+def validate_optimize(body: OptimizeRequest, app: ServiceDep, owner: OwnerDep) -> OptimizeValidation:
+    """Make the same checks as `POST /optimize` without starting anything, and tell what it would cost."""
+    return OptimizeValidation(cost=priced(app, owner, service.prepare, body))

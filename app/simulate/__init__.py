@@ -1,0 +1,1 @@
+"""Simulation of one flight with any of the three models: the request side."""

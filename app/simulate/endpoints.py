@@ -1,0 +1,27 @@
+"""Endpoints of simulation."""
+
+from __future__ import annotations
+
+from app.http.context import OwnerDep, ServiceDep
+from app.jobs.schemas import Job
+from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.simulate import service
+from app.simulate.schemas import SimulateRequest, SimulateValidation
+
+router = OperationRouter("simulate")
+
+
+@router.submission("Fly a model through a morph")
+async def simulate(body: SimulateRequest, submission: SubmissionDep) -> Job:
+    """Start a simulation and return its job.
+
+    With `Prefer: wait=30` the job of a rigid or an equivalent model has usually ended when the answer comes.
+    A flight keeps no checkpoint: where its worker is lost, another flies it again from the start.
+    """
+    return await submission.accept(service.prepare, body)
+
+
+@router.validation("Check a request for a simulation")
+def validate_simulate(body: SimulateRequest, app: ServiceDep, owner: OwnerDep) -> SimulateValidation:
+    """Make the same checks as `POST /simulate` without starting anything, and tell what it would cost."""
+    return SimulateValidation(cost=priced(app, owner, service.prepare, body))

@@ -1,0 +1,1 @@
+"""Study of the number of links per wing: the request side."""

@@ -1,0 +1,27 @@
+"""Endpoints of the study."""
+
+from __future__ import annotations
+
+from app.http.context import OwnerDep, ServiceDep
+from app.jobs.schemas import Job
+from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.study import service
+from app.study.schemas import StudyRequest, StudyValidation
+
+router = OperationRouter("study")
+
+
+@router.submission("Compare models of several sizes")
+async def study(body: StudyRequest, submission: SubmissionDep) -> Job:
+    """Start a study and return its job.
+
+    A model is identified for every number of links per wing from the same samples; accuracy and cost of each
+    are told, and one is recommended. The recommended model becomes one of yours: see `model_id` of the job.
+    """
+    return await submission.accept(service.prepare, body)
+
+
+@router.validation("Check a request for a study")
+def validate_study(body: StudyRequest, app: ServiceDep, owner: OwnerDep) -> StudyValidation:
+    """Make the same checks as `POST /study` without starting anything, and tell what it would cost."""
+    return StudyValidation(cost=priced(app, owner, service.prepare, body))
