@@ -110,7 +110,7 @@ class SimulationResult:
         return self.simulation.trajectory
 
     def to_document(self) -> Document:
-        """JSON form; see the schemas of the HTTP API."""
+        """JSON form with the names of the API; the summary's angles are departures from the start."""
         flown, trim = self.trajectory, self.simulation.trim
         tips = {side: flown.extra.get(f"tip_{side}_z") for side in SIDES}
         return {
@@ -123,8 +123,7 @@ class SimulationResult:
             },
             "trajectory": trajectory_document(flown),
             "summary": {
-                "max_abs_rad": _per_angle(np.abs(flown.euler).max(axis=0)),
-                "max_departure_rad": _per_angle(np.abs(_departure(flown)).max(axis=0)),
+                "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
                 "variation_rad2": attitude_variation(flown),
             },
             "cost": {
@@ -334,7 +333,3 @@ def trajectory_document(trajectory: Trajectory) -> Document:
         **{f"{name}_{UNITS[name]}" if name in UNITS else name: v for name, v in trajectory.extra.items()},
     }
     return {name: values.tolist() for name, values in columns.items()}
-
-
-def _per_angle(values: Array) -> dict[str, float]:
-    return {angle: float(value) for angle, value in zip(ANGLES, values, strict=True)}
