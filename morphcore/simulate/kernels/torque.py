@@ -1,0 +1,76 @@
+"""Torque of the hinge motors along a flight."""
+
+from __future__ import annotations
+
+from morphcore.jit import entry_kernel
+from morphcore.lanes import LANES
+from morphcore.models.kernels.chain import clear
+from morphcore.models.kernels.layout import (
+    LINKS_C,
+    S_CARRIED,
+    S_INERTIA,
+    joint_rows_of_scratch,
+    link_rows_of_scratch,
+)
+from morphcore.multibody.kernels.articulated import LINK_ROWS, add_bias, add_link
+from morphcore.multibody.kernels.gimbal import JOINT_ROWS, carry_through_gimbal
+from morphcore.multibody.kernels.hinge import H_SUBSPACE
+from morphcore.simulate.kernels.step import instant_rates
+
+
+@entry_kernel
+def torques(
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, states, zero,
+    block, scratch, inputs, outputs, rates, out,
+):  # fmt: skip
+    """Inverse dynamics of every wing at each of some instants of one flight.
+
+    Leaves the accelerations of all links in the scratch block by the forward pass, then sums over each wing,
+    from its tip to its hinge, what each link takes: I a + v x* I v - air load (recursive Newton-Euler,
+    Featherstone (2008), table 5.1). Gravity is in the accelerations.
+
+    Parameters (t instants, s surfaces)
+    ----------
+    states : (t, rows) of one flight; the others as in ``rates_of_blocks``, with a leading axis t.
+    block : (rows, LANES) and the rest of the scratch: the caller's own. out : (t, s) N m, along the positive
+    hinge coordinates; zero without a hinge.
+    """
+    links = ranges.shape[0]
+    coordinates = 3 * (links - surfaces.shape[0])
+    w_twist, w_wrench, _, w_acceleration, _ = link_rows_of_scratch(links)
+    _, _, _, w_joint, _ = joint_rows_of_scratch(links, coordinates)
+    inertia = scratch[S_INERTIA : S_INERTIA + 21]
+    force = scratch[S_CARRIED : S_CARRIED + 6]
+    for n in range(states.shape[0]):
+        for i in range(states.shape[1]):
+            for l in range(LANES):
+                block[i, l] = states[n, i]
+        instant_rates(
+            surfaces, ranges, shared, strips[n], hinges[n], hinge_accelerations[n], operators[n], wind[n],
+            constants, block, zero, scratch, inputs, outputs, rates,
+        )  # fmt: skip
+        last_joint = coordinates // 3
+        for s in range(surfaces.shape[0] - 1, -1, -1):
+            clear(force)
+            for k in range(surfaces[s, 1] - 1, -1, -1):
+                link = surfaces[s, 0] + k
+                rows = constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS]
+                clear(inertia)  # of this link alone
+                add_link(
+                    rows,
+                    scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
+                    scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
+                    inertia,
+                    force,
+                )
+                add_bias(inertia, scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6], force)
+                if k > 0:
+                    last_joint -= 1
+                    joint = scratch[
+                        w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)
+                    ]
+                    carry_through_gimbal(rows, joint, inertia, force)
+            torque = 0.0
+            for i in range(6):
+                torque += hinges[n, s, H_SUBSPACE + i] * force[i, 0]
+            out[n, s] = torque
