@@ -96,6 +96,9 @@ Begin = Callable[[Document, int], Work]
 
 OPERATIONS: Mapping[str, str] = {
     "identify": "worker.operations.identification:begin",
+    "study": "worker.operations.study:begin",
+    "simulate": "worker.operations.simulation:begin",
+    "optimize": "worker.operations.optimisation:begin",
 }
 
 

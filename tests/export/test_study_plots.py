@@ -1,0 +1,71 @@
+"""A study as a picture and as a table: what they show, and what they do without."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from morphcore.export.study_plots import study_figure, study_plots, study_table
+
+
+def row(links: int, **changes: Any) -> dict[str, Any]:
+    """Make a study's row."""
+    return {
+        "links_per_wing": links,
+        "bodies": 2 * links + 1,
+        "parameters": 7 * (links - 1) + 4,
+        "J_train": 0.1 / 10**links,
+        "J_held_out": 0.3 / 10**links,
+        "rms_rad": {"phi": 1e-3, "theta": 2e-3, "psi": None},
+        "flight_s": 0.01 * links,
+        "identify_s": 1.0,
+        "flights": 100,
+        **changes,
+    }
+
+
+def study(*rows: dict[str, Any], recommended: int | None = 2) -> dict[str, Any]:
+    """Make a study's result."""
+    return {
+        "rows": list(rows),
+        "rigid": {"J_train": 0.05, "J_held_out": 0.2, "flight_s": 0.008},
+        "recommended": {"links_per_wing": recommended, "reason": "because"},
+    }
+
+
+def test_the_picture_shows_accuracy_and_price() -> None:
+    """J of both roles on a logarithmic axis with the rigid model's beside, the time of a flight in ms."""
+    accuracy, price = study_figure(study(row(1), row(2), row(3))).axes
+    fitted = next(line for line in accuracy.lines if line.get_label() == "fitted flights")
+    assert np.allclose(fitted.get_ydata(), [1e-2, 1e-3, 1e-4])
+    assert accuracy.get_yscale() == "log"
+    assert max(line.get_ydata()[0] for line in accuracy.lines) == 0.2
+    assert np.allclose(price.lines[0].get_ydata(), [10.0, 20.0, 30.0])
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        study(row(1, J_held_out=None, flight_s=None), recommended=1),
+        study(row(1, J_train=None, J_held_out=None), recommended=None),
+        {"rows": [], "recommended": None},
+    ],
+)
+def test_what_is_not_known_is_not_drawn(document: dict[str, Any]) -> None:
+    """A study without held-out flights, one whose model diverged, one cancelled at once."""
+    files = study_plots(document)
+    assert set(files) == {"study.svg", "study.png"}
+    assert ET.fromstring(files["study.svg"]).tag.endswith("svg")  # noqa: S314 - our own file
+
+
+def test_the_table_holds_every_row() -> None:
+    """Figures survive to nine digits, unknown ones are empty cells, the recommended row is marked."""
+    text = study_table(study(row(1, J_held_out=None), row(2, identify_s=1.23456789))).decode()
+    one, two = csv.DictReader(io.StringIO(text))
+    assert (one["J_held_out"], one["recommended"], two["recommended"]) == ("", "", "yes")
+    assert (two["identify_s"], two["rms_phi_rad"], two["rms_psi_rad"]) == ("1.23456789", "0.001", "")

@@ -1,0 +1,24 @@
+"""The operation ``study``: equivalent models of several sizes from the same sample flights."""
+
+from __future__ import annotations
+
+from morphcore.export.study_plots import study_plots, study_table
+from morphcore.identify.study import study_from_document
+from morphcore.identify.study_result import StudyResult
+from worker.operations import Document
+from worker.operations.library_work import SearchWork, library_errors
+
+
+def begin(request: Document, threads: int) -> SearchWork[StudyResult]:
+    """Check the request and prepare the searches.
+
+    Raises
+    ------
+    WorkRefused : the request cannot be flown.
+    """
+    with library_errors():
+        return SearchWork(study_from_document(request, threads=threads), _files)
+
+
+def _files(_result: StudyResult, document: Document) -> dict[str, bytes]:
+    return {**study_plots(document), "study.csv": study_table(document)}
