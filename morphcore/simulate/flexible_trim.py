@@ -36,7 +36,7 @@ class FlexibleTrim:
 
 
 class _Balance:
-    """The equations of trim: scaled imbalance for displacements of all nodes and (alpha | base rates)."""
+    """The equations of trim: scaled imbalance for displacements of all nodes and, of free trim, alpha."""
 
     def __init__(self, flight: FlexibleFlight, path: HingePath, wind_N: Array, start: StartMode) -> None:
         self.flight, self.path, self.wind_N = flight, path, wind_N
@@ -53,24 +53,21 @@ class _Balance:
             poses.R[root : tip + 1] = poses.R[root]
             poses.x[root : tip + 1] = poses.x[root] + model.rest_W[root : tip + 1] @ poses.R[root].T
         self.unbent = poses
-        self.inertia = self._whole_inertia()
 
     @property
     def unknowns(self) -> int:
         """Number of unknowns."""
-        return 6 * self.free.size + (6 if self.given is not None else 1)
+        return 6 * self.free.size + (1 if self.given is None else 0)
 
-    def _whole_inertia(self) -> Array:
-        """Spatial inertia (6, 6) of the unbent aircraft about the reference point."""
-        columns = []
-        for column in range(6):
-            A_B = np.zeros(6)
-            A_B[column] = 1.0
-            A = self._rigid(self.unbent, A_B)
-            gravity, self.flight.gravity_N = self.flight.gravity_N, np.zeros(3)
-            demands = self.flight.structure(self.unbent, np.zeros_like(A), A)
-            self.flight.gravity_N = gravity
-            columns.append(self.total(self.unbent, demands))
+    def _inertia(self, poses: NodePoses, at_rest: Array) -> Array:
+        """Spatial inertia (6, 6) of the whole aircraft in this shape about the reference point.
+
+        From the nodes' demands (n, 6) for unit accelerations, less those ``at_rest``.
+        """
+        zero, columns = np.zeros_like(at_rest), []
+        for unit_B in np.eye(6):
+            demands = self.flight.structure(poses, zero, self._rigid(poses, unit_B))
+            columns.append(self.total(poses, demands - at_rest))
         return np.stack(columns, axis=1)
 
     def _rigid(self, poses: NodePoses, motion_B: Array) -> Array:
@@ -106,18 +103,23 @@ class _Balance:
         poses.R = np.ascontiguousarray(poses.R)
         V = self._rigid(poses, V_B)
         A = np.zeros_like(V)
-        if self.given is not None:
-            A = self._rigid(poses, x[count:])
         demands = flight.structure(poses, V, A)
         twists = flight.place_lattice(poses, V, self.wind_N)
         wind_B = self.wind_N @ R_NB
         circulation = flight.lattice.circulation(twists, wind_B)
         flight.subtract_air(circulation, twists, wind_B, demands)
+        if self.given is not None:
+            # the wings move with the fuselage as one: its acceleration follows from the sum of all forces
+            at_rest = flight.structure(poses, np.zeros_like(V), A)
+            thrust = np.concatenate([self.given.moment_B, self.given.force_B])
+            A_B = np.linalg.solve(self._inertia(poses, at_rest), thrust - self.total(poses, demands))
+            A = self._rigid(poses, A_B)
+            demands += flight.structure(poses, V, A) - flight.structure(poses, V, np.zeros_like(V))
         lag = np.stack([circulation, circulation])
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands
 
     def imbalance(self, x: Array) -> Array:
-        """Displacements that would undo the imbalance, and the defect of the flight path's equations."""
+        """Displacements that would undo the imbalance and, of free trim, the defect of lift as an angle."""
         flight, model = self.flight, self.flight.model
         state, demands = self.state(x)
         total = self.total(state.poses, demands)
@@ -127,8 +129,7 @@ class _Balance:
         expand_solution(model.beams, flight.work, demands)
         bent = demands[self.free].ravel()
         if self.given is not None:
-            total -= np.concatenate([self.given.moment_B, self.given.force_B])
-            return np.concatenate([bent, np.linalg.solve(self.inertia, total)])
+            return np.asarray(bent)
         alpha = x[-1]
         normal = -np.sin(alpha) * total[3] + np.cos(alpha) * total[5]
         return np.append(bent, normal / (model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE))
@@ -140,8 +141,8 @@ def trim_flexible(
     """Equilibrium at the path's first hinge angles, as `simulate.trim.trim` defines it.
 
     Unknowns are the poses of all free nodes and the angle of attack; thrust along the flight path, side force
-    and moment follow. With ``start="given"`` they are the flight's, and the unknowns are the nodes and the
-    fuselage's acceleration, with which the wings move as one. Newton's method with Krylov steps
+    and moment follow. With ``start="given"`` they are the flight's, the unknowns are the nodes, and the wings
+    share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with Krylov steps
     (`scipy.optimize.newton_krylov`), on the imbalance divided by the structure's stiffness.
 
     Raises

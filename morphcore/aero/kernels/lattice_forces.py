@@ -7,7 +7,7 @@ from morphcore.jit import entry_kernel
 
 @entry_kernel
 def normal_influence(normals, velocity, out):
-    """Normal velocity (r, r) at control points from rings: velocity (3, rings, points), its first r points."""
+    """Normal velocity (r, r) at control points of rings: velocity (3, rings, points), r points first."""
     rings = normals.shape[0]
     for p in range(rings):
         nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
