@@ -30,6 +30,7 @@ INK, GRID = "0.15", "0.88"
 
 SILENT_RAD = 1e-6  # an angle that stays below is round-off, not motion
 SILENT_SPAN_DEG = 0.1  # half the height of the axis on which it is drawn, as a flat line
+LEGEND_HEAD_IN, TITLE_HEAD_IN = 0.62, 0.36  # above the panels: for title and legend, for a title alone
 PNG_DPI = 110
 LONGEST_TITLE = 70  # characters
 MOST_POINTS = 4000  # of a curve: more than the pixels of a page
@@ -42,8 +43,11 @@ _drawing = threading.Lock()
 # panels
 
 
-def stack(figure: Figure, heights: Sequence[float]) -> list[Axes]:
-    """Panels of the given relative heights, one above the other, with a common abscissa."""
+def stack(figure: Figure, heights: Sequence[float], head_in: float = LEGEND_HEAD_IN) -> list[Axes]:
+    """Panels of the given relative heights, one above the other, with a common abscissa.
+
+    ``head_in`` is left free above them, inches.
+    """
     inches = float(figure.get_figheight())
     grid = figure.add_gridspec(
         len(heights),
@@ -52,7 +56,7 @@ def stack(figure: Figure, heights: Sequence[float]) -> list[Axes]:
         hspace=0.14,
         left=0.115,
         right=0.98,
-        top=1.0 - 0.62 / inches,
+        top=1.0 - head_in / inches,
         bottom=0.5 / inches,
     )
     rows: list[Axes] = []
