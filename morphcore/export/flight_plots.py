@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from morphcore.export.figure import (
@@ -10,6 +13,7 @@ from morphcore.export.figure import (
     BLUE,
     SILENT_SPAN_DEG,
     TITLE_HEAD_IN,
+    Array,
     Document,
     draw,
     draw_sides,
@@ -17,6 +21,7 @@ from morphcore.export.figure import (
     headline,
     is_silent,
     label_axis,
+    printable,
     quiet,
     rendered,
     series,
@@ -25,7 +30,8 @@ from morphcore.export.figure import (
 )
 
 TIPS = ("tip_left_z_m", "tip_right_z_m")
-TIPS_ALIKE_M = 1e-6  # round-off of tips that move together
+ROUND_OFF_M = 1e-6  # of tips that move together, or not at all
+STILL_SPAN_M = 0.1  # half the height of the axis on which tips are drawn that do not move
 ANGLE_HEIGHT, SILENT_HEIGHT, OTHER_HEIGHT = 1.0, 0.45, 0.6  # of the panels, relative
 
 
@@ -51,21 +57,28 @@ def flight_figure(document: Document) -> Figure:
     time_s = series(flown["time_s"])
     angles = {key: np.unwrap(series(flown[key])) for key, _ in ANGLES}
     silent = {key: is_silent([values]) for key, values in angles.items()}
-    has_tips = all(name in flown for name in TIPS)
+    tips_up = [-series(flown[name]) for name in TIPS if flown.get(name) is not None]  # body z points down
     heights = [SILENT_HEIGHT if silent[key] else ANGLE_HEIGHT for key, _ in ANGLES]
-    heights += [OTHER_HEIGHT] * (1 + has_tips)
+    heights += [OTHER_HEIGHT] * (1 + bool(tips_up))
     figure = Figure(figsize=(7.2, 1.1 + 1.75 * sum(heights)))
     rows = stack(figure, heights, TITLE_HEAD_IN)
     for axes, (key, label) in zip(rows, ANGLES, strict=False):
         label_axis(axes, f"{label}, deg")
+        axes.axhline(np.degrees(angles[key][0]), color="0.5", linewidth=0.6)  # how it started
         draw(axes, time_s, np.degrees(angles[key]), color=BLUE, linewidth=1.5)
         if silent[key]:
             quiet(axes, SILENT_SPAN_DEG)
-    if has_tips:
-        left, right = (-series(flown[name]) for name in TIPS)  # body z points down
-        draw_sides(rows[len(ANGLES)], time_s, left, right, TIPS_ALIKE_M)
-        label_axis(rows[len(ANGLES)], "tips up, m")
+    if tips_up:
+        _draw_tips(rows[len(ANGLES)], time_s, tips_up)
     draw_sweep(rows[-1], time_s, flown)
     time_axis(figure, rows, time_s)
-    headline(figure, f"simulated flight, {document['model']['kind']} model")
+    headline(figure, f"simulated flight, {printable(str(document['model']['kind']))} model")
     return figure
+
+
+def _draw_tips(axes: Axes, time_s: Array, up_m: Sequence[Array]) -> None:
+    """Height of the tips above their roots, m: of both sides, or of the one that has a wing."""
+    label_axis(axes, "tips up, m")
+    draw_sides(axes, time_s, up_m[0], up_m[-1], ROUND_OFF_M)
+    if all(np.abs(values).max() < ROUND_OFF_M for values in up_m):  # rigid wings
+        quiet(axes, STILL_SPAN_M)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from morphcore.export.figure import (
     BLUE,
-    ORANGE,
+    GREEN,
     VERMILION,
     Document,
     headline,
@@ -22,10 +23,21 @@ from morphcore.export.figure import (
     rendered,
 )
 
-ERRORS = (("J_train", "fitted flights", BLUE, "o"), ("J_held_out", "flights held out", ORANGE, "s"))
-ANGLES = ("phi", "theta", "psi")
-HEADROOM = 1.15  # above the highest time, for the mark of the recommended number
-PLAIN_COLUMNS = (
+MILLISECONDS = 1e3  # of a second
+MARGIN = 1.8  # factor above the largest and below the least value
+TWO_DECADES = 100.0
+TRAIN = {"color": BLUE, "marker": "o", "markersize": 5, "linewidth": 1.4}
+HELD_OUT = {
+    "color": GREEN,
+    "marker": "s",
+    "markersize": 5,
+    "linewidth": 1.4,
+    "linestyle": (0, (5, 2)),
+    "markerfacecolor": "white",
+}
+RIGID = {"color": VERMILION, "linewidth": 1.1, "linestyle": (0, (1, 1.4))}
+CHOSEN_COLOUR = "#FBEBC8"  # of a light band behind the recommended number of links
+COLUMNS = (
     "links_per_wing",
     "bodies",
     "parameters",
@@ -35,41 +47,45 @@ PLAIN_COLUMNS = (
     "identify_s",
     "flights",
 )
+ANGLES = ("phi", "theta", "psi")
 
 
 def study_plots(document: Document) -> dict[str, bytes]:
-    """Draw a study's result: ``study.svg`` and ``study.png``. The same input gives the same bytes."""
+    """Draw what a study's result has to show.
+
+    Parameters
+    ----------
+    document : the result; of its ``rows`` "links_per_wing", "J_train", "J_held_out" and "flight_s", of
+        ``rigid`` the same of the rigid model, and ``recommended``. What is None is left out.
+
+    Returns
+    -------
+    File name -> content: ``study.svg`` and ``study.png``. The same input gives the same bytes.
+    """
     return rendered("study", study_figure(document))
 
 
 def study_figure(document: Document) -> Figure:
-    """J of the fitted and the held-out flights (rad^2) and the time of one flight (ms) against the links."""
-    figure = Figure(figsize=(9.0, 3.8))
-    accuracy = figure.add_axes((0.085, 0.14, 0.41, 0.75))
-    price = figure.add_axes((0.575, 0.14, 0.41, 0.75))
-    rows, rigid = document["rows"], document.get("rigid") or {}
-    for name, label, color, marker in ERRORS:
-        _curve(accuracy, rows, name, 1.0, color=color, marker=marker, label=label)
-        if is_cost(rigid.get(name)):
-            accuracy.axhline(rigid[name], color=color, linewidth=0.9, linestyle=(0, (5, 2)))
-            accuracy.annotate("rigid", (0.99, rigid[name]), xycoords=("axes fraction", "data"), fontsize=8,
-                              ha="right", va="bottom", color=color)  # fmt: skip
-    if accuracy.lines:
-        accuracy.set_yscale("log")
-        accuracy.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
-        accuracy.yaxis.set_minor_formatter(NullFormatter())
-        if accuracy.get_legend_handles_labels()[0]:
-            accuracy.legend(frameon=False, fontsize=8.5, loc="lower left")
-    _curve(price, rows, "flight_s", 1e3, color=VERMILION, marker="o", label="one flight")
-    price.set_ylim(0.0, HEADROOM * price.get_ylim()[1])
-    for axes, label in ((accuracy, "J, rad²"), (price, "one flight on one core, ms")):
+    """J (rad²) over the fitted flights and those held out, and below it the time of one flight (ms)."""
+    figure = Figure(figsize=(7.2, 6.0))
+    accuracy = figure.add_axes((0.115, 0.4, 0.865, 0.53))
+    price = figure.add_axes((0.115, 0.085, 0.865, 0.26), sharex=accuracy)
+    for axes, label in ((accuracy, "J, rad²"), (price, "one flight, ms")):
         axes.set_ylabel(label, fontsize=9)
-        axes.set_xlabel("links per wing", fontsize=9)
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.tick_params(labelsize=8.5)
-        light_grid(axes)
-        _mark(axes, document)
-    headline(figure, "accuracy and cost against the number of links per wing")
+        _abscissa(axes, document)
+    rigid = document.get("rigid") or {}
+    values = _line(accuracy, document, "J_train", "fitted flights", TRAIN)
+    values += _line(accuracy, document, "J_held_out", "flights held out", HELD_OUT)
+    values += _level(accuracy, rigid.get("J_train"), "rigid model, fitted flights", {**RIGID, "color": BLUE})
+    values += _level(accuracy, rigid.get("J_held_out"), "rigid model, held out", {**RIGID, "color": GREEN})
+    _ordinate(accuracy, values, "no model flew every flight")
+    values = _line(price, document, "flight_s", "equivalent model", TRAIN, MILLISECONDS)
+    values += _level(price, rigid.get("flight_s"), "rigid model", RIGID, MILLISECONDS)
+    _ordinate(price, values, "no flight was timed")
+    accuracy.tick_params(labelbottom=False)
+    price.set_xlabel("links per wing", fontsize=9)
+    figure.align_ylabels([accuracy, price])
+    headline(figure, _title(document))
     return figure
 
 
@@ -77,32 +93,77 @@ def study_table(document: Document) -> bytes:
     """Write a study's rows as CSV, UTF-8, with the units of the document; what is not known is empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*PLAIN_COLUMNS, *(f"rms_{angle}_rad" for angle in ANGLES), "recommended"))
+    writer.writerow((*COLUMNS, *(f"rms_{angle}_rad" for angle in ANGLES), "recommended"))
     chosen = _recommended(document)
     for row in document["rows"]:
         rms = row.get("rms_rad") or {}
-        values = [*(row.get(name) for name in PLAIN_COLUMNS), *(rms.get(angle) for angle in ANGLES)]
+        values = [*(row.get(name) for name in COLUMNS), *(rms.get(angle) for angle in ANGLES)]
         cells = ["" if value is None else f"{value:.9g}" for value in values]
         writer.writerow((*cells, "yes" if row["links_per_wing"] == chosen else ""))
     return text.getvalue().encode()
 
 
-def _curve(axes: Axes, rows: list[Document], name: str, factor: float, **style: Any) -> None:
-    """A quantity of the rows that know it."""
-    known = [(row["links_per_wing"], factor * row[name]) for row in rows if is_cost(row.get(name))]
-    if known:
-        axes.plot(*zip(*known, strict=True), linewidth=1.4, markersize=5.0, **style)
-
-
-def _mark(axes: Axes, document: Document) -> None:
-    """Show the recommended number."""
-    chosen = _recommended(document)
-    if chosen is not None:
-        axes.axvspan(chosen - 0.15, chosen + 0.15, color="0.93", zorder=0)
-        axes.annotate("recommended", (chosen, 0.98), xycoords=("data", "axes fraction"), fontsize=8,
-                      ha="center", va="top", rotation=90, color="0.4")  # fmt: skip
+# pieces
 
 
 def _recommended(document: Document) -> int | None:
     chosen: int | None = (document.get("recommended") or {}).get("links_per_wing")
     return chosen
+
+
+def _title(document: Document) -> str:
+    duration_s = (document.get("cost") or {}).get("flight_duration_s")
+    said = "accuracy, and wall time of one flight"
+    said += f" of {duration_s:g} s on one core" if duration_s else ""
+    chosen = _recommended(document)
+    return said if chosen is None else f"{said}; recommended: {chosen} link{'s' * (chosen != 1)} per wing"
+
+
+def _abscissa(axes: Axes, document: Document) -> None:
+    """One tick for each number of links, and a band behind the recommended one."""
+    numbers = sorted(row["links_per_wing"] for row in document["rows"]) or [1]
+    axes.set_xticks(range(numbers[0], numbers[-1] + 1))
+    axes.set_xlim(numbers[0] - 0.5, numbers[-1] + 0.5)
+    axes.tick_params(labelsize=8.5)
+    light_grid(axes)
+    chosen = _recommended(document)
+    if chosen is not None:
+        axes.axvspan(chosen - 0.28, chosen + 0.28, zorder=0, color=CHOSEN_COLOUR, linewidth=0)
+
+
+def _line(
+    axes: Axes, document: Document, name: str, label: str, style: dict[str, Any], factor: float = 1.0
+) -> list[float]:
+    """Draw one figure of all rows that have it; give its values."""
+    points = sorted(
+        (row["links_per_wing"], factor * row[name]) for row in document["rows"] if is_cost(row.get(name))
+    )
+    if points:
+        links, values = zip(*points, strict=True)
+        axes.plot(links, values, label=label, **style)
+    return [value for _, value in points]
+
+
+def _level(axes: Axes, value: Any, label: str, style: dict[str, Any], factor: float = 1.0) -> list[float]:
+    if not is_cost(value):
+        return []
+    axes.axhline(factor * value, label=label, **style)
+    return [factor * value]
+
+
+def _ordinate(axes: Axes, values: Sequence[float], nothing: str) -> None:
+    """A logarithmic ordinate around the values, and a legend."""
+    if not values:
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, nothing, transform=axes.transAxes, ha="center", fontsize=9)
+        return
+    axes.set_yscale("log")
+    low, high = min(values) / MARGIN, max(values) * MARGIN
+    axes.set_ylim(low, high)
+    if high / low < TWO_DECADES:  # too few powers of ten to read values between them
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    else:
+        axes.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.legend(frameon=False, fontsize=8.5, loc="best")

@@ -46,6 +46,31 @@ def test_the_picture_shows_accuracy_and_price() -> None:
     assert accuracy.get_yscale() == "log"
     assert max(line.get_ydata()[0] for line in accuracy.lines) == 0.2
     assert np.allclose(price.lines[0].get_ydata(), [10.0, 20.0, 30.0])
+    low, high = accuracy.get_ylim()
+    assert low < 1e-4
+    assert high > 0.2, "the rigid model is within the picture"
+    assert price.get_ylabel().endswith("ms")
+
+
+def test_the_title_says_which_to_take() -> None:
+    """The recommended number stands above, where there is one."""
+    titles = [
+        study_figure(study(row(1), row(2), recommended=chosen)).texts[0].get_text() for chosen in (2, None)
+    ]
+    assert titles[0].endswith("recommended: 2 links per wing")
+    assert "recommended" not in titles[1]
+
+
+def test_gaps_are_left_out() -> None:
+    """A model that diverged has no point; the others keep their places."""
+    accuracy = study_figure(study(row(1), row(2, J_held_out=None), row(3))).axes[0]
+    held_out = next(line for line in accuracy.lines if line.get_label() == "flights held out")
+    assert np.array_equal(held_out.get_xdata(), [1, 3])
+
+
+def test_same_input_same_bytes() -> None:
+    """No date, no random ids."""
+    assert study_plots(study(row(1), row(2))) == study_plots(study(row(1), row(2)))
 
 
 @pytest.mark.parametrize(
