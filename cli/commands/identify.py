@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-import typer
-
 from cli.commands import options
 from cli.files import require_place
 from cli.screen import fit_table, model_table, reports_errors, stdout
@@ -18,7 +16,11 @@ def identify(
     flight: options.FlightFile,
     sample: options.Samples,
     held_out: options.HeldOut = None,
-    links: Annotated[int, typer.Option(min=1, max=8, help="Links per wing.")] = 3,
+    links: Annotated[int, options.model_option(min=1, max=8, help="Links per wing.")] = 3,
+    start: options.StartAt = None,
+    chordwise: options.Chordwise = None,
+    spanwise: options.Spanwise = None,
+    core: options.VortexCore = None,
     method: options.Method = None,
     seed: options.Seed = None,
     particles: options.Particles = None,
@@ -34,6 +36,8 @@ def identify(
     require_place(json_out, "--json")
     request = options.sample_request("identify", aircraft, flight, sample, held_out or [])
     request.put("/model/links_per_wing", links, "--links")
+    request.put("/model/start", start, "--start")
+    options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
     options.put_search(
         request,
         method=method,

@@ -50,11 +50,10 @@ class Preset(StrEnum):
 def optimize(
     aircraft: options.AircraftFile,
     flight: options.FlightFile,
-    parameters: Annotated[
-        Path, options.model_option(help="Equivalent model to search with: result of an identification, JSON.")
-    ],
     final: Annotated[float, morph_option(help="Sweep at the end of the morph, rad.")],
     duration: Annotated[float, morph_option(help="Time that the morph takes, s.")],
+    parameters: options.Parameters = None,
+    model_id: options.ModelId = None,
     initial: Annotated[
         float | None, morph_option(help="Sweep before the morph, rad.", show_default="0")
     ] = None,
@@ -115,7 +114,7 @@ def optimize(
     require_place(json_out, "--json")
     require_place(out, "--out")
     request = options.flight_request("optimize", aircraft, flight)
-    options.put_parameters(request, parameters)
+    options.put_known_model(request, parameters, model_id, url)
     request.put("/model/start", start, "--start")
     options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
     request.put("/morph/initial_rad", initial, "--initial")

@@ -55,6 +55,9 @@ HeldOut = Annotated[
 Parameters = Annotated[
     Path | None, model_option("--parameters", help="Equivalent model: result of an identification, JSON.")
 ]
+ModelId = Annotated[
+    str | None, model_option("--model-id", help="Instead of --parameters: a model identified at the --url.")
+]
 Elements = Annotated[
     int | None, model_option("--elements", min=1, help="Beam elements of each wing of the flexible model.")
 ]
@@ -96,13 +99,34 @@ def flight_request(operation: str, aircraft: Path, flight: Path) -> Request:
     return request
 
 
-def put_parameters(request: Request, path: Path) -> None:
-    """Fill in the parameters of an equivalent model: an identification's result, or the model in it.
+def put_known_model(request: Request, parameters: Path | None, model_id: str | None, url: str | None) -> None:
+    """Fill in an equivalent model that is known already: a file, or the id of a model at a service.
 
     Raises
     ------
-    CommandError : the file holds neither.
+    CommandError : neither or both are given, or an id without a service.
     """
+    if (parameters is None) == (model_id is None):
+        raise CommandError(
+            f"{'no' if parameters is None else 'more than one'} equivalent model is given",
+            code=Exit.USAGE,
+            hint="give either --parameters out.json, which `morphid identify --json out.json` writes, "
+            "or --model-id",
+        )
+    if parameters is not None:
+        request.put("/model/parameters", _parameters_in(parameters), f"--parameters {parameters}")
+        return
+    if url is None:
+        raise CommandError(
+            f"--model-id {model_id} names a model at a service",
+            code=Exit.USAGE,
+            hint="say at which one with --url, or give --parameters",
+        )
+    request.put("/model/model_id", model_id, "--model-id")
+
+
+def _parameters_in(path: Path) -> dict[str, Any]:
+    """Give the model in an identification's result, or the model that the file is."""
     found = read_json(path)
     if isinstance(found, dict):
         found = found.get("model", found)
@@ -112,7 +136,7 @@ def put_parameters(request: Request, path: Path) -> None:
             code=Exit.INVALID_INPUT,
             hint="give the file that `morphid identify --json` wrote, or the `model` in it",
         )
-    request.put("/model/parameters", found, f"--parameters {path}")
+    return found
 
 
 def put_search(request: Request, **options: Any) -> None:

@@ -14,11 +14,14 @@ from rich.table import Table
 
 from cli.commands import options
 from cli.exits import CommandError, Exit
-from cli.files import require_file, require_place
+from cli.files import require_file, require_place, write_bytes
 from cli.request import Request
 from cli.screen import reports_errors, short, stdout
 
-schedule_option = partial(typer.Option, rich_help_panel="Schedule")
+schedule_option = partial(typer.Option, rich_help_panel="Schedule and air")
+
+
+FLIGHT_FILE = "flight.csv"  # among what a simulation leaves behind
 
 
 class Model(StrEnum):
@@ -38,6 +41,7 @@ def simulate(
         options.model_option(help="What flies.", show_default="equivalent with --parameters, else rigid"),
     ] = None,
     parameters: options.Parameters = None,
+    model_id: options.ModelId = None,
     schedule: Annotated[
         Path | None, schedule_option(help="Sweep over time: CSV with t, sweep_left, sweep_right.")
     ] = None,
@@ -48,6 +52,9 @@ def simulate(
     final: Annotated[float | None, schedule_option(help="With --rate: sweep at the end, rad.")] = None,
     duration: Annotated[
         float | None, schedule_option(help="Time to fly, s.", show_default="to the end of the schedule")
+    ] = None,
+    environment: Annotated[
+        Path | None, schedule_option(help="Gust and turbulence, JSON; still air without.")
     ] = None,
     start: options.StartAt = None,
     elements: options.Elements = None,
@@ -62,33 +69,27 @@ def simulate(
     plots: options.Plots = None,
 ) -> None:
     """Fly the aircraft through a morph schedule, as a rigid, an equivalent or a flexible model."""
-    from cli.running import hand_over, run
+    from cli.running import hand_over, run, wrote
 
     require_place(json_out, "--json")
     require_place(out, "--out")
     request = options.flight_request("simulate", aircraft, flight)
-    _put_model(request, model, parameters)
+    known = parameters is not None or model_id is not None
+    kind = model or (Model.EQUIVALENT if known else Model.RIGID)
+    request.put("/model/kind", kind, "--model")
+    if known or kind is Model.EQUIVALENT:
+        options.put_known_model(request, parameters, model_id, url)
     request.put("/model/elements", elements, "--elements")
     request.put("/model/start", start, "--start")
     options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
+    if environment is not None:
+        request.put_file("/environment", environment, "--environment")
     _put_schedules(request, schedule, rate, final, duration)
     answer = run(request, url)
+    if out is not None and answer.result is not None:
+        write_bytes(answer.files[FLIGHT_FILE], out)
+        wrote(out)
     hand_over(answer, show_flight, json_out=json_out, plots=plots)
-
-
-def _put_model(request: Request, model: Model | None, parameters: Path | None) -> None:
-    kind = model or (Model.RIGID if parameters is None else Model.EQUIVALENT)
-    if (kind is Model.EQUIVALENT) != (parameters is not None):
-        raise CommandError(
-            f"--model {kind} {'needs' if parameters is None else 'has no'} --parameters",
-            code=Exit.USAGE,
-            hint="give --parameters out.json, written by `morphid identify --json out.json`"
-            if parameters is None
-            else "leave one of the two out",
-        )
-    request.put("/model/kind", kind, "--model")
-    if parameters is not None:
-        options.put_parameters(request, parameters)
 
 
 def _put_schedules(
@@ -143,10 +144,9 @@ def _put_rate(request: Request, rate: float, final: float) -> float:
             code=Exit.INVALID_INPUT,
             hint="give a positive rate in rad/s, and a final angle in rad other than 0",
         )
-    duration_s = abs(final) / rate
-    document = {"kind": "constant_rate", "final_rad": final, "duration_s": duration_s}
+    document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
     request.put("/schedules/both", document, f"--rate {rate:g} --final {final:g}")
-    return duration_s
+    return abs(final) / rate
 
 
 def show_flight(result: Mapping[str, Any]) -> None:
@@ -164,9 +164,9 @@ def flight_table(result: Mapping[str, Any]) -> Table:
     table.add_row("angle of attack at the start, rad", short(trim.get("alpha_rad")))
     for side in ("left", "right"):
         if tips.get(side) is not None:
-            table.add_row(f"{side} tip at the start, m up", short(-tips[side]))
+            table.add_row(f"{side} tip at the start, m up", short(0.0 - tips[side]))
     for angle, letter in (("phi", "φ"), ("theta", "θ"), ("psi", "ψ")):
-        table.add_row(f"largest |{letter}|, rad", short(largest.get(angle)))
+        table.add_row(f"largest departure of {letter}, rad", short(largest.get(angle)))
     table.add_row("variation of the attitude, rad²", short(summary.get("variation_rad2")))
     table.add_row("computed in, s", short(cost.get("wall_s")))
     table.add_row("times faster than real time", short(cost.get("real_time_factor")))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import httpx
@@ -17,9 +18,18 @@ class PlayedService:
     operation : the only one that it knows.
     result : of the job.
     ending : final status.
+    files : what the job leaves behind.
     """
 
-    def __init__(self, operation: str, result: dict[str, Any], ending: str = "succeeded") -> None:
+    def __init__(
+        self,
+        operation: str,
+        result: dict[str, Any],
+        ending: str = "succeeded",
+        *,
+        files: Mapping[str, bytes] = MappingProxyType({"convergence.svg": b"<svg/>"}),
+    ) -> None:
+        self.files = files
         self.operation = operation
         self.result = result
         self.ending = ending
@@ -39,9 +49,12 @@ class PlayedService:
             "GET /jobs/job_1": httpx.Response(200, json=self.job(status)),
             "GET /jobs/job_1/result": httpx.Response(200, json=self.result),
             "GET /jobs/job_1/artifacts": httpx.Response(
-                200, json={"artifacts": [{"name": "convergence.svg"}]}
+                200, json={"artifacts": [{"name": name} for name in self.files]}
             ),
-            "GET /jobs/job_1/artifacts/convergence.svg": httpx.Response(200, content=b"<svg/>"),
+        }
+        answers |= {
+            f"GET /jobs/job_1/artifacts/{name}": httpx.Response(200, content=content)
+            for name, content in self.files.items()
         }
         return answers.get(call) or httpx.Response(404, json={"title": "There is nothing here"})
 
