@@ -8,6 +8,7 @@ from morphcore.geometry.aircraft import aircraft_from_document, flight_from_docu
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.flight import simulate
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
 
@@ -20,7 +21,7 @@ _WING = {
 
 
 def warm_up(threads: int | None = None) -> None:
-    """Fly one tiny flight of two links a wing: everything that an identification runs is then compiled.
+    """Fly one tiny flight of two links a wing and one of beams: every kernel of a job is then compiled.
 
     Call it in the process that computes (never in the parent of forked workers), once.
     """
@@ -40,5 +41,7 @@ def warm_up(threads: int | None = None) -> None:
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
     sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
-    model = chain_model(aircraft, flight, 2, LatticeSettings(chordwise=1, spanwise=4))
+    small = LatticeSettings(chordwise=1, spanwise=4)
+    model = chain_model(aircraft, flight, 2, small)
     costs(model, physical_guess(model), sample_cases(model, [sample]), "trim")
+    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=small, step_s=0.01)
