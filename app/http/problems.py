@@ -120,6 +120,8 @@ def _sentence(item: Mapping[str, Any]) -> str:
 
 
 def _extra_field_hint(name: str, known: Sequence[str]) -> str:
+    if name in known:
+        return "It belongs to another object. Leave it out here."
     near = difflib.get_close_matches(name[:SHOWN_CHARACTERS], known, n=1)
     return f"Did you mean {near[0]!r}? Otherwise leave it out." if near else "Leave it out."
 
@@ -128,6 +130,9 @@ def _bound_hint(kind: str, context: Mapping[str, Any]) -> str:
     for key, words in (("ge", "at least"), ("gt", "more than"), ("le", "at most"), ("lt", "less than")):
         if key in context and kind.startswith(("greater", "less")):
             return f"It must be {words} {context[key]:g}."
+    if kind.startswith("union_tag"):
+        tags = context.get("expected_tags")
+        return f"Give {context.get('discriminator', 'a kind')}: {tags or 'one of the documented kinds'}."
     if kind == "literal_error":
         return f"Use {context.get('expected', 'one of the documented words')}."
     return HINTS.get(kind, "See the documentation of this field at /docs.")

@@ -28,5 +28,6 @@ class Lattice(Strict):
     core: VortexCore = VortexCore()
 
 
-StepS = Annotated[float, Field(ge=0.0005, le=0.01)]
+StepS = Annotated[float, Field(ge=0.0005, le=0.01)]  # of a search
+FlightStepS = Annotated[float, Field(ge=1e-5, le=0.02)]  # of one flight, which may be as exact as it likes
 Start = Literal["trim", "given"]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from app.schemas.fields import Identifier, Strict
-from app.schemas.lattice import Lattice, Start, StepS
+from app.schemas.lattice import FlightStepS, Lattice, Start
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -58,7 +58,7 @@ class Parameters(Strict):
     )
     aero: Corrections
     lattice: Lattice | None = Field(default=None, description="With which the model was identified.")
-    step_s: StepS | None = None
+    step_s: FlightStepS | None = None
     start: Start | None = None
 
 
@@ -96,5 +96,5 @@ class KnownModel(Strict):
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     lattice: Lattice | None = None
-    step_s: StepS | None = None
+    step_s: FlightStepS | None = None
     start: Start | None = None

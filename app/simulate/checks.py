@@ -51,6 +51,18 @@ def schedules_faults(request: SimulateRequest) -> Iterator[Fault]:
                 yield first
 
 
+def air_faults(request: SimulateRequest) -> Iterator[Fault]:
+    """Check that a gust blows somewhere."""
+    gust = None if request.environment is None else request.environment.gust
+    if gust is not None and not any(gust.direction_n):
+        yield Fault(
+            "no_direction",
+            "The gust has no direction.",
+            "/environment/gust/direction_n",
+            "Give a vector of any length, [0, 0, -1] for up.",
+        )
+
+
 def size_faults(request: SimulateRequest, step_s: float | None) -> Iterator[Fault]:
     """Check that the flight has rows to show and that its steps can be flown in reasonable time.
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
-from app.schemas.lattice import Lattice, Start, StepS
+from app.schemas.lattice import FlightStepS, Lattice, Start
 from app.schemas.parameters import KnownModel
 from app.schemas.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
 
@@ -27,7 +27,7 @@ class RigidModel(Strict):
 
     kind: Literal["rigid"]
     lattice: Lattice | None = None
-    step_s: StepS | None = None
+    step_s: FlightStepS | None = None
     start: Start | None = None
 
 
@@ -43,7 +43,7 @@ class FlexibleModel(Strict):
     kind: Literal["flexible"]
     elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
     lattice: Lattice | None = None
-    step_s: StepS | None = None
+    step_s: FlightStepS | None = None
     start: Start | None = None
 
 
@@ -63,10 +63,10 @@ class Turbulence(Strict):
     """Dryden turbulence (MIL-F-8785C)."""
 
     wind_20ft_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        description="Mean wind at 20 ft, which rules low altitudes: 7.7 is light, 15.4 moderate."
+        default=0.0, description="Mean wind at 20 ft, which rules low altitudes: 7.7 is light, 15.4 moderate."
     )
     sigma_high_m_s: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
-        description="Standard deviation above 2000 ft."
+        default=0.0, description="Standard deviation above 2000 ft."
     )
 
 
@@ -158,7 +158,7 @@ class FlightSummary(BaseModel):
 
     max_abs_rad: dict[str, float] = Field(description="Largest departure of each angle from its start.")
     variation_rad2: float = Field(
-        description="Sum over the rows of the squared departures of the three angles from their start."
+        description="Sum over samples 10 ms apart of the squared departures of the three angles."
     )
 
 

@@ -8,7 +8,7 @@ from app.errors import InvalidRequest
 from app.jobs.submission import Order
 from app.models.service import known_model
 from app.schemas.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
-from app.simulate.checks import schedules_faults, size_faults
+from app.simulate.checks import air_faults, schedules_faults, size_faults
 from app.simulate.cost import estimate
 from app.simulate.schemas import EquivalentFlightModel, FlightCost, SimulateRequest
 
@@ -26,6 +26,7 @@ def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[Fli
     faults = [
         *vehicle_faults(request.aircraft, request.flight, start=model.get("start")),
         *schedules_faults(request),
+        *air_faults(request),
         *size_faults(request, step_s),
     ]
     if request.model.kind != "rigid":

@@ -51,6 +51,41 @@ def identify_document() -> Document:
     return copy.deepcopy(_example())
 
 
+def study_document() -> Document:
+    """Build a valid request for a study."""
+    document = identify_document()
+    document["model"] = {"links_per_wing": [1, 2, 3]}
+    return document
+
+
+def _vehicle() -> Document:
+    document = identify_document()
+    return {"aircraft": document["aircraft"], "flight": document["flight"]}
+
+
+def simulate_document() -> Document:
+    """Build a valid request for a simulation."""
+    morph = {"kind": "constant_rate", "final_rad": 1.0, "duration_s": 2.0, "start_s": 0.2}
+    return {
+        **_vehicle(),
+        "model": {"kind": "rigid"},
+        "schedules": {"both": morph},
+        "duration_s": 2.5,
+    }
+
+
+def optimize_document() -> Document:
+    """Build a valid request for an optimisation."""
+    return {
+        **_vehicle(),
+        "model": {"parameters": copy.deepcopy(RESULT["model"])},
+        "morph": {"final_rad": 1.0, "duration_s": 2.0},
+        "limits": {"max_rate_rad_s": 1.0},
+        "search": {"seed": 1},
+        "verify": "none",
+    }
+
+
 RESULT: Document = {
     "model": {
         "links_per_wing": 2,
@@ -80,4 +115,58 @@ RESULT: Document = {
         "history": [{"generation": 1, "best_cost": 1.0}],
     },
     "cost": {"rigid_flight_s": 0.1, "equivalent_flight_s": 0.2, "flexible_flight_s": None},
+}
+
+STUDY_RESULT: Document = {
+    "rows": [
+        {
+            "links_per_wing": links,
+            "bodies": 2 * links + 1,
+            "parameters": 7 * (links - 1) + 4,
+            "J_train": 0.1 / 10**links,
+            "J_held_out": None,
+            "rms_rad": {"phi": 0.0, "theta": 5e-3 / links, "psi": 0.0},
+            "flight_s": 0.02,
+            "identify_s": 1.0,
+            "flights": 100,
+            "fit": RESULT["fit"],
+            "model": {**RESULT["model"], "links_per_wing": links},
+        }
+        for links in (1, 2, 3)
+    ],
+    "rigid": {"J_train": 0.11, "J_held_out": None, "flight_s": 0.01},
+    "recommended": {"links_per_wing": 2, "reason": "2 links per wing: a link more does not halve the error."},
+    "search": {"method": "hybrid", "seed": 1, "wall_s": 3.0},
+}
+
+SIMULATE_RESULT: Document = {
+    "model": {"kind": "rigid"},
+    "trim": {
+        "alpha_rad": 0.07,
+        "force_b_n": [341.0, 0.0, 25.0],
+        "moment_b_n_m": [0.0, -720.0, 0.0],
+        "tip_z_m": {"left": -0.27, "right": -0.27},
+    },
+    "trajectory": {
+        "time_s": [0.0, 0.01, 0.02],
+        "sweep_left_rad": [0.0, 0.1, 0.2],
+        "sweep_right_rad": [0.0, 0.1, 0.2],
+        "phi_rad": [0.0, 0.0, 0.0],
+        "theta_rad": [0.07, 0.06, 0.05],
+        "psi_rad": [0.0, 0.0, 0.0],
+    },
+    "summary": {"max_abs_rad": {"phi": 0.0, "theta": 0.02, "psi": 0.0}, "variation_rad2": 5e-4},
+    "cost": {"wall_s": 0.5, "real_time_factor": 4.0},
+}
+
+OPTIMIZE_RESULT: Document = {
+    "schedule": {"knot_time_s": [0.0, 0.5, 2.0], "knot_sweep_rad": [0.0, 0.5, 1.0]},
+    "limits": {"max_rate_rad_s": 1.0, "max_accel_rad_s2": None},
+    "variation": {
+        "constant": {"rigid": 0.9, "equivalent": 0.8, "flexible": None},
+        "rigid_optimum": {"rigid": 0.7, "equivalent": 0.75, "flexible": None},
+        "optimum": {"rigid": 0.72, "equivalent": 0.6, "flexible": None},
+    },
+    "reduction_percent": 25.0,
+    "search": {"method": "hybrid", "seed": 1},
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,26 @@ import pytest
 
 from app.main import routed_app
 from app.openapi import DOCUMENT, document_text
-from tests.app.request_documents import identify_document
+from tests.app.request_documents import (
+    OPTIMIZE_RESULT,
+    RESULT,
+    SIMULATE_RESULT,
+    STUDY_RESULT,
+    identify_document,
+    optimize_document,
+    simulate_document,
+    study_document,
+)
 
 Document = dict[str, Any]
+
+REQUESTS = [
+    ("IdentifyRequest", identify_document),
+    ("StudyRequest", study_document),
+    ("SimulateRequest", simulate_document),
+    ("OptimizeRequest", optimize_document),
+]
+RESULTS = [RESULT, STUDY_RESULT, SIMULATE_RESULT, OPTIMIZE_RESULT]
 
 
 @pytest.fixture(scope="module")
@@ -54,19 +72,37 @@ def test_errors_are_problem_documents(document: Document) -> None:
 def test_every_route_is_documented(document: Document) -> None:
     """No route of the API is missing from the document but the pages."""
     paths = {getattr(route, "path", "") for route in routed_app().routes}
-    assert {"/identify", "/jobs/{job_id}/events", "/trajectories"} <= set(document["paths"])
+    assert {"/identify", "/optimize", "/jobs/{job_id}/events", "/trajectories"} <= set(document["paths"])
     assert paths - set(document["paths"]) <= {"/", "/docs", "/openapi.json", "/static", "/static/swagger", ""}
 
 
-def test_example_is_valid_by_the_document(document: Document) -> None:
-    """The example flights are valid by the published schema, which refuses an unknown field."""
-    schema = {"$ref": "#/components/schemas/IdentifyRequest", "components": document["components"]}
+@pytest.mark.parametrize(("name", "request_document"), REQUESTS, ids=[name for name, _ in REQUESTS])
+def test_examples_are_valid_by_the_document(
+    document: Document, name: str, request_document: Callable[[], Document]
+) -> None:
+    """The examples and the tests' requests are valid by the published schema, which refuses unknown fields."""
+    schema = {"$ref": f"#/components/schemas/{name}", "components": document["components"]}
     validator = pytest.importorskip("jsonschema_rs").validator_for(schema)
-    request = identify_document()
+    request = request_document()
     validator.validate(request)
-    for example in document["components"]["schemas"]["IdentifyRequest"]["examples"]:
+    assert document["components"]["schemas"][name]["examples"]
+    for example in document["components"]["schemas"][name]["examples"]:
         validator.validate(example)
     assert not validator.is_valid({**request, "unknown": 1})
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_results_are_valid_by_the_document(document: Document, result: Document) -> None:
+    """A result of each operation is valid by the published answer, and by one of its forms alone."""
+    answer = document["paths"]["/jobs/{job_id}/result"]["get"]["responses"]["200"]
+    forms = answer["content"]["application/json"]["schema"]["anyOf"]
+    fits = [
+        pytest.importorskip("jsonschema_rs")
+        .validator_for({**form, "components": document["components"]})
+        .is_valid(result)
+        for form in forms
+    ]
+    assert (len(fits), sum(fits)) == (4, 1)
 
 
 def test_client_generates_without_a_warning(tmp_path: Path) -> None:
@@ -88,4 +124,5 @@ def test_client_generates_without_a_warning(tmp_path: Path) -> None:
         env={"PATH": f"{binaries}:/usr/bin:/bin", "HOME": str(tmp_path)},
     )
     made = {path.stem for path in tmp_path.rglob("api/*/*.py")}
-    assert {"identify", "get_job", "get_job_result", "upload_trajectory", "list_models"} <= made
+    assert {"identify", "study", "simulate", "optimize"} <= made
+    assert {"get_job", "get_job_result", "upload_trajectory", "list_models"} <= made

@@ -11,26 +11,15 @@ import httpx
 import pytest
 
 from app.jobs import store
+from tests.app import calls
+from tests.app.calls import ANSWER_S, JSON, fault
 from tests.app.request_documents import SAMPLE_NAMES, Document, identify_document, sample_document
 from tests.app.running_service import RunningService
 
-JSON = {"Content-Type": "application/json"}
-ANSWER_S = 1.0  # a bad request is told so within a second
 
-
-def post(service: RunningService, document: Any, **headers: str) -> httpx.Response:
-    """Post a document as the JSON text that Python makes of it, NaN included."""
-    return service.client.post("/identify", content=json.dumps(document), headers={**JSON, **headers})
-
-
-def fault(answer: httpx.Response, status: int = 422) -> Document:
-    """Take the first fault out of a problem document."""
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    document: Document = answer.json()
-    assert document["status"] == status
-    assert document["hint"]
-    return document
+def post(service: RunningService, document: Document, **headers: str) -> httpx.Response:
+    """Ask for an identification."""
+    return calls.post(service, "/identify", document, **headers)
 
 
 def test_accepts_with_the_broker_away(any_service: RunningService) -> None:
@@ -116,14 +105,8 @@ def test_waits_when_asked(service: RunningService) -> None:
 
 
 def changed(path: str, value: Any) -> Document:
-    """Build the valid request with one field changed; `path` is its JSON pointer."""
-    document = identify_document()
-    *parents, last = path.strip("/").split("/")
-    place: Any = document
-    for part in parents:
-        place = place[int(part)] if isinstance(place, list) else place.setdefault(part, {})
-    place[int(last) if isinstance(place, list) else last] = value
-    return document
+    """Build the valid request with one field changed."""
+    return calls.changed(identify_document(), path, value)
 
 
 # (field that is changed, its bad value, pointer of the fault, code, words that the hint must hold)
@@ -200,14 +183,7 @@ def test_bad_field_is_named(
     service: RunningService, path: str, value: Any, pointer: str | None, code: str, words: str
 ) -> None:
     """Every bad field gets its pointer, a stable code and a hint with the way out, within a second."""
-    start = time.perf_counter()
-    problem = fault(post(service, changed(path, value)))
-    took = time.perf_counter() - start
-    first = problem["errors"][0]
-    assert (first["pointer"], first["code"]) == (pointer or path, code)
-    assert words in first["hint"]
-    assert problem["pointer"] == first["pointer"]
-    assert took < ANSWER_S
+    calls.assert_named(service, "/identify", changed(path, value), pointer or path, code, words)
 
 
 def test_several_faults_are_told_at_once(service: RunningService) -> None:

@@ -1,0 +1,56 @@
+"""Calls to the operations as a client makes them, and the faults that come back."""
+
+from __future__ import annotations
+
+import copy
+import json
+import time
+from typing import Any
+
+import httpx
+
+from tests.app.request_documents import Document
+from tests.app.running_service import RunningService
+
+JSON = {"Content-Type": "application/json"}
+ANSWER_S = 1.0  # a bad request is told so within a second
+
+
+def post(service: RunningService, path: str, document: Any, **headers: str) -> httpx.Response:
+    """Post a document as the JSON text that Python makes of it, NaN included."""
+    return service.client.post(path, content=json.dumps(document), headers={**JSON, **headers})
+
+
+def fault(answer: httpx.Response, status: int = 422) -> Document:
+    """Give the problem document of an answer."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    document: Document = answer.json()
+    assert document["status"] == status
+    assert document["hint"]
+    return document
+
+
+def changed(document: Document, path: str, value: Any) -> Document:
+    """Build a request with one field changed; `path` is its JSON pointer."""
+    document = copy.deepcopy(document)
+    *parents, last = path.strip("/").split("/")
+    place: Any = document
+    for part in parents:
+        place = place[int(part)] if isinstance(place, list) else place.setdefault(part, {})
+    place[int(last) if isinstance(place, list) else last] = value
+    return document
+
+
+def assert_named(
+    service: RunningService, path: str, document: Document, pointer: str, code: str, words: str
+) -> None:
+    """A bad request gets pointer, stable code and a hint with the way out, within a second."""
+    start = time.perf_counter()
+    problem = fault(post(service, path, document))
+    took_s = time.perf_counter() - start
+    first = problem["errors"][0]
+    assert (first["pointer"], first["code"]) == (pointer, code)
+    assert words in first["hint"]
+    assert problem["pointer"] == first["pointer"]
+    assert took_s < ANSWER_S
