@@ -9,7 +9,7 @@ puts it (third order off), its circulations, lag and forces follow every iterati
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,9 @@ Array = NDArray[np.float64]
 FLEXIBLE_STEP_S = 0.001
 SPECTRAL_RADIUS = 0.6  # of the stepper at infinite frequency: stretching waves die out in some ten steps
 TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
-MOST_ITERATIONS = 20
+START_TOLERANCE = 1e-9  # of the accelerations at the start, relative
+SLOW = 0.1  # of the last iteration's change: then the matrix is formed anew
+MOST_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,9 @@ def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGr
         angle.append(motion.angle)
         rate.append(moves * motion.rate)
         late, early = schedule.motion(times + h).rate, schedule.motion(times - h).rate
-        acceleration.append(moves * (late - early) / (2.0 * h))
+        mean = (late - early) / (2.0 * h)
+        mean[0] = (late[0] - motion.rate[0]) / h  # what went before the flight is not in it
+        acceleration.append(moves * mean)
     hinges = np.stack(rows, axis=1)
     return HingePath(
         R_BW=np.ascontiguousarray(hinges[..., :9]).reshape(*hinges.shape[:2], 3, 3),
@@ -238,6 +242,7 @@ def stepped(
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
     A = before.A.copy()
     lag, circulation = before.lag, before.circulation
+    slow, last = True, np.inf
     for iteration in range(MOST_ITERATIONS):
         a = rule.averaged(before, A)
         V, poses = rule.velocity(before, a), before.poses.copy()
@@ -250,7 +255,7 @@ def stepped(
         lag = followed(before.lag, before.circulation, circulation, model.riders.lag_time, h)
         flight.subtract_air(acting_circulation(circulation, lag), twists, wind_B, demands)
         demands[0] -= flight.thrust
-        if iteration == 0:
+        if slow:
             factor(model.beams, flight.work, 1.0, share * h * rule.gamma, share * h * h * rule.beta)
         change = flight.solve(-demands, path, row)
         A += change
@@ -263,6 +268,7 @@ def stepped(
             return FlexibleState(poses, V, A, a, lag, circulation)
         if not np.isfinite(largest):
             break
+        slow, last = largest > SLOW * last, largest
     raise _Lost
 
 
@@ -290,6 +296,37 @@ def fly_flexible(
         yield state
 
 
-def resting(state: FlexibleState) -> FlexibleState:
-    """The state with an algorithmic acceleration to start from."""
-    return replace(state, a=state.A.copy())
+def set_in_motion(
+    flight: FlexibleFlight, path: HingePath, wind_N: Array, state: FlexibleState
+) -> FlexibleState:
+    """A trimmed state with its hinges moving as the path begins, the wings turning with them as one.
+
+    Accelerations are those that the forces then ask for. A path that begins at rest changes nothing.
+    """
+    if not (path.rate[0].any() or path.acceleration[0].any()):
+        return state
+    model, poses = flight.model, state.poses
+    V, A = state.V.copy(), np.zeros_like(state.A)
+    flight.follow(poses, V, A, path, 0)
+    for root, tip in zip(model.roots, model.tips, strict=True):
+        arm = (poses.x[root : tip + 1] - poses.x[root]) @ poses.R[root]
+        R_rel = poses.R[root].T @ poses.R[root : tip + 1]
+        linear = V[root, 3:] + np.cross(V[root, :3], arm)
+        V[root : tip + 1, :3] = np.einsum("nij,i->nj", R_rel, V[root, :3])
+        V[root : tip + 1, 3:] = np.einsum("nij,ni->nj", R_rel, linear)
+    circulation = state.circulation
+    for iteration in range(MOST_ITERATIONS):
+        flight.follow(poses, V, A, path, 0)
+        demands = flight.structure(poses, V, A)
+        twists = flight.place_lattice(poses, V, wind_N) if iteration == 0 else flight.twists(poses, V)
+        wind_B = wind_N @ poses.R[0]
+        circulation = flight.lattice.circulation(twists, wind_B)
+        flight.subtract_air(acting_circulation(circulation, state.lag), twists, wind_B, demands)
+        demands[0] -= flight.thrust
+        factor(model.beams, flight.work, 1.0, 0.0, 0.0)
+        change = flight.solve(-demands, path, 0)
+        A += change
+        if np.abs(change).max() < START_TOLERANCE * max(1.0, float(np.abs(A).max())):
+            break
+    flight.follow(poses, V, A, path, 0)
+    return FlexibleState(poses, V, A, A.copy(), state.lag, circulation)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.batch import Interrupted, Stop
-from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, fly_flexible, hinge_path
+from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, fly_flexible, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.record import FlightRecord, require_sound
@@ -49,7 +49,8 @@ def flexible_flight(
     with one_blas_thread():
         trim = trim_flexible(flight, path, wind_N[0], start=start)
     flight.thrust = np.concatenate([trim.moment_B, trim.force_B])
-    states = fly_flexible(flight, path, grid, wind_N, trim.state)
+    begin = set_in_motion(flight, path, wind_N[0], trim.state)
+    states = fly_flexible(flight, path, grid, wind_N, begin)
     rows: list[Array] = []
     for first in range(0, grid.steps + 1, CHUNK_STEPS):
         yield first / grid.steps, None

@@ -142,8 +142,8 @@ def trim_flexible(
 
     Unknowns are the poses of all free nodes and the angle of attack; thrust along the flight path, side force
     and moment follow. With ``start="given"`` they are the flight's, the unknowns are the nodes, and the wings
-    share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with Krylov steps
-    (`scipy.optimize.newton_krylov`), on the imbalance divided by the structure's stiffness.
+    share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with Krylov
+    steps (`scipy.optimize.newton_krylov`), on the imbalance divided by the structure's stiffness.
 
     Raises
     ------

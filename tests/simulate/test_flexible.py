@@ -16,7 +16,7 @@ from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.flight import ModelChoice, Simulation, flight_steps, simulate
-from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.simulate.schedule import ConstantRate, Hold, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
 
@@ -125,6 +125,20 @@ def test_chains_of_more_links_tend_to_the_beams() -> None:
     assert abs(tips[8] - beams) < 0.6 * abs(tips[4] - beams)
     first = [2.0 * tips[4] - tips[2], 2.0 * tips[8] - tips[4]]
     assert (4.0 * first[1] - first[0]) / 3.0 == pytest.approx(beams, rel=0.01)
+
+
+def test_a_flight_may_begin_amid_a_morph() -> None:
+    """Hinges already in motion at the start: stiff beams and links feel the same, 2 mrad in half a second."""
+    stiff = changed({}, youngs_modulus_pa=1e12)
+    moving = Tabulated(np.linspace(0.0, 1.0, 101), 0.5 * np.linspace(0.0, 1.0, 101))
+    beams, links = (
+        simulate(
+            *stiff, {"left": moving, "right": moving}, model=model, duration_s=0.5, step_s=step
+        ).trajectory
+        for model, step in (("flexible", 0.0025), ("rigid", 0.005))
+    )
+    np.testing.assert_allclose(beams.theta - beams.theta[0], links.theta - links.theta[0], atol=2e-3)
+    assert np.ptp(links.theta) > 0.02
 
 
 def simulate_hold(model: ModelChoice) -> Simulation:
