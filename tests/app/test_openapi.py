@@ -80,7 +80,7 @@ def test_every_route_is_documented(document: Document) -> None:
 def test_examples_are_valid_by_the_document(
     document: Document, name: str, request_document: Callable[[], Document]
 ) -> None:
-    """The examples and the tests' requests are valid by the published schema, which refuses unknown fields."""
+    """Examples and the tests' requests are valid by the published schema, which refuses unknown fields."""
     schema = {"$ref": f"#/components/schemas/{name}", "components": document["components"]}
     validator = pytest.importorskip("jsonschema_rs").validator_for(schema)
     request = request_document()

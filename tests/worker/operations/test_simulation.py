@@ -1,0 +1,90 @@
+"""The operation `simulate`, run by a real worker."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.simulate.schemas import SimulateResult
+from morphcore import load_trajectory
+from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation
+from worker.attempt import Ending
+from worker.operations import WorkRefused, find_operation
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        {"kind": "rigid"},
+        {"kind": "equivalent", "parameters": parameters()},
+        {"kind": "flexible", "elements": 2, "step_s": 0.002},
+    ],
+    ids=lambda model: str(model["kind"]),
+)
+def test_each_model_flies(worker: RealWorker, model: dict[str, object]) -> None:
+    """A job of each model ends with the documented result, a table, a picture, and no identified model."""
+    job_id = worker.add("simulate", simulation(**model))
+    assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
+    result = SimulateResult.model_validate(worker.result(job_id))
+    assert result.model.kind == model["kind"]
+    assert len(result.trajectory.time_s) == 61
+    assert np.isclose(result.trajectory.sweep_left_rad[-1], 0.4)
+    files = worker.files(job_id)
+    assert set(files) == {"result.json", "flight.csv", "flight.svg", "flight.png"}
+    assert json.loads(files["result.json"]) == worker.result(job_id)
+    assert worker.job(job_id).model_id is None
+
+
+def test_the_table_is_a_sample(worker: RealWorker, tmp_path: Path) -> None:
+    """`flight.csv` has the columns of the example flights and can be loaded as one."""
+    job_id = worker.add("simulate", simulation())
+    worker.run()
+    table = worker.files(job_id)["flight.csv"]
+    columns = next(csv.reader(io.StringIO(table.decode())))
+    assert columns[:6] == ["t", "sweep_left", "sweep_right", "phi", "theta", "psi"]
+    path = tmp_path / "flight.csv"
+    path.write_bytes(table)
+    flown = load_trajectory(path)
+    assert np.allclose(flown.theta, worker.result(job_id)["trajectory"]["theta_rad"], atol=1e-9)
+
+
+def test_a_flight_is_cancelled_within_two_seconds(worker: RealWorker) -> None:
+    """A long flight of the flexible model stops soon after it is told to, and leaves no half result."""
+    job_id = worker.add("simulate", simulation(60.0, kind="flexible"))
+    ending, took_s = worker.cancelled_after(job_id, fraction=1e-4)
+    assert ending is Ending.CANCELLED
+    assert took_s < 2.0
+    assert not worker.job(job_id).partial
+    assert worker.files(job_id) == {}
+
+
+def test_a_second_attempt_flies_from_the_start(worker: RealWorker) -> None:
+    """A worker told to end hands the flight back; the next one flies it anew, says so, to the same flight."""
+    request = simulation(0.8, kind="flexible", lattice={})
+    job_id = worker.add("simulate", request)
+    assert worker.run(lambda: worker.job(job_id).progress is not None) is Ending.RELEASED
+    assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
+    assert "from the start" in (worker.job(job_id).progress or {})["message"]
+    undisturbed = find_operation("simulate")(request, 1)
+    *_, last = undisturbed.steps(None, lambda: False)
+    assert worker.result(job_id)["trajectory"] == undisturbed.outcome(last.checkpoint).document["trajectory"]
+
+
+def test_a_spline_beyond_its_hinge_is_refused() -> None:
+    """An angle beyond the hinge between two knots, which only the spline shows, is refused with its place."""
+    request = simulation(2.0)
+    request["schedules"] = {
+        "both": {
+            "kind": "spline",
+            "knot_time_s": [0.0, 0.9, 1.0, 2.0],
+            "knot_angle_rad": [0.0, 0.0, 1.2, 1.2],
+        }
+    }
+    with pytest.raises(WorkRefused) as refused:
+        find_operation("simulate")(request, 1)
+    assert (refused.value.code, refused.value.pointer) == ("invalid_input", "/schedules/both")
