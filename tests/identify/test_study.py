@@ -224,27 +224,31 @@ def test_a_foreign_checkpoint_is_refused(undisturbed: tuple[Study, list[Step]]) 
 
 
 @pytest.mark.slow
-def test_the_example_flights_want_few_links() -> None:
-    """Fitted to three morphs at 0.2 to 0.8 rad/s, judged by an asymmetric one.
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_example_flights_want_few_links(seed: int) -> None:
+    """Fitted to three morphs at 0.2 to 0.8 rad/s, judged by an asymmetric one: two to four links.
 
-    From one link to three J falls by more than a factor of 1000, fitted and held out. Links beyond the fourth
-    gain nothing on the flight held out, so two to four are recommended; three links predict its angles within
-    0.3 mrad. The cost of a flight rises with the links, by less than their number.
+    From one link to three J falls by more than a factor of 1000, fitted and held out, and every model of two
+    links or more predicts the asymmetric flight with less than 1e-3 of the rigid model's J, three links every
+    angle within 0.6 mrad. More links gain little: of their parameters the flights cannot see a third with
+    three links at most, more than half with six. The cost of a flight rises with the links, by less than
+    their number.
     """
     samples = [example(name) for name in ("rate_0.2", "rate_0.5", "rate_0.8")]
     samples.append(example("asymmetric", "held_out"))
-    result = study(reference_aircraft(), reference_flight(), samples)
-    for row in result.rows:
-        print(row.links_per_wing, row.bodies, row.parameters, row.J_train, row.J_held_out, row.rms_rad,
-              row.flight_s, row.identify_s, row.flights, row.unseen_directions)  # fmt: skip
-    print(result.rigid, result.recommended)
-    one, three = result.row(1), result.row(3)
-    assert three.J_train < 1e-3 * one.J_train  # type: ignore[operator]
-    assert three.J_held_out < 1e-3 * one.J_held_out  # type: ignore[operator]
-    assert three.worst_rms_rad < 0.3e-3  # type: ignore[operator]
-    assert result.recommended.links_per_wing in (2, 3, 4)
-    assert result.recommended.judged_by == "held_out"
-    best = min(row.J_held_out for row in result.rows[1:4])  # type: ignore[type-var]
-    assert all(row.J_held_out > 0.5 * best for row in result.rows[4:])  # type: ignore[operator]
-    assert result.row(6).flight_s < 6.0 * one.flight_s  # type: ignore[operator]
-    assert one.flight_s < 1.1 * result.row(6).flight_s  # type: ignore[operator]
+    search = SearchSettings(seed=seed)
+    document = study(reference_aircraft(), reference_flight(), samples, search=search).to_document()
+    for row in document["rows"]:
+        print({name: value for name, value in row.items() if name not in ("fit", "model")})
+    print(document["rigid"], document["recommended"])
+    one, two, three, four, five, six = document["rows"]
+    for role in ("J_train", "J_held_out"):
+        assert three[role] < 1e-3 * one[role]
+    for row in (two, three, four, five, six):
+        assert row["J_held_out"] < 1e-3 * document["rigid"]["J_held_out"]
+    assert max(three["rms_rad"].values()) < 0.6e-3
+    assert three["unseen_directions"] < three["parameters"] / 3
+    assert six["unseen_directions"] > six["parameters"] / 2
+    assert document["recommended"]["links_per_wing"] in (2, 3, 4)
+    assert document["recommended"]["judged_by"] == "held_out"
+    assert one["flight_s"] < six["flight_s"] < 6.0 * one["flight_s"]
