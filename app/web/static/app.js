@@ -38,7 +38,7 @@ async function listView() {
   const rows = new Map();
   const sources = new Map();
   const body = element("tbody");
-  const heads = ["Status", "Aircraft", "Links", "Search", "Progress", "Best cost", "Created"].map((text) => element("th", {}, text));
+  const heads = ["Status", "Operation", "Aircraft", "What", "Progress", "Best cost", "Created"].map((text) => element("th", {}, text));
   const more = element("button", {}, "Older jobs");
   const older = element("tbody");
   let cursor = null;
@@ -54,9 +54,9 @@ async function listView() {
       "tr",
       { class: "link", tabindex: 0, on: { click: go, keydown: (event) => event.key === "Enter" && go() } },
       element("td", {}, pill(job.status)),
-      element("td", {}, job.request.aircraft ?? job.operation),
-      element("td", {}, String(job.request.links_per_wing ?? "–")),
-      element("td", {}, job.request.method ?? "–"),
+      element("td", {}, job.operation),
+      element("td", {}, job.request.aircraft ?? "–"),
+      element("td", {}, described(job)),
       element("td", {}, bar(job)),
       element("td", {}, show.number(job.progress?.best_cost)),
       element("td", { class: "soft" }, show.time(job.created_at)),
@@ -103,8 +103,14 @@ async function listView() {
 
 /* ---- one job ---- */
 
-function facts(entries) {
-  return element("dl", { class: "facts" }, ...entries.map(([title, value]) => element("div", {}, element("dt", {}, title), element("dd", {}, value))));
+function searchFacts(progress) {
+  if (progress.flights === null || progress.flights === undefined) return [];
+  return [
+    ["Generation", String(progress.generation ?? "–")],
+    ["Best cost, rad²", show.number(progress.best_cost)],
+    ["Flights", show.number(progress.flights, 8)],
+    ["Flights per second", show.number(progress.flights_per_s)],
+  ];
 }
 
 function headCard(job) {
@@ -120,60 +126,20 @@ function headCard(job) {
   return element(
     "section",
     { class: "card" },
-    element("div", { class: "row" }, element("h1", {}, job.request.aircraft ?? job.operation), pill(job.status), job.partial ? element("span", { class: "soft" }, "best so far") : null, button),
+    element("div", { class: "row" }, element("h1", {}, `${job.operation}: ${job.request.aircraft ?? "aircraft"}`), pill(job.status), job.partial ? element("span", { class: "soft" }, "best so far") : null, button),
     element("div", { class: "soft mono" }, job.id),
     element("p", {}, bar(job)),
     element("div", { class: "soft" }, progress.message ?? ""),
     facts([
-      ["Links per wing", String(job.request.links_per_wing ?? "–")],
-      ["Search", job.request.method ?? "–"],
+      ["Asked for", described(job)],
       ["Phase", progress.phase ?? "–"],
-      ["Generation", String(progress.generation ?? "–")],
-      ["Best cost, rad²", show.number(progress.best_cost)],
-      ["Flights", show.number(progress.flights, 8)],
-      ["Flights per second", show.number(progress.flights_per_s)],
+      ...searchFacts(progress),
       ["Running for", show.duration(elapsed)],
       ["Remaining", FINAL.includes(job.status) ? "–" : show.duration(progress.eta_s)],
       ["Attempt", `${job.attempt} of ${job.max_attempts}`],
+      ...(job.model_id ? [["Kept as", element("a", { href: `/models/${job.model_id}` }, "identified model")]] : []),
     ]),
   );
-}
-
-function fitCard(result) {
-  const number = (text) => ({ text, number: true });
-  const rows = result.fit.map((fit) => [
-    fit.sample, fit.role === "held_out" ? "held out" : fit.role, show.number(fit.J_rigid), show.number(fit.J_initial), show.number(fit.J_identified),
-    show.number(fit.J_identified / fit.J_rigid, 2), ...["phi", "theta", "psi"].map((angle) => show.milliradians(fit.rms_rad[angle])),
-  ]);
-  const titles = ["Sample", "Role", ...["J rigid", "J first guess", "J identified", "ratio", "RMS φ, mrad", "RMS θ, mrad", "RMS ψ, mrad"].map(number)];
-  return element("section", { class: "card" }, element("h2", {}, "Fit"), table(titles, rows));
-}
-
-function modelCard(result) {
-  const model = result.model;
-  const number = (text) => ({ text, number: true });
-  const triples = (rows) => (Array.isArray(rows) ? rows : []).map((row, i) => [`joint ${i + 1}`, ...[row].flat(2).map((value) => show.number(value))]);
-  const wide = Math.max(4, ...triples(model.stiffness_nm_rad).map((row) => row.length));
-  const titles = ["", ...["flap", "torsion", "lag"].map(number)];
-  while (titles.length < wide) titles.push(number(""));
-  const aero = Object.entries(model.aero ?? {}).map(([name, value]) => [name.replaceAll("_", " "), typeof value === "number" ? show.number(value) : JSON.stringify(value)]);
-  return element(
-    "section", { class: "card" },
-    element("h2", {}, "Identified model"),
-    facts([["Links per wing", String(model.links_per_wing)], ["Division of the span", [model.division].flat(2).map((part) => show.number(part)).join(" : ")], ...aero]),
-    element("p", { class: "soft" }, "Stiffness, N m/rad"), table(titles, triples(model.stiffness_nm_rad)),
-    element("p", { class: "soft" }, "Damping, N m s/rad"), table(titles, triples(model.damping_nms_rad)),
-  );
-}
-
-function filesCards(files) {
-  const plots = files.filter((file) => file.name.endsWith(".svg"));
-  const figures = plots.map((file) => element("figure", {}, element("a", { href: file.href, target: "_blank" }, element("img", { src: file.href, alt: file.name, loading: "lazy" })), element("figcaption", {}, file.name.replace(".svg", "").replaceAll("_", " "))));
-  const links = files.map((file) => element("a", { href: file.href, download: file.name }, `${file.name} (${show.bytes(file.size_bytes)})`));
-  return [
-    figures.length ? element("section", { class: "card" }, element("h2", {}, "Plots"), element("div", { class: "plots" }, ...figures)) : null,
-    links.length ? element("section", { class: "card" }, element("h2", {}, "Files"), element("div", { class: "files" }, ...links)) : null,
-  ].filter(Boolean);
 }
 
 async function jobView(id) {
@@ -196,8 +162,7 @@ async function jobView(id) {
     const parts = [];
     if (job.error) parts.push(problemCard({ problem: { title: `Failed: ${job.error.code}`, detail: job.error.detail, hint: job.error.hint } }));
     try {
-      const result = await call(job.links.result);
-      parts.push(fitCard(result), modelCard(result));
+      parts.push(...resultCards(job.operation, await call(job.links.result)));
     } catch (error) {
       if (!error.problem) throw error; // no result is told by the status and the error card
     }

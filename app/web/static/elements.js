@@ -5,7 +5,7 @@ function element(name, options = {}, ...children) {
   const node = document.createElement(name);
   for (const [key, value] of Object.entries(options)) {
     if (key === "on") for (const [event, handler] of Object.entries(value)) node.addEventListener(event, handler);
-    else if (key === "class") node.className = value;
+    else if (key === "class") node.className = value ?? "";
     else if (value !== null && value !== undefined && value !== false) node.setAttribute(key, value === true ? "" : value);
   }
   node.append(...children.filter((child) => child !== null && child !== undefined));
@@ -27,6 +27,7 @@ const show = {
     return Number(value.toPrecision(digits + 1)).toLocaleString("en");
   },
   milliradians: (value) => (value === null || value === undefined ? "–" : (value * 1000).toPrecision(3)),
+  milliseconds: (seconds) => (seconds === null || seconds === undefined ? "–" : (seconds * 1000).toPrecision(3)),
   duration: (seconds) => {
     if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
     if (seconds < 60) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
@@ -52,10 +53,11 @@ function bar(job) {
   );
 }
 
-function table(titles, rows) {
+/* A table; the row of the number `marked` stands out. */
+function table(titles, rows, marked = -1) {
   const heads = titles.map((title) => element("th", { class: title.number ? "number" : "" }, title.text ?? title));
-  const body = rows.map((cells) =>
-    element("tr", {}, ...cells.map((cell, i) => element("td", { class: titles[i].number ? "number" : "" }, cell))),
+  const body = rows.map((cells, row) =>
+    element("tr", { class: row === marked ? "marked" : null }, ...cells.map((cell, i) => element("td", { class: titles[i].number ? "number" : "" }, cell))),
   );
   return element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...body));
 }
