@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
 from morphcore.identify import Identification, IdentifyResult, identification_from_document, identify
+from morphcore.identify.study import study
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.warming import warm_up
@@ -25,5 +26,6 @@ __all__ = [
     "load_flight",
     "load_trajectory",
     "simulate",
+    "study",
     "warm_up",
 ]
