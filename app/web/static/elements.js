@@ -24,7 +24,7 @@ const show = {
     if (value === null || value === undefined || !Number.isFinite(value)) return "–";
     const size = Math.abs(value);
     if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 1);
-    return Number(value.toPrecision(digits + 1)).toLocaleString("en");
+    return value.toLocaleString("en", { maximumSignificantDigits: digits + 1 });
   },
   milliradians: (value) => (value === null || value === undefined ? "–" : (value * 1000).toPrecision(3)),
   milliseconds: (seconds) => (seconds === null || seconds === undefined ? "–" : (seconds * 1000).toPrecision(3)),

@@ -26,6 +26,11 @@ function facts(entries) {
   return element("dl", { class: "facts" }, ...entries.map(([title, value]) => element("div", {}, element("dt", {}, title), element("dd", {}, value))));
 }
 
+function narrow(table) {
+  table.classList.add("narrow");
+  return table;
+}
+
 function card(title, ...content) {
   return element("section", { class: "card" }, element("h2", {}, title), ...content);
 }
@@ -98,11 +103,11 @@ function optimizeCards(result) {
   const knots = result.schedule.knot_time_s.map((time, i) => [String(i + 1), show.number(time), show.number(result.schedule.knot_sweep_rad[i])]);
   const cards = [
     card("Attitude variation, rad²", table(titles, rows, rows.findIndex(([title]) => title === "optimum")), sentence),
-    card("Schedule", table(["Knot", "time, s", "sweep, rad"].map(number), knots)),
+    card("Schedule", narrow(table(["Knot", "time, s", "sweep, rad"].map(number), knots))),
   ];
   if (result.pareto?.length) {
     const front = result.pareto.map((point) => [show.number(point.duration_s), show.number(point.variation_rad2)]);
-    cards.push(card("Duration against variation", table(["duration, s", "variation, rad²"].map(number), front)));
+    cards.push(card("Duration against variation", narrow(table(["duration, s", "variation, rad²"].map(number), front))));
   }
   return cards;
 }
