@@ -103,8 +103,10 @@ class Meter:
             self._progress.update(self._task, description=status)
             return
         fraction, phase = float(progress.get("fraction") or 0.0), str(progress.get("phase") or status)
-        self._progress.update(self._task, completed=fraction, description=phase, detail=_detail(progress))
-        line = f"{phase:<10} {100.0 * fraction:3.0f} %  {_detail(progress)}"
+        self._progress.update(
+            self._task, completed=fraction, description=phase, detail=progress_detail(progress)
+        )
+        line = f"{phase:<10} {100.0 * fraction:3.0f} %  {progress_detail(progress)}"
         console = self._progress.console
         if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
             console.print(line, markup=False, soft_wrap=True)
@@ -179,21 +181,20 @@ def model_table(result: Document) -> Table:
 
 
 def jobs_table(jobs: Sequence[Document]) -> Table:
-    """Show jobs, one a line."""
-    table = Table(box=SIMPLE_HEAD)
-    for name in ("job", "operation", "status", "progress", "attempt", "created"):
-        table.add_column(name)
+    """Show jobs, one a line; ids are whole on a screen of 80 columns, to be copied."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1), collapse_padding=True, pad_edge=False)
+    for name in ("job", "operation", "status", "done", "try", "created, UTC"):
+        table.add_column(name, no_wrap=True)
     for job in jobs:
-        progress = job.get("progress") or {}
-        fraction = progress.get("fraction")
+        fraction = (job.get("progress") or {}).get("fraction")
         status = str(job["status"])
         table.add_row(
             str(job["id"]),
             str(job.get("operation", "")),
             f"[{STATUS_COLOURS.get(status, 'white')}]{status}[/]",
-            "" if fraction is None else f"{100.0 * fraction:.0f} % {_detail(progress)}",
+            "" if fraction is None else f"{100.0 * fraction:.0f} %",
             str(job.get("attempt", "")),
-            str(job.get("created_at", "")),
+            str(job.get("created_at", ""))[: len("2026-01-01T00:00")].replace("T", " "),
         )
     return table
 
@@ -203,7 +204,8 @@ def exit_for(status: str) -> Exit:
     return {"succeeded": Exit.OK, "cancelled": Exit.STOPPED, "expired": Exit.STOPPED}.get(status, Exit.FAILED)
 
 
-def _detail(progress: Document) -> str:
+def progress_detail(progress: Document) -> str:
+    """Give what is known of a job's progress beside its fraction."""
     parts = []
     if progress.get("best_cost") is not None:
         parts.append(f"cost {short(progress['best_cost'])}")
@@ -211,7 +213,7 @@ def _detail(progress: Document) -> str:
         parts.append(f"{progress['flights']:,} flights")
     if progress.get("flights_per_s"):
         parts.append(f"{progress['flights_per_s']:,.0f}/s")
-    if progress.get("eta_s") is not None:
+    if progress.get("eta_s"):
         parts.append(f"{progress['eta_s']:.0f} s left")
     if not parts and progress.get("message"):
         parts.append(str(progress["message"]))

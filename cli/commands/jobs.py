@@ -18,6 +18,7 @@ from cli.screen import (
     meter,
     print_job_error,
     print_json,
+    progress_detail,
     reports_errors,
     stdout,
 )
@@ -66,6 +67,9 @@ def show_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: option
         print_json({**found, "result": result})
         return
     stdout().print(jobs_table([found]))
+    beside = progress_detail(found.get("progress") or {})
+    if beside:
+        stdout().print(beside, markup=False)
     if found.get("error"):
         print_job_error(found["error"])
     if result is not None and found["operation"] in SHOW_RESULT:
