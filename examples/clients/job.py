@@ -1,0 +1,61 @@
+"""What all clients share: post a request, poll its job, fetch the result."""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+EXAMPLES = Path(__file__).resolve().parent.parent
+COLUMNS = {
+    "time_s": "t",
+    "sweep_left_rad": "sweep_left",
+    "sweep_right_rad": "sweep_right",
+    "phi_rad": "phi",
+    "theta_rad": "theta",
+    "psi_rad": "psi",
+}
+
+
+def vehicle() -> dict[str, Any]:
+    """Read the example aircraft and flight condition."""
+    return {name: json.loads((EXAMPLES / f"{name}.json").read_text()) for name in ("aircraft", "flight")}
+
+
+def sample(name: str, role: str) -> dict[str, Any]:
+    """Read a sample flight as it stands in a request (s, rad)."""
+    with (EXAMPLES / f"{name}.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    series = {key: [float(row[column]) for row in rows] for key, column in COLUMNS.items()}
+    return {"name": name, "role": role, **series}
+
+
+def run(service: httpx.Client, operation: str, body: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Start an operation and wait for its end; give the job and its result.
+
+    Raises
+    ------
+    SystemExit : the request is refused or the job does not succeed; says why.
+    """
+    answer = service.post(f"/{operation}", json=body)
+    if answer.is_error:
+        raise SystemExit(answer.text)
+    place = answer.headers["Location"]
+    job = answer.json()
+    while job["status"] in {"queued", "running", "cancelling"}:
+        time.sleep(0.5)
+        job = service.get(place).raise_for_status().json()
+        print(f"{job['status']:<10} {100 * ((job.get('progress') or {}).get('fraction') or 0.0):5.1f} %")
+    if job["status"] != "succeeded":
+        raise SystemExit(json.dumps(job.get("error")))
+    return job, service.get(f"{place}/result").raise_for_status().json()
+
+
+def save(result: dict[str, Any], folder: str) -> None:
+    """Write a result into a folder."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    (Path(folder) / "result.json").write_text(json.dumps(result, indent=1))
