@@ -183,7 +183,7 @@ def model_table(result: Document) -> Table:
 def jobs_table(jobs: Sequence[Document]) -> Table:
     """Show jobs, one a line; ids are whole on a screen of 80 columns, to be copied."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1), collapse_padding=True, pad_edge=False)
-    for name in ("job", "operation", "status", "done", "try", "created, UTC"):
+    for name in ("job", "operation", "status", "done", "try", "created UTC"):
         table.add_column(name, no_wrap=True)
     for job in jobs:
         fraction = (job.get("progress") or {}).get("fraction")
@@ -194,7 +194,7 @@ def jobs_table(jobs: Sequence[Document]) -> Table:
             f"[{STATUS_COLOURS.get(status, 'white')}]{status}[/]",
             "" if fraction is None else f"{100.0 * fraction:.0f} %",
             str(job.get("attempt", "")),
-            str(job.get("created_at", ""))[: len("2026-01-01T00:00")].replace("T", " "),
+            str(job.get("created_at", ""))[len("2026-") : len("2026-01-01T00:00")].replace("T", " "),
         )
     return table
 
