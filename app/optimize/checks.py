@@ -55,6 +55,14 @@ def morph_faults(request: OptimizeRequest) -> Iterator[Fault]:
             "/morph/max_variation_rad2",
             'Leave it out, or use the goal "minimum_time".',
         )
+    limits = request.limits
+    if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
+        yield Fault(
+            "missing",
+            f"Without a limit the goal {morph.goal!r} has no shortest duration.",
+            "/limits",
+            "Give max_rate_rad_s or max_accel_rad_s2.",
+        )
     weights = request.weights
     if weights.phi == weights.theta == weights.psi == 0.0:
         yield Fault("weights_all_zero", "No angle counts.", "/weights", "Give one of them a weight.")

@@ -72,6 +72,13 @@ def test_the_shortest_morph_is_that_of_full_power(limits: Limits, expected_s: fl
     assert math.isclose(shortest_morph_s(1.0, limits), expected_s)
 
 
+def test_a_front_needs_a_limit(service: RunningService) -> None:
+    """Without rate and acceleration limits a front of durations has no shortest one."""
+    document = changed(optimize_document(), "/morph/goal", "pareto")
+    document["limits"] = {"monotonic": False}
+    assert_named(service, "/optimize", document, "/limits", "missing", "max_rate_rad_s")
+
+
 def test_a_start_must_be_there(service: RunningService) -> None:
     """`model.start = "given"` without `flight.start` is refused."""
     document = changed(optimize_document(), "/model/start", "given")
