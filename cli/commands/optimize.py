@@ -18,7 +18,8 @@ from cli.files import require_place, writing
 from cli.screen import reports_errors, short, stdout
 
 MODELS = ("rigid", "equivalent", "flexible")
-SCHEDULES = {"constant": "constant rate", "rigid_optimum": "rigid model's optimum", "optimum": "optimum"}
+SCHEDULES = {"constant": "constant rate", "rigid_optimum": "rigid optimum", "optimum": "optimum"}
+REACHED = {"max_rate_rad_s": "rate", "max_accel_rad_s2": "accel", "max_hinge_torque_nm": "torque"}
 ROW_STEP_S = 0.01  # of the written schedule, as the example flights
 
 morph_option = partial(typer.Option, rich_help_panel="Morph")
@@ -144,7 +145,7 @@ def optimize(
     request.put("/flexible/elements", elements, "--elements")
     answer = run(request, url)
     if out is not None and answer.result is not None:
-        _write_schedule(answer.result, settle, out)
+        _write_schedule(answer.result, out)
     hand_over(answer, show_schedule, json_out=json_out, plots=plots)
 
 
@@ -162,19 +163,18 @@ def _weights(text: str | None) -> dict[str, float] | None:
     return {"phi": phi, "theta": theta, "psi": psi}
 
 
-def _write_schedule(result: Mapping[str, Any], settle_s: float | None, path: Path) -> None:
+def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
     """Write the schedule, from the start of the morph to the end of the settling."""
     import numpy as np
 
     from cli.running import wrote
-    from morphcore.optimise.settings import Morph
     from morphcore.simulate.schedule import Spline
     from morphcore.simulate.schedule_table import write_schedule_csv
 
     found = result["schedule"]
     spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
-    end_s = found["knot_time_s"][-1] + (Morph.settle_s if settle_s is None else settle_s)
-    times = ROW_STEP_S * np.arange(round(end_s / ROW_STEP_S) + 1)
+    end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
+    times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
         write_schedule_csv({"left": spline, "right": spline}, times, path)
     wrote(path)
@@ -183,23 +183,46 @@ def _write_schedule(result: Mapping[str, Any], settle_s: float | None, path: Pat
 def show_schedule(result: Mapping[str, Any]) -> None:
     """Print what came out, for people."""
     stdout().print(variation_table(result))
+    if result.get("pareto"):
+        stdout().print(front_table(result["pareto"]))
     stdout().print(knot_table(result["schedule"]))
+    for note in result.get("notes", ()):
+        stdout().print(note, markup=False)
 
 
 def variation_table(result: Mapping[str, Any]) -> Table:
-    """Compare the schedules in the models that flew them: variation of the attitude, rad^2."""
-    reduction = result.get("reduction_percent")
+    """Compare the schedules: attitude variation (rad^2) in the models that flew them, and what they reach."""
+    reduction, model = result.get("reduction_percent"), result.get("reduction_model")
     table = Table(
-        title="Variation of the attitude in rad², flown in each model",
-        caption=None if reduction is None else f"{reduction:.1f} % below constant rate",
+        title="Attitude variation in rad²; largest rate, acceleration and hinge torque in rad, s, N m",
+        caption=None
+        if reduction is None
+        else f"optimum: {reduction:.1f} % below constant rate ({model} model)",
         box=SIMPLE_HEAD,
+        padding=(0, 1),
+        collapse_padding=True,
+        pad_edge=False,
     )
-    table.add_column("schedule")
-    for model in MODELS:
-        table.add_column(model, justify="right")
+    table.add_column("schedule", no_wrap=True)
+    for title in (*MODELS, *REACHED.values()):
+        table.add_column(title, justify="right", no_wrap=True)
     for name, title in SCHEDULES.items():
         flown = result["variation"].get(name) or {}
-        table.add_row(title, *(short(flown.get(model)) for model in MODELS))
+        reached = (result.get("reached") or {}).get(name) or {}
+        table.add_row(
+            title, *(short(flown.get(m)) for m in MODELS), *(short(reached.get(r)) for r in REACHED)
+        )
+    return table
+
+
+def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
+    """Show the front of duration (s) against variation (rad^2)."""
+    table = Table(title="Front: no schedule is both shorter and calmer", box=SIMPLE_HEAD)
+    for title in ("duration, s", "variation, rad²", "at constant rate"):
+        table.add_column(title, justify="right")
+    for point in front:
+        variations = (short(point["variation_rad2"]), short(point.get("constant_rad2")))
+        table.add_row(f"{point['duration_s']:.2f}", *variations)
     return table
 
 

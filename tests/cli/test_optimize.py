@@ -28,7 +28,12 @@ RESULT: dict[str, Any] = {
         "rigid_optimum": {"rigid": 6.0, "equivalent": 6.5, "flexible": 6.6},
         "optimum": {"rigid": 6.1, "equivalent": 5.0, "flexible": None},
     },
+    "reached": {"constant": {"max_rate_rad_s": 0.53, "max_accel_rad_s2": 5.3, "max_hinge_torque_nm": 77.0}},
     "reduction_percent": 37.5,
+    "reduction_model": "equivalent",
+    "morph": {"settle_s": 0.5},
+    "pareto": [{"duration_s": 1.25, "variation_rad2": 3.5, "constant_rad2": 4.5}],
+    "notes": ["optimum in the flexible model: it diverged"],
     "search": {},
 }
 MORPH = ("--final", "1", "--duration", "2")
@@ -75,22 +80,24 @@ def test_the_choices_reach_the_service(tmp_path: Path, play: Play) -> None:
 
 
 def test_the_comparison_and_the_knots_are_shown(tmp_path: Path, play: Play) -> None:
-    """The table holds every variation that was flown, the reduction, and the knots."""
+    """The tables hold every variation that was flown, what was reached, the front, and the knots."""
     play(PlayedService("optimize", RESULT))
     words = (*MORPH, "--parameters", parameters_file(tmp_path), "--url", "http://there")
     ended = RUNNER.invoke(app, command("optimize", *words))
-    rows = {line[:21].strip(): line[21:].split() for line in ended.stdout.splitlines()}
-    assert rows["constant rate"] == ["9", "8", "8.5"]
-    assert rows["optimum"] == ["6.1", "5"]
-    assert "37.5 % below constant rate" in ended.stdout
-    assert "0.9000" in ended.stdout
+    rows = [line.split() for line in ended.stdout.splitlines()]
+    assert ["constant", "rate", "9", "8", "8.5", "0.53", "5.3", "77"] in rows
+    assert ["optimum", "6.1", "5"] in rows
+    assert ["1.25", "3.5", "4.5"] in rows
+    assert ["0.9000", "0.4000"] in rows
+    assert "37.5 % below constant rate (equivalent model)" in ended.stdout
+    assert "it diverged" in ended.stdout
 
 
 def test_the_written_schedule_is_the_spline(tmp_path: Path, play: Play) -> None:
     """``--out`` holds the spline on both sides every 10 ms, and the settling after it."""
     play(PlayedService("optimize", RESULT))
     out = tmp_path / "schedule.csv"
-    words = (*MORPH, "--settle", "0.5", "--parameters", parameters_file(tmp_path), "--out", out)
+    words = (*MORPH, "--parameters", parameters_file(tmp_path), "--out", out)
     ended = RUNNER.invoke(app, command("optimize", *words, "--url", "http://there"))
     assert ended.exit_code == Exit.OK, ended.output
     written = load_schedule_csv(out)
