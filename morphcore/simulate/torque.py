@@ -17,7 +17,7 @@ CHUNK = 64  # instants: bounds the memory of the interpolated operators
 
 
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
-    """What the hinge motors bear at every grid time, (steps + 1, s), N m along the positive hinge coordinates.
+    """Torque of the hinge motors at every grid time, (steps + 1, s), N m along the positive coordinates.
 
     Inverse dynamics of the wings with their own accelerations and air loads at that instant; the hinges'
     accelerations are the schedule's (at its ends those of the morph, not of the rest beside it). Zero for

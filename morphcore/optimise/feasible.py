@@ -1,0 +1,150 @@
+"""Whether a morph can keep its limits at all, in which time it can, and the constant rate that does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.optimise.limits import HELD, MorphSpace
+from morphcore.optimise.settings import Limits, Morph
+from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+
+OVERSHOOT = 0.5  # of the change: how far a schedule that may turn back may go beyond either end
+SMALLEST_CHANGE_RAD = 1e-6
+USUAL_RAMP_S = 0.1  # of a constant rate where the limits allow it, as the sample flights have
+
+
+def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: float) -> MorphSpace:
+    """The unknowns and limits of a morph on an aircraft's hinges.
+
+    Raises
+    ------
+    InvalidInput : there is no hinge, no change, or a hinge does not reach the angles.
+    """
+    hinges = [surface.hinge for surface in aircraft.surfaces if surface.hinge is not None]
+    if not hinges:
+        raise InvalidInput(
+            "no surface has a hinge", pointer="/aircraft/surfaces", hint="give the wings a hinge"
+        )
+    if abs(morph.change_rad) < SMALLEST_CHANGE_RAD:
+        raise InvalidInput(
+            "the morph ends where it begins", pointer="/morph/final_rad", hint="give another final angle"
+        )
+    least, most = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
+    for name in ("initial_rad", "final_rad"):
+        angle = getattr(morph, name)
+        if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
+            raise InvalidInput(
+                f"{name} {angle:g} is beyond the hinges' range {least:g}..{most:g} rad",
+                pointer=f"/morph/{name}",
+                hint="choose an angle inside, or widen the hinges' min_rad and max_rad",
+            )
+    stops = sorted((stop - morph.initial_rad) / morph.change_rad for stop in (least, most))
+    return MorphSpace(
+        morph,
+        limits,
+        duration_s,
+        max(min(stops[0], 0.0), -OVERSHOOT),
+        min(max(stops[1], 1.0), 1.0 + OVERSHOOT),
+    )
+
+
+def require_schedules(space: MorphSpace) -> None:
+    """Refuse limits that no schedule keeps.
+
+    Raises
+    ------
+    InvalidInput : with the limit that is too tight and the shortest duration that it allows.
+    """
+    if space.room >= HELD:
+        return
+    limits = space.limits
+    each = {
+        "max_rate_rad_s": replace(limits, max_accel_rad_s2=None),
+        "max_accel_rad_s2": replace(limits, max_rate_rad_s=None),
+    }
+    needed = {
+        name: replace(space, limits=alone).quickest[0]
+        for name, alone in each.items()
+        if getattr(limits, name) is not None
+    }
+    shortest = space.quickest[0]
+    # of two limits that only together are too tight, the one that takes more of the time
+    name = max(needed, key=lambda item: needed[item])
+    value = getattr(limits, name)
+    # the rate goes with 1 / T, the acceleration with 1 / T^2
+    power = 1 if name == "max_rate_rad_s" else 2
+    enough = value * max(needed[name] / space.duration_s, 1.0) ** power
+    loosen = f", or raise {name} to {rounded_up(enough):g} or more" if enough > value else ""
+    raise InvalidInput(
+        f"{abs(space.morph.change_rad):g} rad in {space.duration_s:g} s on {space.morph.knots} knots breaks "
+        f"{name} = {value:g}: with these limits it takes {rounded_up(shortest):g} s",
+        pointer=f"/limits/{name}",
+        hint=f"raise duration_s to {rounded_up(shortest):g} or more{loosen}",
+    )
+
+
+def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRate:
+    """The constant rate with ramps that the optimum is compared with, over the same duration.
+
+    Its ramps are those of the sample flights, or the nearest that keep the limits: a ramp r needs the rate
+    ``change / (T - r)`` and the acceleration ``change / (T - r) / r``. Where splines keep the limits there is
+    one, since no schedule needs less time than the trapezoid.
+    """
+    change = abs(morph.change_rad)
+    least, most = 0.0, 0.5 * duration_s
+    if limits.max_accel_rad_s2 is not None:
+        # the product of ramp and rest of the time must not be less than change / acceleration
+        root = 0.25 * duration_s**2 - change / limits.max_accel_rad_s2
+        least = 0.5 * duration_s - np.sqrt(max(root, 0.0))
+    if limits.max_rate_rad_s is not None:
+        most = min(most, duration_s - change / limits.max_rate_rad_s)
+    # what keeps a limit by round-off keeps it by a little more
+    least, most = least * (1.0 + HELD), max(most * (1.0 - HELD), 0.0)
+    ramp = float(np.clip(min(USUAL_RAMP_S, 0.25 * duration_s), least, max(least, most)))
+    return ConstantRate(morph.initial_rad, morph.final_rad, duration_s, ramp_s=min(ramp, 0.5 * duration_s))
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Extremes of a schedule: largest rate (rad/s) and acceleration (rad/s^2), and whether it never turns."""
+
+    max_rate_rad_s: float
+    max_accel_rad_s2: float
+    monotonic: bool
+
+
+def reached(schedule: Schedule) -> Reached:
+    """The extremes of a schedule as it is flown, in closed form from its own coefficients.
+
+    Raises
+    ------
+    TypeError : the schedule is neither a spline nor a constant rate.
+    """
+    if isinstance(schedule, ConstantRate):
+        even = abs(schedule.final_rad - schedule.initial_rad) / (schedule.duration_s - schedule.ramp_s)
+        return Reached(even, even / schedule.ramp_s if schedule.ramp_s > 0.0 else np.inf, monotonic=True)
+    if not isinstance(schedule, Spline):
+        raise TypeError(f"no closed form for {type(schedule).__name__}")
+    cubic = CubicSpline(schedule.knot_time_s, schedule.knot_angle_rad, bc_type="clamped")
+    rate, acceleration = cubic.derivative(), cubic.derivative(2)
+    turns = acceleration.roots(extrapolate=False)
+    at = np.concatenate([schedule.knot_time_s, turns[np.isfinite(turns)]])
+    change = float(schedule.knot_angle_rad[-1] - schedule.knot_angle_rad[0])
+    rates = rate(at) * np.sign(change)
+    return Reached(
+        max_rate_rad_s=float(np.abs(rates).max()),
+        max_accel_rad_s2=float(np.abs(acceleration(schedule.knot_time_s)).max()),
+        # the rate vanishes at both ends: round-off there is no turn
+        monotonic=bool(rates.min() >= -HELD * np.abs(rates).max()),
+    )
+
+
+def rounded_up(value: float) -> float:
+    """A number rounded up to three digits, for people."""
+    digit = 10.0 ** (np.floor(np.log10(value)) - 2.0)
+    return float(np.ceil(value / digit - 1e-9) * digit)

@@ -1,0 +1,131 @@
+"""Flights of candidate schedules in one model: how far the attitude departs, what the hinge motors bear.
+
+All candidates of a morph start from one trim, fly one grid of times and share the lattice along the path of
+the angle; a schedule alone tells them apart. They fly side by side in threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import euler_from_quaternion, wrap_angle
+from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.optimise.settings import Weights
+from morphcore.simulate.batch import Interrupted, Stop, fly_batch
+from morphcore.simulate.plan import CommonPath, time_grid
+from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.torque import hinge_torques
+from morphcore.simulate.trim import StartMode, trim, trimmed_state
+from morphcore.threads import in_threads, thread_count
+
+Array = NDArray[np.float64]
+
+SAMPLE_S = 0.01  # between the rows whose departures are summed
+DIVERGED_ANGLE = 3.0  # rad of departure charged for every angle of a row that a diverged flight never reached
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Flights of p schedules over k rows.
+
+    departure : (p, k, 3) of phi, theta, psi from their values at the start, wrapped, rad; finite, a diverged
+    flight is charged DIVERGED_ANGLE. torque : (p, n) of all hinges at all steps, N m; n is 0 where it was not
+    asked for. diverged : (p,).
+    """
+
+    departure: Array
+    torque: Array
+    diverged: NDArray[np.bool_]
+
+    @property
+    def variation(self) -> Array:
+        """(p,) sum of the squared departures over the rows, rad^2."""
+        return np.asarray(np.einsum("pka,pka->p", self.departure, self.departure))
+
+    def errors(self, weights: Weights) -> Array:
+        """(p, 3 k) what is squared and summed: the departures times the roots of their weights."""
+        return (self.departure * weights.root).reshape(self.departure.shape[0], -1)
+
+    def cost(self, weights: Weights) -> Array:
+        """(p,) J, rad^2."""
+        errors = self.errors(weights)
+        return np.asarray(np.einsum("pm,pm->p", errors, errors))
+
+    @property
+    def peak_torque(self) -> Array:
+        """(p,) largest torque of any hinge, N m; 0 where it was not asked for."""
+        return np.asarray(np.abs(self.torque).max(axis=1, initial=0.0))
+
+
+def sample_times(duration_s: float, settle_s: float) -> Array:
+    """(k,) times of the rows, from the morph's begin to the end of the settling window."""
+    rows = int(np.floor((duration_s + settle_s) / SAMPLE_S + 1e-6)) + 1
+    return SAMPLE_S * np.arange(max(rows, 3), dtype=np.float64)
+
+
+class MorphFlights:
+    """Flights of one parameter set over one window, all from the same trim.
+
+    Raises
+    ------
+    TrimNotFound : there is no steady level flight.
+    """
+
+    def __init__(
+        self,
+        model: ChainModel,
+        batch: ParameterBatch,
+        path: CommonPath,
+        times_s: Array,
+        *,
+        initial_rad: float,
+        start: StartMode,
+        step_s: float,
+    ) -> None:
+        self.model, self.path = model, path
+        self.times_s = times_s
+        self.grid = time_grid(times_s, step_s)
+        waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
+        found = trim(model, batch, waiting, start=start).require()
+        self.constants = lane_constants(model, batch, self.grid.step_s)
+        self.constants.set_thrust(found.force_B, found.moment_B)
+        self.state = trimmed_state(model, batch, waiting, found)
+
+    def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:
+        """Fly schedules of all hinges; with the torque of their motors if asked for.
+
+        ``stop`` is asked between rounds of one flight for each thread; True raises Interrupted.
+        """
+        flown: list[tuple[Array, Array]] = [(np.zeros(0), np.zeros(0))] * len(schedules)
+
+        def one(number: int) -> None:
+            flown[number] = self._one(schedules[number], torque=torque)
+
+        for first in range(0, len(schedules), thread_count()):
+            if stop is not None and stop():
+                raise Interrupted
+            count = min(thread_count(), len(schedules) - first)
+            in_threads(lambda part, first=first: one(first + part), count)  # type: ignore[misc]
+        euler = np.stack([attitude for attitude, _ in flown])
+        departure = wrap_angle(euler - euler[:, :1])
+        lost = ~np.isfinite(departure)
+        return Flown(
+            np.where(lost, DIVERGED_ANGLE, departure),
+            np.stack([torques for _, torques in flown]),
+            np.asarray(lost.any(axis=(1, 2))),
+        )
+
+    def _one(self, schedule: Schedule, *, torque: bool) -> tuple[Array, Array]:
+        """Euler angles (k, 3) at the rows, and torques (n,)."""
+        plan = self.path.plan(self.model, schedule, self.grid)
+        rows = self.model.state_rows if torque else 4
+        chunks = fly_batch(self.model, plan, self.constants, self.state, record_rows=rows)
+        states = np.concatenate([chunk.rows[..., 0] for chunk in chunks])
+        attitude = euler_from_quaternion(states[self.grid.at, :4])
+        if not torque:
+            return attitude, np.zeros(0)
+        return attitude, hinge_torques(self.model, plan, self.constants, states).ravel()

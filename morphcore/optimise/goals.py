@@ -1,0 +1,168 @@
+"""Which searches a goal takes: one after the other, each chosen from what the ones before found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+from morphcore.optimise.flights import SAMPLE_S
+from morphcore.optimise.limits import MorphSpace
+from morphcore.optimise.settings import Limits, Morph
+
+Array = NDArray[np.float64]
+ModelName = Literal["equivalent", "rigid"]
+
+TICK_S = SAMPLE_S  # durations are compared in whole samples: between two the sums have the same rows
+
+
+@dataclass(frozen=True)
+class Task:
+    """A search to be done: with which model, for which duration in s."""
+
+    model: ModelName
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found: its best point (d,), J with weights, variation without (rad^2), peak torque (N m).
+
+    Where no schedule keeps the torque limit, cost and variation are infinite and the torque is the least that
+    was seen.
+    """
+
+    model: ModelName
+    duration_s: float
+    point: Array
+    cost: float
+    variation: float
+    torque: float
+    flights: int
+    generations: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether there is a schedule."""
+        return bool(np.isfinite(self.cost))
+
+
+def durations(morph: Morph, shortest_s: float) -> Array:
+    """Durations, s, that a goal may choose from, rising; the longest is the morph's own."""
+    if morph.goal == "variation":
+        return np.array([morph.duration_s])
+    first, last = int(np.ceil(shortest_s / TICK_S - 1e-9)), int(np.floor(morph.duration_s / TICK_S + 1e-9))
+    ticks = TICK_S * np.arange(first, last + 1)
+    if ticks.size == 0 or morph.duration_s - ticks[-1] > 1e-9:
+        ticks = np.append(ticks, morph.duration_s)
+    if morph.goal == "minimum_time":
+        return np.asarray(ticks, dtype=np.float64)
+    rows = np.unique(np.round(np.linspace(0, ticks.size - 1, morph.front_points)).astype(np.int64))
+    return np.asarray(ticks[rows], dtype=np.float64)
+
+
+def next_task(morph: Morph, choice: Array, found: tuple[Found, ...]) -> Task | None:
+    """The search that comes next; None when the goal is reached.
+
+    The last is always the rigid model's for the duration that was chosen, to compare with.
+
+    Raises
+    ------
+    InvalidInput : no morph reaches the goal.
+    """
+    done = {round(item.duration_s, 6): item for item in found if item.model == "equivalent"}
+    if morph.goal == "minimum_time":
+        wanted = _bisected(morph, choice, done)
+    else:
+        wanted = next((float(t) for t in choice if round(float(t), 6) not in done), None)
+    if wanted is not None:
+        return Task("equivalent", wanted)
+    if any(item.model == "rigid" for item in found):
+        return None
+    return Task("rigid", chosen(morph, found).duration_s)
+
+
+def chosen(morph: Morph, found: tuple[Found, ...]) -> Found:
+    """The search whose schedule is the result; so far, while not all are done."""
+    searched = sorted((item for item in found if item.model == "equivalent"), key=lambda f: f.duration_s)
+    searched = [item for item in searched if item.feasible] or searched
+    if morph.goal == "minimum_time":
+        return next((item for item in searched if _is_calm(morph, item)), searched[-1])
+    return searched[-1]
+
+
+def _is_calm(morph: Morph, item: Found) -> bool:
+    return morph.max_variation_rad2 is None or item.variation <= morph.max_variation_rad2
+
+
+def _bisected(morph: Morph, choice: Array, done: dict[float, Found]) -> float | None:
+    """The next duration to look at for the least that is calm enough; None when it is known.
+
+    First the shortest, then the longest; then halving between the longest that is not and the shortest that
+    is. What is found has a shorter neighbour that was searched too and is not calm enough.
+    """
+    known = [done.get(round(float(t), 6)) for t in choice]
+    for end in (0, len(known) - 1):
+        if known[end] is None:
+            return float(choice[end])
+        if end == 0 and _is_calm(morph, known[0]):  # type: ignore[arg-type]
+            return None
+    calm = [i for i, item in enumerate(known) if item is not None and _is_calm(morph, item)]
+    if not calm:
+        least = min((item for item in known if item is not None), key=lambda item: item.variation)
+        raise InvalidInput(
+            f"no morph of {choice[0]:.4g} to {choice[-1]:.4g} s stays below "
+            f"{morph.max_variation_rad2:g} rad^2: the least found is {least.variation:.4g} rad^2 "
+            f"in {least.duration_s:.4g} s",
+            pointer="/morph/max_variation_rad2",
+            hint=f"raise it to {1.01 * least.variation:.3g} or more, or loosen the limits",
+        )
+    high = min(calm)
+    low = max(i for i, item in enumerate(known) if item is not None and i < high)
+    return float(choice[(low + high) // 2]) if high - low > 1 else None
+
+
+def planned(morph: Morph, choices: int) -> int:
+    """How many searches a goal takes, about, with so many durations to choose from."""
+    if morph.goal == "minimum_time":
+        return 3 + int(np.ceil(np.log2(max(choices, 2))))
+    return choices + 1
+
+
+def warm_starts(space: MorphSpace, found: tuple[Found, ...]) -> Array:
+    """Points (w, d) to begin a search with, out of the search for the nearest duration; none without any.
+
+    Its shape as it is, and the same schedule in its own time, so that both end together.
+    """
+    like = [item for item in found if item.model == "equivalent" and item.feasible]
+    if not like:
+        return np.zeros((0, space.dimension))
+    near = min(like, key=lambda item: abs(item.duration_s - space.duration_s))
+    ratio = near.duration_s / space.duration_s
+    later = near.point.copy()
+    later[: space.inner] = 1.0 - ratio * (1.0 - later[: space.inner])
+    return np.stack([near.point, later]) if ratio != 1.0 else near.point[None, :]
+
+
+def require_goal(morph: Morph, limits: Limits) -> None:
+    """Refuse goals that lack what they need.
+
+    Raises
+    ------
+    InvalidInput : with a pointer to what is missing.
+    """
+    if morph.goal == "minimum_time" and morph.max_variation_rad2 is None:
+        raise InvalidInput(
+            "the goal minimum_time needs max_variation_rad2",
+            pointer="/morph/max_variation_rad2",
+            hint="say how much the attitude may vary, rad^2",
+        )
+    if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
+        raise InvalidInput(
+            f"without a limit the goal {morph.goal} has no shortest duration",
+            pointer="/limits",
+            hint="give max_rate_rad_s or max_accel_rad_s2",
+        )

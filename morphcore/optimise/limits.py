@@ -1,0 +1,347 @@
+"""Which schedules keep the limits of rate, acceleration, sign and range: exactly, and without a flight.
+
+A point holds the unknowns of one schedule: the times of the knots between both ends as shares of the
+duration, then, where the values are free, the angles there as shares of the change. Every limit is a *slack*
+that must not be negative; all are extrema of cubic pieces in closed form (see shapes.py), made relative so
+that a slack of 0.1 means a tenth of the limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from morphcore.optimise.settings import Limits, Morph
+from morphcore.optimise.shapes import Shapes, clamped_shapes
+from morphcore.simulate.schedule import Spline
+
+Array = NDArray[np.float64]
+Map = Callable[[Array], Array]
+
+# a schedule counts as keeping a limit with this relative slack: above the round-off of any program that
+# evaluates the spline anew, and of numbers printed with ten digits
+HELD = 1e-9
+SHORTEST_PIECE = (
+    0.01  # of the duration, between knots: closer ones are a jolt that a flight's step would miss
+)
+PROBE = 1e-7  # of the slacks' difference quotients; their arguments are of order one
+RAY_POINTS = 32  # looked at on a ray before the last interval is halved
+HALVINGS = 40
+RAMPS = (0.02, 0.05, 0.15, 0.3, 0.5)  # of the duration: of the constant rates that are tried first
+WAITS = (0.0, 0.15, 0.3, 0.45, 0.6)  # of the duration: before them
+MOST_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
+TOLERANCE = 1e-11  # of their cost
+NARROW = 0.02  # room below which the centre is sought from the quickest morph too
+
+
+@dataclass(frozen=True)
+class MorphSpace:
+    """The unknowns of a morph of one duration, and which of their values keep the limits.
+
+    low, high : least and largest angle that the hinges (and the lattice's table) allow, as shares of the
+    change; only a schedule that may turn back needs them.
+    """
+
+    morph: Morph
+    limits: Limits
+    duration_s: float
+    low: float = 0.0
+    high: float = 1.0
+
+    @property
+    def inner(self) -> int:
+        """Knots between both ends."""
+        return self.morph.knots - 2
+
+    @property
+    def dimension(self) -> int:
+        """Number of unknowns."""
+        return self.inner * (2 if self.morph.free_values else 1)
+
+    @property
+    def lower(self) -> Array:
+        """(d,) least value of each unknown."""
+        values = np.full(self.dimension - self.inner, 0.0 if self.limits.monotonic else self.low)
+        return np.concatenate([np.zeros(self.inner), values])
+
+    @property
+    def upper(self) -> Array:
+        """(d,) largest value of each unknown."""
+        values = np.full(self.dimension - self.inner, 1.0 if self.limits.monotonic else self.high)
+        return np.concatenate([np.ones(self.inner), values])
+
+    def knots(self, points: Array) -> tuple[Array, Array]:
+        """Times and values (p, k) of all knots of points (p, d), shares of duration and change."""
+        zero, one = np.zeros((points.shape[0], 1)), np.ones((points.shape[0], 1))
+        time = np.concatenate([zero, points[:, : self.inner], one], axis=1)
+        if self.morph.free_values:
+            return time, np.concatenate([zero, points[:, self.inner :], one], axis=1)
+        return time, np.tile(np.linspace(0.0, 1.0, self.morph.knots), (points.shape[0], 1))
+
+    def shapes(self, points: Array) -> Shapes:
+        """The shapes of points (p, d)."""
+        return clamped_shapes(*self.knots(points))
+
+    def schedule(self, point: Array) -> Spline:
+        """The schedule of one point (d,)."""
+        time, value = self.knots(point[None, :])
+        angle = self.morph.initial_rad + self.morph.change_rad * value[0]
+        angle[-1] = self.morph.final_rad
+        return Spline(self.duration_s * time[0], angle)
+
+    def slack(self, points: Array) -> Array:
+        """(p, m) what points (p, d) leave of each limit; none may be negative.
+
+        Rate: its value at the knots and where it turns. Acceleration: at the knots, where it is greatest on
+        linear pieces. Sign: the least rate of every piece; in the first it is ``s (b + c s)``, which is never
+        negative if the acceleration at the start and the rate at the piece's end are not; likewise in the
+        last.
+        """
+        shapes = self.shapes(points)
+        steepness = abs(self.morph.change_rad) / self.duration_s  # mean rate, rad/s
+        turning, inner = shapes.turning_rate(), shapes.rate[:, 1:-1]
+        rates = np.concatenate([turning, inner], axis=1)
+        kept = [self.inner * (np.diff(shapes.time, axis=1) - SHORTEST_PIECE)]
+        if self.limits.max_rate_rad_s is not None:
+            share = rates * (steepness / self.limits.max_rate_rad_s)
+            kept += [1.0 - share] if self.limits.monotonic else [1.0 - share, 1.0 + share]
+        if self.limits.max_accel_rad_s2 is not None:
+            accelerations = np.concatenate([shapes.first, shapes.last[:, -1:]], axis=1)
+            share = accelerations * (steepness / self.duration_s / self.limits.max_accel_rad_s2)
+            kept += [1.0 - share, 1.0 + share]
+        if self.limits.monotonic:
+            start = shapes.first[:, :1] * shapes.length[:, :1]
+            end = -shapes.last[:, -1:] * shapes.length[:, -1:]
+            kept += [start, inner, turning[:, 1:-1], end]
+        else:
+            values = np.concatenate([shapes.turning_values(), shapes.value[:, 1:-1]], axis=1)
+            kept += [self.high - values, values - self.low]
+        return np.concatenate(kept, axis=1)
+
+    def least_slack(self, points: Array) -> Array:
+        """(p,) of the limit that is nearest."""
+        return np.asarray(self.slack(points).min(axis=1))
+
+    def keeps(self, points: Array) -> NDArray[np.bool_]:
+        """(p,) whether points (p, d) keep all limits."""
+        return self.least_slack(points) >= HELD
+
+    # a place to draw back to
+
+    @cached_property
+    def centre(self) -> Array:
+        """(d,) the point whose least slack is greatest, as far as a local search finds it.
+
+        Sequential quadratic programming on max t, slack(x) >= t, from the best constant rate with ramps; if
+        that leaves little room, from the quickest morph too.
+        """
+        tried = np.concatenate([self.waiting((0.0,)), self._even])
+        best = tried[int(np.argmax(self.least_slack(tried)))]
+        centre = self._roomier(best)
+        if self.least_slack(centre[None, :])[0] < NARROW:
+            quick = self.quickest[1]
+            pair = np.stack([centre, quick, self._roomier(quick)])
+            centre = pair[int(np.argmax(self.least_slack(pair)))]
+        centre.setflags(write=False)
+        return centre
+
+    @property
+    def room(self) -> float:
+        """Least slack of the centre: how much the limits leave; negative if there is no schedule at all."""
+        return float(self.least_slack(self.centre[None, :])[0])
+
+    @cached_property
+    def quickest(self) -> tuple[float, Array]:
+        """The least duration, s, in which schedules of these knots keep the limits, and its point (d,).
+
+        As far as a local search finds it: min T, slack_T(x) >= 0. Zero where neither rate nor acceleration is
+        limited. The hinge torque, which takes flights, is not looked at.
+        """
+        tried = np.concatenate([self.waiting((0.0,)), self._even])
+        needed = [self._needed(point) for point in tried]
+        best = int(np.argmin(needed))
+        if needed[best] == 0.0:
+            return 0.0, tried[best]
+        scale = needed[best]
+
+        def slack(x: Array) -> Array:
+            return np.asarray(replace(self, duration_s=scale * x[-1]).slack(x[None, :-1])[0] - 10.0 * HELD)
+
+        def rows(x: Array) -> Array:
+            here = replace(self, duration_s=scale * x[-1])
+            later = replace(self, duration_s=scale * (x[-1] + PROBE)).slack(x[None, :-1])[0]
+            with_time = (later - here.slack(x[None, :-1])[0]) / PROBE
+            return np.concatenate([here.slack_gradient(x[:-1]), with_time[:, None]], axis=1)
+
+        rising = np.append(np.zeros(self.dimension), 1.0)
+        found = _minimised(
+            lambda x: float(x[-1]), lambda _: rising, np.append(tried[best], 1.0), [(slack, rows)]
+        )
+        point = np.clip(found[:-1], self.lower, self.upper)
+        duration = self._needed(point)
+        return (duration, point) if duration < scale else (scale, tried[best])
+
+    @property
+    def _even(self) -> Array:
+        """(1, d) knots at equal times and angles."""
+        return np.tile(np.linspace(0.0, 1.0, self.morph.knots)[1:-1], self.dimension // self.inner)[None, :]
+
+    def _needed(self, point: Array) -> float:
+        """The duration, s, from which on one point keeps the limits; infinite if it never does."""
+        ends = replace(self, duration_s=1e9)
+        if not ends.keeps(point[None, :])[0]:
+            return np.inf
+        shapes, change = self.shapes(point[None, :]), abs(self.morph.change_rad)
+        needed = 0.0
+        if self.limits.max_rate_rad_s is not None:
+            rates = np.concatenate([shapes.turning_rate(), shapes.rate], axis=1)
+            needed = change * float(np.abs(rates).max()) / self.limits.max_rate_rad_s
+        if self.limits.max_accel_rad_s2 is not None:
+            accelerations = np.concatenate([shapes.first, shapes.last], axis=1)
+            squared = change * float(np.abs(accelerations).max()) / self.limits.max_accel_rad_s2
+            needed = max(needed, float(np.sqrt(squared)))
+        return needed * (1.0 + 2.0 * HELD)
+
+    def _roomier(self, start: Array) -> Array:
+        """The point of greatest least slack (d,) near another, or that other."""
+
+        def rows(x: Array) -> Array:
+            gradient = self.slack_gradient(x[:-1])
+            return np.concatenate([gradient, -np.ones((gradient.shape[0], 1))], axis=1)
+
+        def slack(x: Array) -> Array:
+            return np.asarray(self.slack(x[None, :-1])[0] - x[-1])
+
+        raising = np.append(np.zeros(self.dimension), -1.0)
+        first = np.append(start, self.least_slack(start[None, :])[0])
+        found = _minimised(lambda x: -float(x[-1]), lambda _: raising, first, [(slack, rows)])[:-1]
+        pair = np.stack([start, np.clip(found, self.lower, self.upper)])
+        return np.asarray(pair[int(np.argmax(self.least_slack(pair)))])
+
+    def waiting(self, waits: Sequence[float] = WAITS) -> Array:
+        """(p, d) points of schedules that wait, then go at constant rate between ramps to the end.
+
+        As good as a few knots can tell; they need not keep the limits. Fixed values put the knots at equal
+        angles; free ones are put at the corners of the ramps, where the spline has to bend.
+        """
+        points = []
+        even = np.linspace(0.0, 1.0, self.morph.knots)[1:-1]
+        for wait, ramp in product(waits, RAMPS):
+            share = ramp / (1.0 - wait)
+            if share > 0.5:
+                continue
+            time, value = even, even
+            if self.morph.free_values:
+                rest = np.linspace(wait + ramp, 1.0 - ramp, max(self.inner - 1, 1))
+                time = np.concatenate([[wait], rest])[-self.inner :]
+                points.append(np.concatenate([time, _trapezoid((time - wait) / (1.0 - wait), share)]))
+            time = wait + (1.0 - wait) * _trapezoid_time(value, share)
+            points.append(np.concatenate([time, value]) if self.morph.free_values else time)
+        return np.stack(points)
+
+    # maps onto what keeps the limits
+
+    def drawn_back(self, points: Array, anchor: Array | None = None) -> Array:
+        """Points (p, d) on the rays from the anchor (d,), as far out as limits allow, the given ones at most.
+
+        A point that keeps the limits stays. Of the others the ray is walked outward to the last place before
+        the first that breaks a limit, found among RAY_POINTS and then by halving; what is returned has been
+        checked itself. ``anchor`` defaults to the centre and must keep the limits.
+        """
+        held = self.centre if anchor is None else anchor
+        out = points.copy()
+        broken = np.flatnonzero(~self.keeps(points))
+        if broken.size == 0:
+            return out
+        move = points[broken] - held
+        share = np.linspace(0.0, 1.0, RAY_POINTS + 1)[1:]
+        along = held + share[None, :, None] * move[:, None, :]
+        kept = self.keeps(along.reshape(-1, self.dimension)).reshape(broken.size, -1)
+        first_bad = np.argmin(kept, axis=1)  # the last is broken: there is one
+        low = np.where(first_bad > 0, share[first_bad - 1], 0.0)
+        high = share[first_bad]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            good = self.keeps(held + middle[:, None] * move)
+            low, high = np.where(good, middle, low), np.where(good, high, middle)
+        out[broken] = np.where(low[:, None] > 0.0, held + low[:, None] * move, held)
+        return out
+
+    def nearest(self, point: Array, margin: float) -> Array | None:
+        """The point (d,) nearest to one that leaves a margin of all limits; None if none was found."""
+        slack = self.least_slack(point[None, :])[0]
+        if slack >= margin:
+            return point
+        found = self.constrained(
+            lambda x: float((x - point) @ (x - point)), lambda x: 2.0 * (x - point), point, 1.2 * margin
+        )
+        if self.least_slack(found[None, :])[0] >= margin:
+            return found
+        # along the ray to the centre, the first that does
+        share = np.linspace(0.0, 1.0, 4 * RAY_POINTS)[:, None]
+        along = point + share * (self.centre - point)
+        good = np.flatnonzero(self.least_slack(along) >= margin)
+        return along[good[0]] if good.size else None
+
+    def constrained(
+        self,
+        cost: Callable[[Array], float],
+        gradient: Callable[[Array], Array],
+        start: Array,
+        margin: float,
+        more: tuple[Map, Map] | None = None,
+    ) -> Array:
+        """A local minimum (d,) of a smooth cost under the limits, by sequential quadratic programming.
+
+        It keeps the limits to the solver's tolerance only: check or draw back. ``more`` : further slacks and
+        their gradients.
+        """
+        limits: list[tuple[Map, Map]] = [(lambda x: self.slack(x[None, :])[0] - margin, self.slack_gradient)]
+        found = _minimised(cost, gradient, start, limits + ([] if more is None else [more]))
+        return np.clip(found, self.lower, self.upper)
+
+    def slack_gradient(self, point: Array) -> Array:
+        """(m, d) forward differences of the slacks at one point."""
+        probes = point + np.concatenate([np.zeros((1, self.dimension)), PROBE * np.eye(self.dimension)])
+        slack = self.slack(probes)
+        return np.asarray(((slack[1:] - slack[0]) / PROBE).T)
+
+
+def _minimised(
+    cost: Callable[[Array], float], gradient: Map, start: Array, slacks: Sequence[tuple[Map, Map]]
+) -> Array:
+    """A local minimum under slacks that must not be negative, or the start where the solver fails."""
+    constraints = [{"type": "ineq", "fun": slack, "jac": rows} for slack, rows in slacks]
+    found = minimize(  # type: ignore[call-overload]
+        cost,
+        start,
+        jac=gradient,
+        constraints=constraints,
+        method="SLSQP",
+        options={"maxiter": MOST_ITERATIONS, "ftol": TOLERANCE},
+    ).x
+    return found if np.all(np.isfinite(found)) else start
+
+
+def _trapezoid(time: Array, ramp: float) -> Array:
+    """Share of a morph done at shares of its time (k,), at constant rate between ramps."""
+    t = np.clip(time, 0.0, 1.0)
+    rate = 1.0 / (1.0 - ramp)
+    rising, falling = 0.5 * rate / ramp * t**2, 1.0 - 0.5 * rate / ramp * (1.0 - t) ** 2
+    return np.where(t < ramp, rising, np.where(t > 1.0 - ramp, falling, rate * (t - 0.5 * ramp)))
+
+
+def _trapezoid_time(value: Array, ramp: float) -> Array:
+    """The inverse of ``_trapezoid``."""
+    rate = 1.0 / (1.0 - ramp)
+    corner = 0.5 * rate * ramp  # done at the end of the first ramp
+    rising = np.sqrt(2.0 * ramp / rate * np.minimum(value, corner))
+    falling = 1.0 - np.sqrt(2.0 * ramp / rate * np.minimum(1.0 - value, corner))
+    even = 0.5 * ramp + value / rate
+    return np.where(value < corner, rising, np.where(1.0 - value < corner, falling, even))

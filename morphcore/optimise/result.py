@@ -1,0 +1,275 @@
+"""The result of an optimisation: the schedule, what it keeps, and how it compares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import wrap_angle
+from morphcore.optimise.feasible import reached
+from morphcore.optimise.flights import Flown
+from morphcore.optimise.goals import Found
+from morphcore.optimise.settings import Limits, Morph, Weights
+from morphcore.optimise.state import OptimisationState
+from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+
+if TYPE_CHECKING:
+    from morphcore.optimise.optimisation import ScheduleOptimisation
+
+Array = NDArray[np.float64]
+Document = dict[str, Any]
+
+SCHEDULES = ("constant", "rigid_optimum", "optimum")
+MODELS = ("rigid", "equivalent", "flexible")
+ANGLES = ("phi_rad", "theta_rad", "psi_rad")
+
+
+@dataclass(frozen=True)
+class ComparedFlight:
+    """One schedule flown in one model.
+
+    departure : (k, 3) of phi, theta, psi from the start, rad. variation : its sum of squares, rad^2; None if
+    the flight diverged. torque : largest of any hinge, N m; None where it was not computed.
+    """
+
+    departure: Array
+    variation: float | None
+    torque: float | None
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """One duration, s, of the front: its best schedule and variation, beside the constant rate's (rad^2)."""
+
+    duration_s: float
+    schedule: Spline
+    variation: float
+    constant: float | None
+
+
+@dataclass(frozen=True)
+class ScheduleResult:
+    """An optimised morph with its comparison.
+
+    schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
+    of each model, of each schedule; None where it was not flown. front : durations that no other beats in
+    both; searched : all durations that were looked at. partial : the best so far of a run that did not end.
+    """
+
+    morph: Morph
+    limits: Limits
+    weights: Weights
+    best: Found
+    schedules: dict[str, Schedule | None]
+    times_s: Array
+    flights: dict[str, dict[str, ComparedFlight | None]]
+    front: tuple[FrontPoint, ...]
+    searched: tuple[Found, ...]
+    search: Document
+    notes: tuple[str, ...]
+    partial: bool
+
+    @property
+    def schedule(self) -> Spline:
+        """The optimum."""
+        found = self.schedules["optimum"]
+        assert isinstance(found, Spline)  # noqa: S101 - a search makes nothing else
+        return found
+
+    def variation(self, schedule: str, model: str) -> float | None:
+        """Variation of one schedule in one model, rad^2; None where it was not flown."""
+        flown = self.flights[model].get(schedule)
+        return None if flown is None else flown.variation
+
+    def reduction(self, schedule: str = "optimum") -> tuple[float | None, str]:
+        """By how many per cent less than the constant rate's a variation is, and in which model.
+
+        The flexible one if both were flown in it, else the equivalent one.
+        """
+        for model in ("flexible", "equivalent"):
+            constant, other = self.variation("constant", model), self.variation(schedule, model)
+            if constant and other is not None:
+                return 100.0 * (1.0 - other / constant), model
+        return None, "equivalent"
+
+    def to_document(self) -> Document:
+        """JSON form with the names that the API fixes, and more beside."""
+        reduction, model = self.reduction()
+        document: Document = {
+            "schedule": _knots(self.schedule),
+            "limits": vars(self.limits).copy(),
+            "reached": {name: self._reached(name) for name in SCHEDULES},
+            "variation": {
+                name: {model: self.variation(name, model) for model in MODELS} for name in SCHEDULES
+            },
+            "reduction_percent": reduction,
+            "reduction_model": model,
+            "rigid_optimum_reduction_percent": self.reduction("rigid_optimum")[0],
+            "schedules": {name: _schedule_document(found) for name, found in self.schedules.items()},
+            "torque": {
+                name: {model: self._torque(name, model) for model in MODELS[:2]} for name in SCHEDULES
+            },
+            "morph": {name: value for name, value in vars(self.morph).items() if value is not None},
+            "duration_s": self.best.duration_s,
+            "weights": vars(self.weights).copy(),
+            "search": self.search,
+            "partial": self.partial,
+        }
+        if self.morph.goal == "pareto":
+            document["pareto"] = [_front_document(point) for point in self.front]
+        if self.morph.goal != "variation":
+            document["searched"] = [
+                {"duration_s": f.duration_s, "variation_rad2": _number(f.variation)} for f in self.searched
+            ]
+        if self.notes:
+            document["notes"] = list(self.notes)
+        return document
+
+    def curves(self) -> Document:
+        """Time histories for plots and tables: the schedules, and the attitude in every model."""
+        schedules = {}
+        for name, schedule in self.schedules.items():
+            if schedule is not None:
+                motion = schedule.motion(self.times_s)
+                schedules[name] = {
+                    "sweep_rad": motion.angle.tolist(),
+                    "rate_rad_s": motion.rate.tolist(),
+                    "acceleration_rad_s2": motion.acceleration.tolist(),
+                }
+        flights = {
+            model: {name: _attitude(flight) for name, flight in flown.items() if flight is not None}
+            for model, flown in self.flights.items()
+        }
+        return {"time_s": self.times_s.tolist(), "schedules": schedules, "flights": flights}
+
+    def _reached(self, name: str) -> Document | None:
+        schedule = self.schedules[name]
+        if schedule is None:
+            return None
+        model = "rigid" if name == "rigid_optimum" else "equivalent"
+        return vars(reached(schedule)) | {"max_hinge_torque_nm": self._torque(name, model)}
+
+    def _torque(self, schedule: str, model: str) -> float | None:
+        flown = self.flights[model].get(schedule)
+        return None if flown is None else flown.torque
+
+
+def schedule_result(
+    run: ScheduleOptimisation, state: OptimisationState, *, judged: bool = True
+) -> ScheduleResult:
+    """Fly the compared schedules; if ``judged``, with their torques and the front's constant rates too."""
+    best, schedules = run.best(state), run.compared(state)
+    named = {name: schedule for name, schedule in schedules.items() if schedule is not None}
+    flights: dict[str, dict[str, ComparedFlight | None]] = {}
+    benches = {model: run.flights(model, best.duration_s) for model in ("rigid", "equivalent")}
+    for model, bench in benches.items():
+        flown = bench.fly(list(named.values()), torque=judged)
+        flights[model] = {name: _compared(flown, i, judged=judged) for i, name in enumerate(named)}
+    flights["flexible"] = {item.schedule: _verified(item.euler) for item in state.verified}
+    searched = tuple(
+        sorted((f for f in state.found if f.model == "equivalent"), key=lambda item: item.duration_s)
+    )
+    settings = run.search
+    return ScheduleResult(
+        morph=run.morph,
+        limits=run.limits,
+        weights=run.weights,
+        best=best,
+        schedules=schedules,
+        times_s=benches["equivalent"].times_s,
+        flights=flights,
+        front=_front(run, searched, judged=judged) if run.morph.goal == "pareto" else (),
+        searched=searched,
+        search={
+            "method": settings.method,
+            "seed": settings.seed,
+            "unknowns": run.space(best.duration_s).dimension,
+            "flights": state.flights,
+            "generations": state.generation,
+            "wall_s": state.wall_s,
+            "search_s": state.search_s,
+            "verify_s": sum(item.wall_s for item in state.verified),
+            "best_cost": _number(best.cost),
+            "finished": state.phase == "done",
+            "history": list(state.history),
+        },
+        notes=tuple(
+            f"{item.schedule} in the flexible model: {item.failure}"
+            for item in state.verified
+            if item.failure
+        ),
+        partial=state.phase != "done",
+    )
+
+
+def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
+    """The durations that none beats: every shorter one varies more."""
+    front: list[FrontPoint] = []
+    for item in searched:
+        if not item.feasible or (front and item.variation >= front[-1].variation):
+            continue
+        constant = None
+        if judged:
+            flown = run.flights("equivalent", item.duration_s).fly(
+                [run.constant(item.duration_s)], torque=False
+            )
+            constant = None if flown.diverged[0] else float(flown.variation[0])
+        schedule = run.space(item.duration_s).schedule(item.point)
+        front.append(FrontPoint(item.duration_s, schedule, item.variation, constant))
+    return tuple(front)
+
+
+def _compared(flown: Flown, i: int, *, judged: bool) -> ComparedFlight:
+    lost = bool(flown.diverged[i])
+    return ComparedFlight(
+        flown.departure[i],
+        None if lost else float(flown.variation[i]),
+        _number(flown.peak_torque[i]) if judged and not lost else None,
+    )
+
+
+def _verified(euler: Array) -> ComparedFlight | None:
+    if euler.size == 0:
+        return None
+    departure = wrap_angle(euler - euler[:1])
+    return ComparedFlight(departure, float(np.sum(departure**2)), None)
+
+
+def _attitude(flight: ComparedFlight) -> Document:
+    return {name: column.tolist() for name, column in zip(ANGLES, flight.departure.T, strict=True)}
+
+
+def _knots(schedule: Spline) -> Document:
+    return {
+        "knot_time_s": schedule.knot_time_s.tolist(),
+        "knot_sweep_rad": schedule.knot_angle_rad.tolist(),
+    }
+
+
+def _schedule_document(schedule: Schedule | None) -> Document | None:
+    """A schedule as requests have it."""
+    if isinstance(schedule, ConstantRate):
+        return {"kind": "constant_rate", **vars(schedule)}
+    if isinstance(schedule, Spline):
+        return {
+            "kind": "spline",
+            "knot_time_s": schedule.knot_time_s.tolist(),
+            "knot_angle_rad": schedule.knot_angle_rad.tolist(),
+        }
+    return None
+
+
+def _front_document(point: FrontPoint) -> Document:
+    return {
+        "duration_s": point.duration_s,
+        "variation_rad2": point.variation,
+        "constant_rad2": point.constant,
+        "schedule": _knots(point.schedule),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
