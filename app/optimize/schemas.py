@@ -10,13 +10,19 @@ from app.identify.schemas import MAX_SEED, WEEK_S
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
-from app.schemas.lattice import Lattice
+from app.schemas.lattice import Lattice, StepS
 from app.schemas.parameters import EXAMPLE_PARAMETERS, KnownModel
 from app.simulate.schemas import MAX_ELEMENTS
 
 LONGEST_MORPH_S = 100.0
 
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
+
+
+class SearchedModel(KnownModel):
+    """The equivalent model that is searched with."""
+
+    step_s: StepS | None = None
 
 
 class Morph(Strict):
@@ -111,7 +117,7 @@ class OptimizeRequest(Strict):
 
     aircraft: Aircraft
     flight: Flight
-    model: KnownModel
+    model: SearchedModel
     morph: Morph
     limits: Limits = Limits()
     weights: Weights = Weights()
@@ -186,7 +192,8 @@ class OptimizeResult(BaseModel):
     limits: KeptLimits
     variation: Variations
     reduction_percent: float | None = Field(
-        description="Of the variation against constant rate, in the best model in which both were flown."
+        description="Of the variation against constant rate, in the flexible model where both were flown in "
+        "it, else in the equivalent one."
     )
     search: dict[str, Any]
     partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from app.schemas.fields import Identifier, Strict
-from app.schemas.lattice import FlightStepS, Lattice, Start
+from app.schemas.lattice import FlightStepS, Lattice, Start, StepS
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -58,7 +58,7 @@ class Parameters(Strict):
     )
     aero: Corrections
     lattice: Lattice | None = Field(default=None, description="With which the model was identified.")
-    step_s: FlightStepS | None = None
+    step_s: StepS | None = None
     start: Start | None = None
 
 

@@ -71,11 +71,16 @@ def test_a_flight_is_summed_up(service: RunningService, page: Page) -> None:
 
 def test_schedules_are_compared(service: RunningService, page: Page) -> None:
     """Each schedule in each model, the optimum marked, what it gains, and its knots."""
-    result = {**OPTIMIZE_RESULT, "pareto": [{"duration_s": 1.5, "variation_rad2": 0.9}]}
+    front = [{"duration_s": 1.5, "variation_rad2": 0.9, "constant_rad2": 1.1}]
+    reached = {"optimum": {"max_rate_rad_s": 0.98, "max_accel_rad_s2": 3.0, "max_hinge_torque_nm": None}}
+    result = {**OPTIMIZE_RESULT, "reached": reached, "reduction_model": "equivalent", "pareto": front}
     text = shown(page, service, ended(service, "optimize", optimize_document(), result))
     assert "to 1 rad in 2 s, 2 links, hybrid" in text
     assert page.locator("tr.marked td").all_inner_texts() == ["optimum", "0.72", "0.6", "–"]
-    assert "25 per cent less" in text
+    assert "25 per cent less than the constant rate, flown in the equivalent model" in text
+    assert "Largest rate, rad/s\n0.98 of 1\n" in text
+    assert "Largest acceleration, rad/s²\n3\n" in text
+    assert "torque" not in text, "nothing is told that is not known"
     assert page.get_by_role("heading", name="Duration against variation").is_visible()
 
 

@@ -38,3 +38,12 @@ def test_simulate_client(live_service: LiveService, examples: Path, tmp_path: Pa
     assert saved(tmp_path)["model"]["kind"] == "flexible"
     assert len((tmp_path / "flight.csv").read_text().splitlines()) == 1 + 101
     assert "<svg" in (tmp_path / "flight.svg").read_text()[:2000]
+
+
+def test_optimize_client(live_service: LiveService, examples: Path, tmp_path: Path) -> None:
+    """A model is identified, and the schedule found with it varies less than the constant rate."""
+    script = str(examples / "clients" / "optimize_httpx.py")
+    printed = run_client([sys.executable, script], live_service, tmp_path)
+    variation = saved(tmp_path)["variation"]
+    assert variation["optimum"]["equivalent"] < variation["constant"]["equivalent"]
+    assert "rigid_optimum" in printed

@@ -95,19 +95,37 @@ function simulateCards(result) {
 const SCHEDULES = [["constant", "constant rate"], ["rigid_optimum", "optimum of the rigid model"], ["optimum", "optimum"]];
 const FLOWN_IN = ["rigid", "equivalent", "flexible"];
 
+/* What the optimum reaches of each limit, and the limit itself. */
+const LIMITS = [["max_rate_rad_s", "Largest rate, rad/s"], ["max_accel_rad_s2", "Largest acceleration, rad/s²"], ["max_hinge_torque_nm", "Largest hinge torque, N m"]];
+
+function limitFacts(result) {
+  const reached = result.reached?.optimum ?? {};
+  return LIMITS.filter(([name]) => reached[name] !== null && reached[name] !== undefined).map(([name, title]) => {
+    const limit = result.limits[name];
+    return [title, show.number(reached[name]) + (limit === null || limit === undefined ? "" : ` of ${show.number(limit)}`)];
+  });
+}
+
+function reductionSentence(result) {
+  const reduction = result.reduction_percent;
+  if (reduction === null || reduction === undefined) return null;
+  const where = result.reduction_model ? `, flown in the ${result.reduction_model} model` : "";
+  return element("p", {}, `The optimum varies ${show.number(Math.abs(reduction))} per cent ${reduction < 0 ? "more" : "less"} than the constant rate${where}.`);
+}
+
 function optimizeCards(result) {
   const rows = SCHEDULES.filter(([name]) => result.variation[name]).map(([name, title]) => [title, ...FLOWN_IN.map((model) => show.number(result.variation[name][model]))]);
   const titles = ["Schedule", ...FLOWN_IN.map((model) => number(`flown in the ${model} model`))];
-  const reduction = result.reduction_percent;
-  const sentence = reduction === null || reduction === undefined ? null : element("p", {}, `The optimum varies ${show.number(Math.abs(reduction))} per cent ${reduction < 0 ? "more" : "less"} than the constant rate.`);
+  const marked = rows.findIndex(([title]) => title === "optimum");
   const knots = result.schedule.knot_time_s.map((time, i) => [String(i + 1), show.number(time), show.number(result.schedule.knot_sweep_rad[i])]);
+  const notes = (result.notes ?? []).map((note) => element("p", { class: "soft" }, note));
   const cards = [
-    card("Attitude variation, rad²", table(titles, rows, rows.findIndex(([title]) => title === "optimum")), sentence),
-    card("Schedule", narrow(table(["Knot", "time, s", "sweep, rad"].map(number), knots))),
+    card("Attitude variation, rad²", table(titles, rows, marked), reductionSentence(result), ...notes),
+    card("Schedule", narrow(table(["Knot", "time, s", "sweep, rad"].map(number), knots)), facts(limitFacts(result))),
   ];
   if (result.pareto?.length) {
-    const front = result.pareto.map((point) => [show.number(point.duration_s), show.number(point.variation_rad2)]);
-    cards.push(card("Duration against variation", narrow(table(["duration, s", "variation, rad²"].map(number), front))));
+    const front = result.pareto.map((point) => [point.duration_s, point.variation_rad2, point.constant_rad2].map((value) => show.number(value)));
+    cards.push(card("Duration against variation", narrow(table(["duration, s", "variation, rad²", "at constant rate, rad²"].map(number), front))));
   }
   return cards;
 }

@@ -62,6 +62,19 @@ def parameters() -> Document:
     }
 
 
+def optimisation(**parts: Any) -> Document:
+    """Ask for a small optimisation on a coarse lattice, of a short morph with one knot to place."""
+    return {
+        **vehicle(),
+        "model": {"parameters": parameters(), "lattice": COARSE},
+        "morph": {"final_rad": 0.5, "duration_s": 0.8, "knots": 3, "settle_s": 0.2},
+        "limits": {"max_rate_rad_s": 1.2},
+        "search": {"particles": 4, "generations": 2, "seed": 1},
+        "verify": "none",
+        **parts,
+    }
+
+
 @dataclass
 class RealWorker:
     """A job store and a worker of this process that runs the library."""

@@ -1,0 +1,23 @@
+"""The operation ``optimize``: the morph schedule that disturbs the attitude least."""
+
+from __future__ import annotations
+
+from morphcore.export.schedule_tables import schedule_tables
+from morphcore.optimise import ScheduleResult, optimisation_from_document
+from worker.operations import Document
+from worker.operations.library_work import SearchWork, library_errors
+
+
+def begin(request: Document, threads: int) -> SearchWork[ScheduleResult]:
+    """Check the request and prepare the searches.
+
+    Raises
+    ------
+    WorkRefused : the request cannot be flown, or no schedule keeps its limits.
+    """
+    with library_errors():
+        return SearchWork(optimisation_from_document(request, threads=threads), _files)
+
+
+def _files(result: ScheduleResult, _document: Document) -> dict[str, bytes]:
+    return schedule_tables(result.curves())
