@@ -9,6 +9,7 @@ from __future__ import annotations
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
 from morphcore.identify import Identification, IdentifyResult, identification_from_document, identify
 from morphcore.identify.study import study
+from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.warming import warm_up
@@ -25,6 +26,7 @@ __all__ = [
     "load_aircraft",
     "load_flight",
     "load_trajectory",
+    "optimise_schedule",
     "simulate",
     "study",
     "warm_up",
