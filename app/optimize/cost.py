@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from app.identify.cost import REAL_TIME_FACTOR
 from app.optimize.schemas import OptimizeRequest, ScheduleCost
 from app.simulate.cost import DEFAULT_STEP_S, STEP_CORE_S
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
-SWARM_PARTICLES, SWARM_GENERATIONS = 50, 200
-SCREEN, DESCENT_STARTS, DESCENT_ITERATIONS = 16, 3, 25
+SWARM_PARTICLES, SWARM_GENERATIONS = 50, 100
+SCREEN, DESCENT_STARTS, DESCENT_ITERATIONS = 16, 3, 8
+REAL_TIME_FACTOR = 150.0  # on one core: every flight has a schedule, and so a lattice over time, of its own
 SEARCHES = 2  # with the rigid model too
 COMPARED_SCHEDULES = 3  # constant rate and both optima
 DURATIONS_TRIED = 10  # on the way to the least time
