@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ EXIT_CODES = (
     "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 input refused, 4 cancelled or out of time, 5 no service, "
     "6 machine not ready, 130 Ctrl-C."
 )
+HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters of an identified model
 DEFAULT_URL = "http://127.0.0.1:8000"
 
 # groups of options, as a command's help shows them
@@ -114,7 +116,11 @@ def put_known_model(request: Request, parameters: Path | None, model_id: str | N
             "or --model-id",
         )
     if parameters is not None:
-        request.put("/model/parameters", _parameters_in(parameters), f"--parameters {parameters}")
+        found = _parameters_in(parameters)
+        request.put("/model/parameters", found, f"--parameters {parameters}")
+        # told outright, so that one option (`--core smoothed`) changes that alone
+        for name in HOW_IDENTIFIED:
+            request.put(f"/model/{name}", deepcopy(found.get(name)), f"--parameters {parameters}")
         return
     if url is None:
         raise CommandError(

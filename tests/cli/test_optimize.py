@@ -15,7 +15,7 @@ from cli.main import app
 from morphcore import load_trajectory
 from morphcore.simulate.schedule import Spline
 from morphcore.simulate.schedule_table import load_schedule_csv
-from tests.cli.command_lines import COARSE, PARAMETERS, command, parameters_file
+from tests.cli.command_lines import PARAMETERS, command, parameters_file
 from tests.cli.played_service import Play, PlayedService
 from tests.live import LiveService
 
@@ -36,8 +36,12 @@ RESULT: dict[str, Any] = {
     "notes": ["optimum in the flexible model: it diverged"],
     "search": {},
 }
+LATTICE = {**PARAMETERS["lattice"], "core": {"law": "smoothed"}}  # the identified one, with this core
 MORPH = ("--final", "1", "--duration", "2")
-QUICK = ("--method", "pso", "--particles", "4", "--generations", "1", "--seed", "2", "--knots", "4")
+QUICK = (
+    *("--method", "pso", "--particles", "4", "--generations", "1", "--seed", "2"),
+    *("--knots", "4", "--settle", "0.2", "--rate-limit", "1", "--verify", "none"),
+)
 
 
 def test_the_choices_reach_the_service(tmp_path: Path, play: Play) -> None:
@@ -62,7 +66,7 @@ def test_the_choices_reach_the_service(tmp_path: Path, play: Play) -> None:
             "max_hinge_torque_nm": 900.0,
             "monotonic": False,
         },
-        "model": {"parameters": PARAMETERS, "start": "given", "lattice": {"core": {"law": "smoothed"}}},
+        "model": {"parameters": PARAMETERS, "start": "given", "lattice": LATTICE},
         "morph": {
             "initial_rad": 0.1,
             "final_rad": 1.0,
@@ -111,18 +115,7 @@ def test_the_written_schedule_is_the_spline(tmp_path: Path, play: Play) -> None:
 def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:
     """In this process a schedule is found within its limit, and `morphid simulate` flies what was written."""
     model, out, best = parameters_file(tmp_path), tmp_path / "schedule.csv", tmp_path / "best.json"
-    words = (
-        *MORPH,
-        *QUICK,
-        "--settle",
-        "0.2",
-        "--rate-limit",
-        "1",
-        "--verify",
-        "none",
-        "--parameters",
-        model,
-    )
+    words = (*MORPH, *QUICK, "--parameters", model)
     ended = RUNNER.invoke(app, command("optimize", *words, "--out", out, "--json", best))
     assert ended.exit_code == Exit.OK, ended.output
     result = json.loads(best.read_text())
@@ -136,9 +129,10 @@ def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:
     assert ended.exit_code == Exit.OK, ended.output
     trajectory = load_trajectory(flown)
     assert trajectory.time_s[-1] == pytest.approx(2.2)
-    # the file's rows are 10 ms apart, the spline is not: its variation comes back within 0.1 per cent
+    # one per cent: `simulate` trims with the hinge as it is at the first moment, which a spline accelerates;
+    # the search trims before the morph
     again = json.loads(ended.stdout)["summary"]["variation_rad2"]
-    assert again == pytest.approx(variation["optimum"]["equivalent"], rel=1e-3)
+    assert again == pytest.approx(variation["optimum"]["equivalent"], rel=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +143,7 @@ def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:
         ("--parameters nowhere.json", Exit.INVALID_INPUT, "there is no file nowhere.json"),
         ("--parameters M --weights 1,2", Exit.USAGE, "--weights 1,1,1"),
         ("--parameters M --weights 0,0,0", Exit.INVALID_INPUT, "given by --weights 0,0,0"),
-        ("--parameters M --rate-limit 0.4", Exit.INVALID_INPUT, "--"),
+        ("--parameters M --rate-limit 0.4", Exit.INVALID_INPUT, "given by --"),
         ("--parameters M --final 3", Exit.INVALID_INPUT, "given by --final 3"),
         ("--parameters M --knots 1", Exit.INVALID_INPUT, "given by --knots 1"),
         ("--parameters M --goal minimum_time", Exit.INVALID_INPUT, "max_variation"),
@@ -169,7 +163,7 @@ def test_what_is_wrong_is_said_with_its_option(tmp_path: Path, words: str, code:
 def test_the_service_finds_the_same(live_service: LiveService, tmp_path: Path) -> None:
     """The same command in this process and at the service gives the same schedule: same seed, same answer."""
     found = {}
-    words = (*MORPH, *QUICK, "--settle", "0.2", "--rate-limit", "1", "--verify", "none", *COARSE)
+    words = (*MORPH, *QUICK)
     for name, more in (("here", ()), ("there", ("--url", live_service.url))):
         out = tmp_path / f"{name}.json"
         model = ("--parameters", parameters_file(tmp_path), "--json", out)
