@@ -10,9 +10,9 @@ from morphcore.optimise.settings import Morph, ScheduleSearch
 from morphcore.optimise.state import OptimisationState
 
 # seconds that parts of the work take on the machine it was written on: their ratios make the fraction
-SEARCH_COST_S = 5.0
+SEARCH_COST_S = 3.5
 PARTICLE_COST_S = 0.015
-FLEXIBLE_COST_S = 10.0  # for each second flown
+FLEXIBLE_COST_S = 1.5  # for each second flown
 FLEXIBLE_FLIGHTS = 3
 
 

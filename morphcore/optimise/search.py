@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.optimise.descent import DescentState, first_descent, next_descent
+from morphcore.optimise.ease import EaseState, next_ease
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.limits import MorphSpace
 from morphcore.optimise.settings import ScheduleSearch, Weights
@@ -26,8 +27,6 @@ Phase = Literal["baseline", "ease", "screen", "swarm", "polish", "done"]
 
 # the field of starts narrows as the descent goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((5, 1.0), (10, 0.5))
-EASE_TARGET = 0.95  # of the torque limit: what lies above is lowered
-EASE_ITERATIONS = 12
 USUAL_ITERATIONS = 8  # of a descent: for the progress that is shown
 
 
@@ -54,6 +53,7 @@ class SearchState:
     budget_s: float | None = None
     swarm: SwarmState | None = field(default=None, repr=False)
     descent: DescentState | None = field(default=None, repr=False)
+    ease: EaseState | None = field(default=None, repr=False)
 
     @property
     def feasible(self) -> bool:
@@ -97,49 +97,46 @@ class SearchRun:
         points = np.concatenate([self.space.centre[None, :], self.space.drawn_back(state.warm)])
         trials = self._fly(points, stop)
         good = self.limit.keeps(trials.peak)
-        if not good.any():
-            rows = np.argsort(np.nan_to_num(trials.peak, nan=np.inf), kind="stable")[:1]
-            eased = self._excess(trials)
-            return replace(
-                state,
-                phase="ease",
-                anchor_cost=float(trials.cost[rows[0]]),
-                anchor_torque=float(trials.peak[rows[0]]),
-                descent=first_descent(points[rows], eased.select(rows)),
-            )
-        return self._started(state, points[good], trials.select(good))
+        if good.any():
+            return self._started(state, points[good], trials.select(good))
+        more = self.space.drawn_back(self.space.waiting())
+        flown = self._fly(more, stop)
+        peaks = np.append(trials.peak, flown.peak)
+        lowest = int(np.argmin(np.where(np.isfinite(peaks), peaks, np.inf)))
+        point = np.concatenate([points, more])[lowest]
+        cost = float(np.append(trials.cost, flown.cost)[lowest])
+        eased = EaseState(point, float(peaks[lowest]))
+        return self._eased(replace(state, phase="ease", ease=eased, anchor_cost=cost), eased, stop)
 
     def _ease(self, state: SearchState, stop: Stop | None) -> SearchState:
-        """One step of descent on the torque above its limit; done, without a schedule, if it ends there."""
-        before = state.descent
-        assert before is not None  # noqa: S101 - the phase says so
-        after = next_descent(
-            before, self.space, TorqueLimit(None), lambda points: self._excess(self._fly(points, stop)), 1
-        )
-        if bool(self.limit.keeps(after.torque)[0]):
-            return self._started(state, after.point, self._fly(after.point, stop))
-        over = not after.active.any() or after.iteration >= EASE_ITERATIONS
-        return replace(
-            state, phase="done" if over else "ease", descent=after, anchor_torque=float(after.torque[0])
-        )
+        """One step of lowering the torque; done, without a schedule, if it falls no further."""
+        assert state.ease is not None  # noqa: S101 - the phase says so
+        after = next_ease(state.ease, self.space, lambda points: self._fly(points, stop))
+        return self._eased(state, after, stop)
+
+    def _eased(self, state: SearchState, after: EaseState, stop: Stop | None) -> SearchState:
+        """The search begins where the torque keeps its limit."""
+        if bool(self.limit.keeps(np.array([after.peak]))[0]):
+            points = after.point[None, :]
+            return self._started(replace(state, ease=None), points, self._fly(points, stop))
+        phase: Phase = "done" if after.over else "ease"
+        return replace(state, phase=phase, ease=after, anchor_torque=after.peak)
 
     def _started(self, state: SearchState, points: Array, trials: Trials) -> SearchState:
         """After flights that keep all limits: what comes next, and from where."""
         best = int(np.argmin(trials.cost))
         phase: Phase = "swarm" if self.settings.method == "pso" else "screen"
-        warm_starts = phase == "screen" and points.shape[0] > 1
-        started = replace(
+        return replace(
             state,
-            phase="polish" if warm_starts else phase,
+            phase=phase,
             best=points[best],
             best_cost=float(trials.cost[best]),
             best_torque=float(trials.peak[best]),
             anchor=points[0],
             anchor_cost=float(trials.cost[0]),
             anchor_torque=float(trials.peak[0]),
-            descent=first_descent(points, trials) if warm_starts else None,
+            descent=first_descent(points, trials),
         )
-        return started if self.space.dimension else replace(started, phase="done")
 
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly schedules that wait and go, and random ones; choose the descent's starts among them."""
@@ -151,10 +148,11 @@ class SearchRun:
         points = np.concatenate([space.waiting(), points])
         points, trials = self._kept(state, space.drawn_back(points), stop)
         order = np.argsort(trials.cost, kind="stable")[: self.settings.starts - 1]
-        starts = np.concatenate([state.anchor[None, :], points[order]])
+        first = state.descent
+        assert first is not None  # noqa: S101 - the phase says so
+        starts = np.concatenate([first.point, points[order]])
         flown = Trials.known(
-            np.append(state.anchor_cost, trials.cost[order]),
-            np.append(state.anchor_torque, trials.peak[order]),
+            np.append(first.cost, trials.cost[order]), np.append(first.torque, trials.peak[order])
         )
         found = self._bettered(state, points, trials)
         return replace(found, phase="polish", descent=first_descent(starts, flown))
@@ -207,14 +205,6 @@ class SearchRun:
         held = Trials.known(np.full(count, state.anchor_cost), np.full(count, state.anchor_torque))
         anchors = np.tile(state.anchor, (count, 1))
         return self.limit.kept(self.space, points, anchors, held, lambda x: self._fly(x, stop))
-
-    def _excess(self, trials: Trials) -> Trials:
-        """The same flights, with the torque above the target as errors."""
-        most = self.limit.most_nm or 1.0
-        errors = np.maximum(np.abs(trials.torque) / most - EASE_TARGET, 0.0)
-        errors = np.where(np.isfinite(errors), errors, 1e3)
-        cost = np.einsum("pm,pm->p", errors, errors)
-        return Trials(errors, cost, np.zeros((cost.size, 0)), trials.peak)
 
     def _bettered(self, state: SearchState, points: Array, trials: Trials) -> SearchState:
         best = int(np.argmin(trials.cost))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.checkpoint import pack, unpack
 from morphcore.optimise.descent import DescentState
+from morphcore.optimise.ease import EaseState
 from morphcore.optimise.goals import Found, Task
 from morphcore.optimise.search import SearchState
 from morphcore.swarm import SwarmState
@@ -82,7 +83,12 @@ def _state(tree: dict[str, Any]) -> OptimisationState:
 
 
 def _search(tree: dict[str, Any]) -> SearchState:
-    swarm, descent = tree.pop("swarm"), tree.pop("descent")
+    swarm, descent, ease = tree.pop("swarm"), tree.pop("descent"), tree.pop("ease")
     if swarm is not None:
         swarm = SwarmState(**swarm | {"random": tuple(swarm["random"])})
-    return SearchState(**tree, swarm=swarm, descent=None if descent is None else DescentState(**descent))
+    return SearchState(
+        **tree,
+        swarm=swarm,
+        descent=None if descent is None else DescentState(**descent),
+        ease=None if ease is None else EaseState(**ease),
+    )
