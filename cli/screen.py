@@ -221,5 +221,7 @@ def progress_detail(progress: Document) -> str:
 
 
 def short(value: float | None) -> str:
-    """Give a number with three digits, nothing for None."""
-    return "" if value is None else f"{value:.3g}"
+    """Give a number with three digits, thousands in full, nothing for None."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e4 else f"{value:.3g}"

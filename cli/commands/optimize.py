@@ -19,7 +19,7 @@ from cli.screen import reports_errors, short, stdout
 
 MODELS = ("rigid", "equivalent", "flexible")
 SCHEDULES = {"constant": "constant rate", "rigid_optimum": "rigid optimum", "optimum": "optimum"}
-REACHED = {"max_rate_rad_s": "rate", "max_accel_rad_s2": "accel", "max_hinge_torque_nm": "torque"}
+REACHED = {"max_rate_rad_s": "rad/s", "max_accel_rad_s2": "rad/s²", "max_hinge_torque_nm": "N m"}
 ROW_STEP_S = 0.01  # of the written schedule, as the example flights
 
 morph_option = partial(typer.Option, rich_help_panel="Morph")
@@ -194,7 +194,7 @@ def variation_table(result: Mapping[str, Any]) -> Table:
     """Compare the schedules: attitude variation (rad^2) in the models that flew them, and what they reach."""
     reduction, model = result.get("reduction_percent"), result.get("reduction_model")
     table = Table(
-        title="Attitude variation in rad²; largest rate, acceleration and hinge torque in rad, s, N m",
+        title="Attitude variation in rad²; largest rate, acceleration, torque",
         caption=None
         if reduction is None
         else f"optimum: {reduction:.1f} % below constant rate ({model} model)",
@@ -228,7 +228,7 @@ def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
 
 def knot_table(schedule: Mapping[str, Sequence[float]]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
-    table = Table(title="Schedule: knots of a clamped cubic spline", box=SIMPLE_HEAD)
+    table = Table(title="Knots of the spline", box=SIMPLE_HEAD)
     table.add_column("time, s", justify="right")
     table.add_column("sweep, rad", justify="right")
     for time_s, sweep_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
