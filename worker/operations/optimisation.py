@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from morphcore.export.schedule_plots import schedule_plots
 from morphcore.export.schedule_tables import schedule_tables
 from morphcore.optimise import ScheduleResult, optimisation_from_document
 from worker.operations import Document
@@ -19,5 +20,6 @@ def begin(request: Document, threads: int) -> SearchWork[ScheduleResult]:
         return SearchWork(optimisation_from_document(request, threads=threads), _files)
 
 
-def _files(result: ScheduleResult, _document: Document) -> dict[str, bytes]:
-    return schedule_tables(result.curves())
+def _files(result: ScheduleResult, document: Document) -> dict[str, bytes]:
+    curves = result.curves()
+    return {**schedule_plots(document, curves), **schedule_tables(curves)}

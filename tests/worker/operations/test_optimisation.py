@@ -18,6 +18,7 @@ from worker.attempt import Ending
 from worker.operations import WorkRefused, find_operation
 
 TABLES = {"schedule.csv", "schedules.csv", "departures.csv"}
+PICTURES = {f"{name}.{kind}" for name in ("schedules", "departures") for kind in ("svg", "png")}
 
 
 def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Path) -> None:
@@ -31,7 +32,7 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
     assert result.variation.optimum.equivalent <= result.variation.constant.equivalent
     assert result.variation.optimum.flexible is None
     files = worker.files(job_id)
-    assert {"result.json", *TABLES} <= set(files)
+    assert set(files) == {"result.json", *TABLES, *PICTURES}
     path = tmp_path / "schedule.csv"
     path.write_bytes(files["schedule.csv"])
     left = load_schedule_csv(path)["left"]
