@@ -15,6 +15,7 @@ from cli.commands.identify import identify
 from cli.commands.jobs import jobs
 from cli.commands.optimize import optimize
 from cli.commands.options import EXIT_CODES
+from cli.commands.paper import paper
 from cli.commands.serve import serve
 from cli.commands.simulate import simulate
 from cli.commands.study import study
@@ -26,7 +27,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-for command in (serve, identify, study, simulate, optimize, bench):
+for command in (serve, identify, study, simulate, optimize, paper, bench):
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(jobs, name="jobs")
 app.add_typer(database, name="db")

@@ -135,6 +135,8 @@ def hand_over(
     plots : folder of plots and curves.
     """
     if answer.result is not None:
+        if answer.result.get("partial"):
+            stderr().print("ended before its end: this is the best so far")
         if json_out == STANDARD_OUTPUT:
             print_json(answer.result)
         else:
