@@ -42,12 +42,16 @@ class ComparedFlight:
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """One duration, s, of the front: its best schedule and variation, beside the constant rate's (rad^2)."""
+    """One duration, s: its best schedule and variation, beside the constant rate's (rad^2).
+
+    ``beaten`` : a shorter morph varies no more. ``constant`` : None where it was not flown, or diverged.
+    """
 
     duration_s: float
     schedule: Spline
     variation: float
     constant: float | None
+    beaten: bool
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,8 @@ class ScheduleResult:
     """An optimised morph with its comparison.
 
     schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
-    of each model, of each schedule; None where it was not flown. front : durations that no other beats in
-    both; searched : all durations that were looked at. partial : the best so far of a run that did not end.
+    of each model, of each schedule; None where it was not flown. front : all durations
+    that were looked at, rising. partial : the best so far of a run that did not end.
     """
 
     morph: Morph
@@ -67,7 +71,6 @@ class ScheduleResult:
     times_s: Array
     flights: dict[str, dict[str, ComparedFlight | None]]
     front: tuple[FrontPoint, ...]
-    searched: tuple[Found, ...]
     search: Document
     notes: tuple[str, ...]
     partial: bool
@@ -119,11 +122,9 @@ class ScheduleResult:
             "partial": self.partial,
         }
         if self.morph.goal == "pareto":
-            document["pareto"] = [_front_document(point) for point in self.front]
+            document["pareto"] = [_front_document(point) for point in self.front if not point.beaten]
         if self.morph.goal != "variation":
-            document["searched"] = [
-                {"duration_s": f.duration_s, "variation_rad2": _number(f.variation)} for f in self.searched
-            ]
+            document["searched"] = [_front_document(point) | {"beaten": point.beaten} for point in self.front]
         if self.notes:
             document["notes"] = list(self.notes)
         return document
@@ -181,8 +182,7 @@ def schedule_result(
         schedules=schedules,
         times_s=benches["equivalent"].times_s,
         flights=flights,
-        front=_front(run, searched, judged=judged) if run.morph.goal == "pareto" else (),
-        searched=searched,
+        front=_front(run, searched, judged=judged) if run.morph.goal != "variation" else (),
         search={
             "method": settings.method,
             "seed": settings.seed,
@@ -206,10 +206,11 @@ def schedule_result(
 
 
 def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
-    """The durations that none beats: every shorter one varies more."""
+    """All durations with a schedule; those that none beats are those that vary less than all shorter ones."""
     front: list[FrontPoint] = []
+    least = np.inf
     for item in searched:
-        if not item.feasible or (front and item.variation >= front[-1].variation):
+        if not item.feasible:
             continue
         constant = None
         if judged:
@@ -218,7 +219,9 @@ def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bo
             )
             constant = None if flown.diverged[0] else float(flown.variation[0])
         schedule = run.space(item.duration_s).schedule(item.point)
-        front.append(FrontPoint(item.duration_s, schedule, item.variation, constant))
+        beaten = item.variation >= least
+        front.append(FrontPoint(item.duration_s, schedule, item.variation, constant, beaten))
+        least = min(least, item.variation)
     return tuple(front)
 
 
