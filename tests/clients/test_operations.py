@@ -22,6 +22,7 @@ def saved(folder: Path) -> dict[str, Any]:
     return result
 
 
+@pytest.mark.slow
 def test_study_client(live_service: LiveService, examples: Path, tmp_path: Path) -> None:
     """Three models are compared, one is recommended and kept."""
     script = str(examples / "clients" / "study_httpx.py")
@@ -40,6 +41,7 @@ def test_simulate_client(live_service: LiveService, examples: Path, tmp_path: Pa
     assert "<svg" in (tmp_path / "flight.svg").read_text()[:2000]
 
 
+@pytest.mark.slow
 def test_optimize_client(live_service: LiveService, examples: Path, tmp_path: Path) -> None:
     """A model is identified, and the schedule found with it varies less than the constant rate."""
     script = str(examples / "clients" / "optimize_httpx.py")

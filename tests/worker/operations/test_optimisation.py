@@ -47,7 +47,8 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
 
 def test_schedules_are_flown_in_the_flexible_model(worker: RealWorker) -> None:
     """With verification every schedule is flown in the flexible model too, and judged there."""
-    request = optimisation(verify="flexible", flexible={"elements": 2, "lattice": COARSE})
+    morph = {"final_rad": 0.3, "duration_s": 0.4, "knots": 3, "settle_s": 0.1}
+    request = optimisation(morph=morph, verify="flexible", flexible={"elements": 2, "lattice": COARSE})
     job_id = worker.add("optimize", request)
     assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
     document = worker.result(job_id)
