@@ -1,0 +1,17 @@
+"""Every table and figure of the paper, made anew with our own flexible model as the truth."""
+
+from __future__ import annotations
+
+from morphcore.paper.paper import paper_runner
+from morphcore.paper.report.report import summary_document, write_report
+from morphcore.paper.settings import PaperSettings
+from morphcore.paper.stages import StageRunner, StageStep
+
+__all__ = [
+    "PaperSettings",
+    "StageRunner",
+    "StageStep",
+    "paper_runner",
+    "summary_document",
+    "write_report",
+]

@@ -1,0 +1,158 @@
+"""The stage "computation" (Table 2): what one flight costs in each model, on one core, one at a time.
+
+The models take turns, flight by flight, so that a machine that slows down slows all of them; medians are
+kept. What is compared is the time that the processor spends on the flight's thread, which other programs on
+the machine hardly change; the wall's stands beside it. ``flight_steps`` of any model reports once before it
+begins to fly: what comes before is called preparation (lattice along the morph, or its first one, and trim),
+what comes after flight.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from morphcore.bench import benchmark_swarm
+from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
+from morphcore.models.equivalent import ParameterBatch, chain_model
+from morphcore.models.parameters_document import parameters_from_document
+from morphcore.paper.scenario import LINKS, PaperFlight, aircraft, flight, paper_flights, two_second_flight
+from morphcore.paper.settings import PaperSettings
+from morphcore.paper.stages import Progress, Results, Work
+from morphcore.simulate.flight import ModelChoice, flight_steps
+from morphcore.simulate.trajectory import Trajectory
+from morphcore.threads import one_blas_thread, thread_count, use_threads
+
+Document = dict[str, Any]
+
+MODELS = ("rigid", "equivalent", "flexible")
+BATCH_ROUNDS = 3
+TIMES = ("prepare_s", "fly_s", "total_s", "wall_s")
+
+
+def computation_inputs(settings: PaperSettings) -> Document:
+    """What decides what is timed."""
+    effort = settings.effort
+    return {
+        "rounds": effort.timing_rounds,
+        "batch": effort.batch,
+        "flights": [each.name for each in timed_flights(settings)],
+        "lattice": settings.lattice.to_document(),
+        "elements": settings.elements,
+    }
+
+
+def timed_flights(settings: PaperSettings) -> tuple[PaperFlight, ...]:
+    """The flight of two seconds, and the paper's six where there is time."""
+    more = paper_flights() if settings.effort.all_flights_timed else ()
+    return (two_second_flight(), *more)
+
+
+def time_models(settings: PaperSettings, results: Results, _checkpoint: bytes | None) -> Work:
+    """Time every model on every flight, then the equivalent one in a batch."""
+    identified = parameters_from_document(results["identification"]["model"])
+    rounds, flights = settings.effort.timing_rounds, timed_flights(settings)
+    rows: list[Document] = []
+    trajectory: Trajectory | None = None
+    with _one_core():
+        for number, each in enumerate(flights):
+            taken: dict[str, list[Document]] = {name: [] for name in MODELS}
+            for turn in range(rounds + 1):  # the first turn loads and compiles, and is not counted
+                for name in MODELS:
+                    share = (number + turn / (rounds + 1)) / (1 + len(flights))
+                    yield Progress(share, f"{each.label}, {name} model, turn {turn} of {rounds}")
+                    times, flown = _timed(settings, each, _choice(name, identified))
+                    taken[name].append(times)
+                    trajectory = flown if trajectory is None else trajectory
+            rows.append(_row(each, taken))
+        yield Progress(len(flights) / (1 + len(flights)), "equivalent models in a batch")
+        batch = _timed_batch(settings, trajectory)
+    return {"flights": rows, "batch": batch, "links_per_wing": LINKS}
+
+
+def _choice(name: str, identified: ParameterBatch) -> ModelChoice:
+    if name == "equivalent":
+        return identified
+    return "rigid" if name == "rigid" else "flexible"
+
+
+def _timed(
+    settings: PaperSettings, each: PaperFlight, model: ModelChoice
+) -> tuple[dict[str, float], Trajectory]:
+    """The processor's time for one flight, in its parts, and the wall's, s."""
+    schedules = each.schedules()
+    wall, begin = time.perf_counter(), time.thread_time()
+    steps = flight_steps(
+        aircraft(), flight(), schedules, model=model, duration_s=each.duration_s,
+        lattice=settings.lattice, elements=settings.elements,
+    )  # fmt: skip
+    next(steps)
+    ready = time.thread_time()
+    *_, last = steps
+    end = time.thread_time()
+    assert last.simulation is not None  # noqa: S101 - a flight ends with its simulation
+    times = {
+        "prepare_s": ready - begin,
+        "fly_s": end - ready,
+        "total_s": end - begin,
+        "wall_s": time.perf_counter() - wall,
+    }
+    return times, last.simulation.trajectory
+
+
+def _row(each: PaperFlight, taken: dict[str, list[Document]]) -> Document:
+    """Medians over the turns, the first left out, and how far these are apart."""
+    medians = {
+        name: {part: statistics.median(turn[part] for turn in turns[1:]) for part in TIMES}
+        for name, turns in taken.items()
+    }
+    spread = {
+        name: max(turn["total_s"] for turn in turns[1:]) / min(turn["total_s"] for turn in turns[1:])
+        for name, turns in taken.items()
+    }
+    return {
+        "flight": each.name,
+        "label": each.label,
+        "duration_s": each.duration_s,
+        "models": medians,
+        "slowest_over_fastest": spread,
+    }
+
+
+def _timed_batch(settings: PaperSettings, trajectory: Trajectory | None) -> Document:
+    """Cost of one flight among many that fly together: lattice, trims and all, on one core."""
+    assert trajectory is not None  # noqa: S101 - flights were timed before
+    model = chain_model(aircraft(), flight(), LINKS, settings.lattice)
+    swarm = benchmark_swarm(model, settings.effort.batch)
+    taken: dict[str, list[float]] = {"prepare_s": [], "fly_s": []}
+    for _ in range(BATCH_ROUNDS):
+        begin = time.thread_time()
+        cases = sample_cases(model, [trajectory])
+        ((case, found),) = shared_trims(model, swarm, cases, "trim")
+        ready = time.thread_time()
+        fly_attitudes(model, swarm, case, found)
+        taken["prepare_s"].append(ready - begin)
+        taken["fly_s"].append(time.thread_time() - ready)
+    prepare_s, fly_s = (statistics.median(taken[part]) for part in ("prepare_s", "fly_s"))
+    return {
+        "parameter_sets": swarm.particles,
+        "rounds": BATCH_ROUNDS,
+        "prepare_s": prepare_s,
+        "fly_s": fly_s,
+        "flight_s": (prepare_s + fly_s) / swarm.particles,
+    }
+
+
+@contextmanager
+def _one_core() -> Iterator[None]:
+    """One thread of ours and one of the linear algebra's, inside the block."""
+    before = thread_count()
+    use_threads(1)
+    try:
+        with one_blas_thread():
+            yield
+    finally:
+        use_threads(before)

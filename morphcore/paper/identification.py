@@ -1,0 +1,102 @@
+"""The stages that identify: the study (Table 1), our search and the paper's swarm (figures 4 to 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import asdict
+from typing import Any, Protocol
+
+from morphcore.identify.identification import Identification
+from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.study import Study
+from morphcore.paper.scenario import LINKS, aircraft, flight
+from morphcore.paper.settings import PaperSettings
+from morphcore.paper.stages import Progress, Results, Work
+from morphcore.paper.truth import samples_of
+
+Document = dict[str, Any]
+
+
+class SearchStep(Protocol):
+    """What a step of any search tells."""
+
+    @property
+    def fraction(self) -> float:
+        """Of the whole search, 0..1."""
+        ...
+
+    @property
+    def message(self) -> str:
+        """For people."""
+        ...
+
+    @property
+    def checkpoint(self) -> bytes:
+        """Complete state."""
+        ...
+
+
+class Search(Protocol):
+    """A search of the library: steps, each with a checkpoint to go on from."""
+
+    def steps(self, checkpoint: bytes | None = None) -> Iterator[SearchStep]:
+        """One step after the other."""
+        ...
+
+
+def searched(search: Search, checkpoint: bytes | None) -> Generator[Progress, None, bytes]:
+    """Work a search off; gives the checkpoint of its last step."""
+    last = checkpoint or b""
+    for step in search.steps(checkpoint):
+        last = step.checkpoint
+        yield Progress(step.fraction, step.message, last)
+    return last
+
+
+def study_inputs(settings: PaperSettings) -> Document:
+    """What decides the study."""
+    return {"links": list(settings.effort.links), **search_inputs(settings, settings.search)}
+
+
+def search_inputs(settings: PaperSettings, search: SearchSettings) -> Document:
+    """What decides an identification."""
+    return {"lattice": settings.lattice.to_document(), "links_per_wing": LINKS, "search": asdict(search)}
+
+
+def study_links(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
+    """Models of several sizes, identified on three flights and judged on the other three."""
+    study = Study(
+        aircraft(),
+        flight(),
+        samples_of(results["truth"]),
+        links=settings.effort.links,
+        model=ModelSettings(lattice=settings.lattice),
+        search=settings.search,
+    )
+    last = yield from searched(study, checkpoint)
+    return study.result(last).to_document()
+
+
+def identify_model(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
+    """The model of three links by our search."""
+    return (yield from _identified(settings, settings.search, results, checkpoint))
+
+
+def identify_by_swarm(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
+    """The same by the paper's swarm."""
+    return (yield from _identified(settings, settings.swarm_search, results, checkpoint))
+
+
+def _identified(
+    settings: PaperSettings, search: SearchSettings, results: Results, checkpoint: bytes | None
+) -> Work:
+    run = Identification(
+        aircraft(),
+        flight(),
+        samples_of(results["truth"]),
+        ModelSettings(links_per_wing=LINKS, lattice=settings.lattice),
+        search,
+    )
+    last = yield from searched(run, checkpoint)
+    found = run.result(last)
+    return found.to_document() | {"curves": found.curves()["samples"]}

@@ -1,0 +1,64 @@
+"""What made the figures: versions, machine, and a digest of the code that decides them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from morphcore.threads import thread_count
+
+Document = dict[str, Any]
+
+PACKAGES = ("numpy", "scipy", "numba", "pyswarms", "matplotlib")
+PRESENTATION = ("export", "paper/report")  # rooms that show figures and do not change them
+UNKNOWN = "unknown"
+
+
+def versions() -> dict[str, str]:
+    """Versions of this project, Python, and the libraries that compute."""
+    return {
+        "morphid": _version("morphid"),
+        "python": platform.python_version(),
+        **{name: _version(name) for name in PACKAGES},
+    }
+
+
+def machine() -> Document:
+    """Processor, cores, threads used and operating system."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "threads": thread_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def code_digest() -> str:
+    """A digest of the library's source, but for the rooms that only show: other code, other figures."""
+    library = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(library.rglob("*.py")):
+        name = path.relative_to(library).as_posix()
+        if not name.startswith(PRESENTATION):
+            digest.update(f"{name}\n".encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        return UNKNOWN
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or UNKNOWN
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), UNKNOWN)

@@ -1,0 +1,1 @@
+"""The report: the stages' results as one page of tables and figures."""

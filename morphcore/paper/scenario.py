@@ -1,0 +1,151 @@
+"""The paper's aircraft, flights and headline figures.
+
+Sizes, rates and the roles of the flights are the paper's; density, modulus, damping and speed are ours, since
+its text does not print them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
+from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.schedule_document import schedule_from_document
+from morphcore.simulate.trajectory import Role
+
+Document = dict[str, Any]
+
+DOI = "10.1177/00368504211010946"
+TITLE = (
+    "Equivalent modelling of a sweep-morphing aircraft with gimbal-jointed rigid bodies, identified by "
+    "particle swarm"
+)
+
+# headlines that the paper's text prints, per cent
+PAPER_COMPUTATION = 10.0  # of the flexible model's, that an equivalent flight takes
+PAPER_OPTIMUM = -4.23  # attitude variation of the optimised morph against constant rate
+PAPER_RIGID_OPTIMUM = 4.12  # of the morph optimised with the rigid model
+
+LINKS = 3  # a wing, of the equivalent model whose flights are shown
+SWARM_PARTICLES = 2500  # of the paper's identification
+
+# how each sample flight begins and ends: held, and rates ramped, as the independent program's flights
+HELD_BEFORE_S = 0.2
+HELD_AFTER_S = 0.3
+RAMP_S = 0.1
+FINAL_RAD = 1.0
+
+# the morph that is optimised
+MORPH_S = 2.0
+SETTLE_S = 2.0
+RATE_LIMIT_RAD_S = 1.0
+KNOTS = 6
+
+_WING: Document = {
+    "span_m": 3.0,
+    "chord_m": 0.3,
+    "thickness_m": 0.1,
+    "material": {
+        "density_kg_m3": 500.0,
+        "youngs_modulus_pa": 2.1e9,
+        "poisson_ratio": 0.3,
+        "stiffness_damping_s": 0.004,
+    },
+    "profile_drag": 0.01,
+    "flexible": True,
+}
+
+AIRCRAFT: Document = {
+    "name": "reference sweep-morphing aircraft",
+    "fuselage": {
+        "shape": "box",
+        "length_m": 5.0,
+        "width_m": 0.7,
+        "height_m": 0.5,
+        "density_kg_m3": 500.0,
+    },
+    "surfaces": [
+        {
+            "name": f"{side} wing",
+            "side": side,
+            **_WING,
+            "hinge": {"position_m": [0.0, y, 0.0], "axis": "z"},
+        }
+        for side, y in (("right", 0.35), ("left", -0.35))
+    ],
+}
+
+FLIGHT: Document = {
+    "airspeed_m_s": 150.0,
+    "air_density_kg_m3": 1.225,
+    "gravity_m_s2": 9.81,
+    "altitude_m": 0.0,
+}
+
+
+@dataclass(frozen=True)
+class PaperFlight:
+    """One sample flight: both wings follow ``schedule`` (a document, see `schedule_from_document`)."""
+
+    name: str
+    label: str
+    role: Role
+    schedule: Document
+    duration_s: float
+
+    def schedules(self) -> dict[str, Schedule]:
+        """The motion of each side's hinge."""
+        schedule = schedule_from_document(self.schedule, "/schedule")
+        return {"left": schedule, "right": schedule}
+
+    def to_document(self) -> Document:
+        """JSON form."""
+        return dict(vars(self))
+
+
+def aircraft() -> Aircraft:
+    """The aircraft."""
+    return aircraft_from_document(AIRCRAFT)
+
+
+def flight() -> Flight:
+    """The flight condition."""
+    return flight_from_document(FLIGHT)
+
+
+def paper_flights() -> tuple[PaperFlight, ...]:
+    """Three flights to identify on, then three to check with: between, beyond, and of another shape."""
+    fitted = [_constant_rate(rate, "train") for rate in (0.2, 0.5, 0.8)]
+    checks = [_constant_rate(rate, "held_out") for rate in (0.4, 1.0)]
+    return (*fitted, *checks, _quadratic())
+
+
+def two_second_flight() -> PaperFlight:
+    """The flight whose computation is compared: 1 rad in 2 s and nothing else."""
+    schedule = {"kind": "constant_rate", "final_rad": FINAL_RAD, "duration_s": MORPH_S, "ramp_s": RAMP_S}
+    return PaperFlight("two_seconds", "1 rad in 2 s", "held_out", schedule, MORPH_S)
+
+
+def _constant_rate(rate_rad_s: float, role: Role) -> PaperFlight:
+    duration_s = FINAL_RAD / rate_rad_s
+    schedule = {
+        "kind": "constant_rate",
+        "final_rad": FINAL_RAD,
+        "duration_s": duration_s,
+        "start_s": HELD_BEFORE_S,
+        "ramp_s": RAMP_S,
+    }
+    total_s = HELD_BEFORE_S + duration_s + HELD_AFTER_S
+    return PaperFlight(f"rate_{rate_rad_s}", f"{rate_rad_s} rad/s", role, schedule, total_s)
+
+
+def _quadratic() -> PaperFlight:
+    schedule = {
+        "kind": "quadratic",
+        "final_rad": FINAL_RAD,
+        "duration_s": MORPH_S,
+        "start_s": HELD_BEFORE_S,
+    }
+    total_s = HELD_BEFORE_S + MORPH_S + HELD_AFTER_S
+    return PaperFlight("quadratic", "quadratic, 1 rad in 2 s", "held_out", schedule, total_s)
