@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,19 @@ class CsvColumns:
                 f"{self.path} has no column {', '.join(missing)}",
                 hint=f"give the columns {', '.join(names)}; units may be in the names (theta_deg, t_ms)",
             )
+        return found
+
+    def others(self, names: Sequence[str]) -> dict[str, Array]:
+        """Further columns of numbers under their own titles, units as they are; words are passed over."""
+        seen: set[str] = set()
+        found: dict[str, Array] = {}
+        for number, title in enumerate(self.header):
+            name, _ = standard_name(title)
+            if name in names and name not in seen:
+                seen.add(name)
+                continue
+            with suppress(InvalidInput):
+                found[title] = self._numbers(number)
         return found
 
     def _numbers(self, column: int) -> Array:

@@ -112,8 +112,8 @@ class _Balance:
             # the wings move with the fuselage as one: its acceleration follows from the sum of all forces
             at_rest = flight.structure(poses, np.zeros_like(V), A)
             thrust = np.concatenate([self.given.moment_B, self.given.force_B])
-            A_B: Array = np.linalg.solve(self._inertia(poses, at_rest), thrust - self.total(poses, demands))
-            A = self._rigid(poses, A_B)
+            defect = thrust - self.total(poses, demands)
+            A = self._rigid(poses, np.asarray(np.linalg.solve(self._inertia(poses, at_rest), defect)))
             demands += flight.structure(poses, V, A) - flight.structure(poses, V, np.zeros_like(V))
         lag = np.stack([circulation, circulation])
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -103,6 +103,12 @@ class FlightPlan:
     def mean_accelerations(self) -> Array:
         """(steps, s) mean acceleration of the hinges over each step, rad/s^2."""
         return np.diff(self.rates, axis=0) / self.grid.step_s
+
+    def at_rest(self) -> FlightPlan:
+        """The plan's first moment with its hinges held: where a flight is trimmed."""
+        hinges, accelerations = self.hinges[:1].copy(), self.accelerations[:1]
+        hinges[:, :, H_RATE] = 0.0
+        return replace(self, hinges=hinges, accelerations=np.zeros_like(accelerations))
 
 
 def _hinged(aircraft: Aircraft) -> NDArray[np.bool_]:

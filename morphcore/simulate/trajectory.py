@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -13,13 +11,13 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
+from morphcore.simulate.csv_columns import read_csv_columns
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
 
 MOST_ROWS = 200_000
 COLUMNS = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
-DEGREE = np.pi / 180.0
 
 
 @dataclass(frozen=True)
@@ -55,48 +53,18 @@ class Trajectory:
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     """Read a CSV file with the columns t, sweep_left, sweep_right, phi, theta, psi.
 
-    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns land in ``extra`` as
-    they are.
+    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns of numbers land in
+    ``extra`` as they are.
 
     Raises
     ------
     InvalidInput : a column is missing or holds something that is not a finite number, or time does not rise.
     """
-    path = Path(path)
-    try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            reader = csv.reader(stream)
-            header = [name.strip() for name in next(reader, [])]
-            rows = [row for row in reader if row]
-    except FileNotFoundError:
-        raise InvalidInput(f"{path} does not exist", hint="check the path") from None
-    if not rows:
-        raise InvalidInput(
-            f"{path} holds no rows", hint="give a CSV file with a header and at least three rows"
-        )
-    try:
-        table = np.array(rows, dtype=np.float64)
-    except ValueError as error:
-        raise InvalidInput(
-            f"{path}: {error}", hint="every cell must be a number, every row as long as the header"
-        ) from None
-    if table.shape[1] != len(header):
-        raise InvalidInput(f"{path}: rows and header differ in length", hint="repair the header")
-    values, extra = {}, {}
-    for name, column in zip(header, table.T, strict=True):
-        standard, factor = _standard_column(name)
-        if standard in COLUMNS and standard not in values:
-            values[standard] = column * factor
-        else:
-            extra[name] = column
-    missing = [name for name in COLUMNS if name not in values]
-    if missing:
-        raise InvalidInput(
-            f"{path} has no column {', '.join(missing)}", hint=f"give the columns {', '.join(COLUMNS)}"
-        )
+    columns = read_csv_columns(path)
+    values = columns.quantities(COLUMNS)
     return checked(
         Trajectory(
-            name=path.stem,
+            name=columns.path.stem,
             time_s=values["t"],
             sweep_left=values["sweep_left"],
             sweep_right=values["sweep_right"],
@@ -104,9 +72,9 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
             theta=values["theta"],
             psi=values["psi"],
             role=role,
-            extra=extra,
+            extra=columns.others(COLUMNS),
         ),
-        pointer=f"/{path.name}",
+        pointer=f"/{columns.path.name}",
     )
 
 
@@ -161,13 +129,3 @@ def checked(trajectory: Trajectory, pointer: str) -> Trajectory:
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
     return trajectory
-
-
-def _standard_column(name: str) -> tuple[str, float]:
-    """The standard name of a CSV column and the factor to SI units."""
-    match = re.fullmatch(r"(.+?)_(deg|rad|s|ms)", name)
-    if match is None:
-        return ("t" if name == "time" else name), 1.0
-    base, unit = match.groups()
-    base = "t" if base == "time" else base
-    return base, {"deg": DEGREE, "rad": 1.0, "s": 1.0, "ms": 1e-3}[unit]

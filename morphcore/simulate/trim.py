@@ -60,7 +60,7 @@ class Trim:
 
 
 def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: StartMode = "trim") -> Trim:
-    """Equilibrium at the plan's first hinge angles.
+    """Equilibrium at the plan's first hinge angles, the hinges held.
 
     With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and
     across it, a constant moment, and the joint angles: the aircraft then flies straight and level. With
@@ -77,8 +77,9 @@ def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: S
             pointer="/flight/start",
             hint="add start with alpha_rad, force_b_n and moment_b_n_m, or choose start = trim",
         )
+    held = plan.at_rest()
     parts = [
-        _trim_slab(model, batch.select(slice(i, i + SLAB)), plan, start)
+        _trim_slab(model, batch.select(slice(i, i + SLAB)), held, start)
         for i in range(0, batch.particles, SLAB)
     ]
     return Trim(
