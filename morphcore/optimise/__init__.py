@@ -6,7 +6,7 @@ from typing import Any
 
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.fields import Fields
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
+from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.optimise.optimisation import ScheduleOptimisation
@@ -28,6 +28,7 @@ from morphcore.optimise.settings import (
 )
 from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.request import flown_model
 from morphcore.threads import use_threads
 
 __all__ = [
@@ -92,6 +93,8 @@ def optimise_schedule(
 def optimisation_from_document(document: dict[str, Any], threads: int | None = None) -> ScheduleOptimisation:
     """The optimisation that a request document (the body of ``POST /optimize``) asks for.
 
+    Identified parameters bring their own lattice, step and start, unless others are given beside them.
+
     Raises
     ------
     InvalidInput : with a pointer to the field at fault.
@@ -101,12 +104,8 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
     fields = Fields(document, "")
     aircraft = aircraft_from_document(fields.raw("aircraft"))
     flight = flight_from_document(fields.raw("flight"))
-    model = fields.child("model")
-    parameters = parameters_from_document(model.raw("parameters"), "/model/parameters")
-    lattice = lattice_settings(model.raw("lattice", {}), "/model/lattice")
-    start = model.choice("start", ("trim", "given"), default="trim")
-    step_s = model.number("step_s", default=STEP_S, least=5e-4, most=0.01)
-    model.done()
+    parameters = parameters_from_document(fields.child("model").raw("parameters"), "/model/parameters")
+    model = flown_model({"kind": "equivalent", **fields.raw("model")})
     run = ScheduleOptimisation(
         aircraft,
         flight,
@@ -117,9 +116,9 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
         search=schedule_search(fields.raw("search", {})),
         verify=fields.choice("verify", VERIFICATIONS, default="flexible"),  # type: ignore[arg-type]
         flexible=flexible_settings(fields.raw("flexible", {})),
-        lattice=lattice,
-        start=start,  # type: ignore[arg-type]
-        step_s=step_s,
+        lattice=model.lattice,
+        start=model.start,
+        step_s=STEP_S if model.step_s is None else model.step_s,
     )
     fields.done()
     return run
