@@ -197,4 +197,4 @@ def _step(
     found = space.constrained(
         value, slope, model.base, MARGIN, limit.linear(model.base, model.torque, model.torque_gradient)
     )
-    return np.asarray(space.drawn_back(found[None, :], anchor=point)[0])
+    return space.put_back(found, point)

@@ -75,7 +75,7 @@ def next_ease(state: EaseState, space: MorphSpace, fly: Callable[[Array], Trials
             lambda _: np.concatenate([-eye, eye]),
         )
         found = space.constrained(lambda z: smooth(z)[0], lambda z: smooth(z)[1], model.base, MARGIN, within)
-        tried.append(space.drawn_back(found[None, :], anchor=state.point)[0])
+        tried.append(space.put_back(found, state.point))
     flown = fly(np.stack(tried))
     peaks = np.where(np.isfinite(flown.peak), flown.peak, np.inf)
     best = int(np.argmin(peaks))

@@ -30,11 +30,12 @@ HELD = 1e-9
 SHORTEST_PIECE = (
     0.01  # of the duration, between knots: closer ones are a jolt that a flight's step would miss
 )
+BESIDE = 1e-7  # relative margin of points that are put back
 PROBE = 1e-7  # of the slacks' difference quotients; their arguments are of order one
 RAY_POINTS = 32  # looked at on a ray before the last interval is halved
 HALVINGS = 40
-RAMPS = (0.02, 0.05, 0.15, 0.3, 0.5)  # of the duration: of the constant rates that are tried first
-WAITS = (0.0, 0.15, 0.3, 0.45, 0.6)  # of the duration: before them
+RAMPS = (0.02, 0.1, 0.3, 0.5)  # of the duration: of the constant rates that are tried first
+WAITS = (0.0, 0.2, 0.4, 0.6)  # of the duration: before them
 MOST_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
 TOLERANCE = 1e-11  # of their cost
 NARROW = 0.02  # room below which the centre is sought from the quickest morph too
@@ -123,6 +124,12 @@ class MorphSpace:
             values = np.concatenate([shapes.turning_values(), shapes.value[:, 1:-1]], axis=1)
             kept += [self.high - values, values - self.low]
         return np.concatenate(kept, axis=1)
+
+    def peak_acceleration(self, points: Array) -> Array:
+        """(p,) largest acceleration of points (p, d), rad/s^2."""
+        shapes = self.shapes(points)
+        peak = np.abs(np.concatenate([shapes.first, shapes.last[:, -1:]], axis=1)).max(axis=1)
+        return np.asarray(peak * abs(self.morph.change_rad) / self.duration_s**2)
 
     def least_slack(self, points: Array) -> Array:
         """(p,) of the limit that is nearest."""
@@ -247,14 +254,14 @@ class MorphSpace:
 
     # maps onto what keeps the limits
 
-    def drawn_back(self, points: Array, anchor: Array | None = None) -> Array:
-        """Points (p, d) on the rays from the anchor (d,), as far out as limits allow, the given ones at most.
+    def drawn_back(self, points: Array) -> Array:
+        """Points (p, d) on the rays from the centre, as far out as limits allow, the given ones at most.
 
         A point that keeps the limits stays. Of the others the ray is walked outward to the last place before
         the first that breaks a limit, found among RAY_POINTS and then by halving; what is returned has been
-        checked itself. ``anchor`` defaults to the centre and must keep the limits.
+        checked itself.
         """
-        held = self.centre if anchor is None else anchor
+        held = self.centre
         out = points.copy()
         broken = np.flatnonzero(~self.keeps(points))
         if broken.size == 0:
@@ -288,6 +295,17 @@ class MorphSpace:
         along = point + share * (self.centre - point)
         good = np.flatnonzero(self.least_slack(along) >= margin)
         return along[good[0]] if good.size else None
+
+    def put_back(self, point: Array, other: Array) -> Array:
+        """A point (d,) if it keeps the limits, else the nearest that does, else another that is known to.
+
+        For steps between points at the limits: these are curved, and the ray between two such points may run
+        just outside.
+        """
+        if self.keeps(point[None, :])[0]:
+            return point
+        near = self.nearest(point, BESIDE)
+        return other if near is None else near
 
     def constrained(
         self,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from morphcore.optimise.descent import DescentState, first_descent, next_descent
 from morphcore.optimise.ease import EaseState, next_ease
 from morphcore.optimise.flights import MorphFlights
-from morphcore.optimise.limits import MorphSpace
+from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.optimise.settings import ScheduleSearch, Weights
 from morphcore.optimise.torque_limit import TorqueLimit, Trials
 from morphcore.simulate.batch import Stop
@@ -145,8 +145,8 @@ class SearchRun:
         points = rng.uniform(space.lower, space.upper, (self.settings.screen, space.dimension))
         points[:, : space.inner].sort(axis=1)
         points[:, space.inner :].sort(axis=1)
-        points = np.concatenate([space.waiting(), points])
-        points, trials = self._kept(state, space.drawn_back(points), stop)
+        points = self._gentle(state).drawn_back(np.concatenate([space.waiting(), points]))
+        points, trials = self._kept(state, points, stop)
         order = np.argsort(trials.cost, kind="stable")[: self.settings.starts - 1]
         first = state.descent
         assert first is not None  # noqa: S101 - the phase says so
@@ -198,6 +198,21 @@ class SearchRun:
         errors = flown.errors(self.weights)
         peak = np.where(flown.diverged & (self.limit.most_nm is not None), np.nan, flown.peak_torque)
         return Trials(errors, flown.cost(self.weights), flown.torque, peak)
+
+    def _gentle(self, state: SearchState) -> MorphSpace:
+        """The space with the acceleration that the torque limit allows a wing, going by the anchor's flight.
+
+        What is drawn back to it hardly ever exceeds the torque, and need not give up its shape in flights.
+        """
+        space, limits = self.space, self.space.limits
+        if self.limit.most_nm is None:
+            return space
+        share = self.limit.most_nm / state.anchor_torque
+        most = share * float(space.peak_acceleration(state.anchor[None, :])[0])
+        if limits.max_accel_rad_s2 is not None:
+            most = min(most, limits.max_accel_rad_s2)
+        gentle = replace(space, limits=replace(limits, max_accel_rad_s2=most))
+        return gentle if gentle.room >= HELD else space
 
     def _kept(self, state: SearchState, points: Array, stop: Stop | None) -> tuple[Array, Trials]:
         """Fly points, drawn back to the anchor where their torque is too much."""

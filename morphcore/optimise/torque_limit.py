@@ -17,9 +17,9 @@ from morphcore.optimise.limits import Map, MorphSpace
 
 Array = NDArray[np.float64]
 
-ROUNDS = 5  # of drawing back; what is still too much then stays at its anchor
+ROUNDS = 4  # of drawing back; what is still too much then stays at its anchor
 AIM = 0.99  # of the limit, when a schedule is drawn back: the torque is not linear along the ray
-NEAR = 0.95  # of the limit: drawn back this far is far enough
+NEAR = 0.9  # of the limit: drawn back this far is far enough
 LINEAR_MARGIN = 1e-3  # of the limit, in linear models
 WATCHED = 0.5  # of the limit: torques above are watched in linear models
 MOST_WATCHED = 200
@@ -84,10 +84,8 @@ class TorqueLimit:
             rise = np.maximum(high_peak[open_] - low_peak[open_], 1e-12)
             share = np.clip((AIM * self.most_nm - low_peak[open_]) / rise, 0.1, 0.9)
             middle = low[open_] + share * (high[open_] - low[open_])
-            tried = anchors[open_] + middle[:, None] * (targets[open_] - anchors[open_])
-            tried = np.stack(
-                [space.drawn_back(t[None, :], a)[0] for t, a in zip(tried, anchors[open_], strict=True)]
-            )
+            between = anchors[open_] + middle[:, None] * (targets[open_] - anchors[open_])
+            tried = np.stack([space.put_back(*pair) for pair in zip(between, anchors[open_], strict=True)])
             again = fly(tried)
             good = self.keeps(again.peak)
             inside, outside = open_[good], open_[~good]

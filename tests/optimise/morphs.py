@@ -1,0 +1,50 @@
+"""Morphs to optimise: the example aircraft, and short ones whose flights take milliseconds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.optimise import Limits, Morph, ScheduleOptimisation, ScheduleSearch, Step
+from morphcore.simulate.schedule import Spline
+from tests.identify.flights import reference_aircraft, reference_flight
+
+Array = NDArray[np.float64]
+
+SHORT = Morph(0.4, 0.8, settle_s=0.3)  # mean rate 0.5 rad/s
+QUICK = ScheduleSearch(seed=3, screen=4, starts=2, iterations=3)
+
+
+def optimisation(
+    morph: Morph = SHORT,
+    limits: Limits = Limits(max_rate_rad_s=0.9),  # noqa: B008 - frozen
+    *,
+    links: int = 1,
+    search: ScheduleSearch = QUICK,
+    **options: Any,
+) -> ScheduleOptimisation:
+    """An optimisation with the physical guess of the example aircraft; no flexible flights unless asked."""
+    parameters = physical_guess(chain_model(reference_aircraft(), reference_flight(), links))
+    return ScheduleOptimisation(
+        reference_aircraft(),
+        reference_flight(),
+        parameters,
+        **{"morph": morph, "limits": limits, "search": search, "verify": "none", **options},
+    )
+
+
+def last(run: ScheduleOptimisation, checkpoint: bytes | None = None) -> Step:
+    """The last step of a run."""
+    *_, step = run.steps(checkpoint)
+    return step
+
+
+def sampled(schedule: Spline, points: int = 20_001) -> tuple[Array, Array, Array]:
+    """Angle, rate and acceleration of a schedule at many times, by scipy."""
+    cubic = CubicSpline(schedule.knot_time_s, schedule.knot_angle_rad, bc_type="clamped")
+    times = np.linspace(schedule.knot_time_s[0], schedule.knot_time_s[-1], points)
+    return cubic(times), cubic(times, 1), cubic(times, 2)

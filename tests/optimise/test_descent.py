@@ -1,0 +1,183 @@
+"""The descent on problems whose answer is known, and how a torque limit is kept, without flights."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from morphcore.optimise.descent import first_descent, next_descent, probes_of
+from morphcore.optimise.ease import EaseState, next_ease
+from morphcore.optimise.limits import HELD, MorphSpace
+from morphcore.optimise.settings import Limits, Morph
+from morphcore.optimise.torque_limit import TorqueLimit, Trials
+
+SPACE = MorphSpace(Morph(1.0, 2.0), Limits(1.0, 6.0), 2.0)
+LATE = np.array([0.75, 0.85, 0.92, 0.97])  # beyond the limits of SPACE
+NO_LIMIT = TorqueLimit(None)
+
+
+class Bench:
+    """Flights replaced by formulas: errors curve gently about a wanted point, torques are linear in it.
+
+    Every asked point is remembered.
+    """
+
+    def __init__(self, wanted=LATE, most_nm=None):
+        self.wanted, self.limit, self.asked = wanted, TorqueLimit(most_nm), []
+
+    def __call__(self, points):  # noqa: D102 - see the class
+        self.asked.append(points)
+        x = points - self.wanted
+        errors = np.concatenate([x + 0.3 * x**2, 0.5 * (x[:, 1:] - x[:, :-1])], axis=1)
+        torque = np.stack([200.0 * points.sum(axis=1), -50.0 + 0.0 * points[:, 0]], axis=1)
+        return Trials(errors, np.einsum("pm,pm->p", errors, errors), torque, np.abs(torque).max(axis=1))
+
+    @property
+    def flown(self):
+        """All points asked for, (n, d)."""
+        return np.concatenate(self.asked)
+
+
+def descended(bench, space=SPACE, iterations=12):
+    """The best of a descent from the centre."""
+    start = space.centre[None, :]
+    state = first_descent(start, bench(start))
+    for _ in range(iterations):
+        state = next_descent(state, space, bench.limit, bench, keep=1)
+    return state
+
+
+def independent(space, bench, torque=np.inf):
+    """The constrained minimum by another route: SLSQP on the cost itself, from several starts."""
+    best = np.inf
+    for start in space.drawn_back(np.random.default_rng(0).uniform(size=(6, space.dimension))):
+        constraints = [
+            {"type": "ineq", "fun": lambda x: space.slack(x[None, :])[0]},
+            {"type": "ineq", "fun": lambda x: min(torque, 1e9) - 200.0 * x.sum()},
+        ]
+        found = minimize(lambda x: bench(x[None, :]).cost[0], start, constraints=constraints, method="SLSQP")
+        if found.success and space.least_slack(found.x[None, :])[0] > -1e-6:
+            best = min(best, found.fun)
+    return best
+
+
+def test_finds_the_minimum_at_the_limits():
+    """The least cost under rate and acceleration limits is found to 1e-5, at a corner of the limits."""
+    bench = Bench()
+    state = descended(bench)
+    assert state.cost[0] == pytest.approx(independent(SPACE, Bench()), rel=1e-5)
+    assert SPACE.least_slack(state.point)[0] < 1e-6
+    assert not state.active.any()
+
+
+def test_finds_a_minimum_inside():
+    """Where the wanted schedule keeps the limits it is found itself."""
+    inside = SPACE.drawn_back(SPACE.centre[None, :] + 0.02)[0]
+    state = descended(Bench(inside))
+    np.testing.assert_allclose(state.point[0], inside, atol=1e-5)
+
+
+def test_nothing_is_flown_that_breaks_a_limit():
+    """Probes and trials alike keep the limits, whatever the search does."""
+    bench = Bench()
+    descended(bench)
+    assert SPACE.keeps(bench.flown).all()
+    assert bench.flown.shape[0] > 20
+
+
+def test_a_torque_limit_is_met_and_kept():
+    """The minimum under a torque limit is found to a per mille, and no better point was taken above it."""
+    limit = 430.0
+    bench = Bench(most_nm=limit)
+    assert bench(SPACE.centre[None, :]).peak[0] < limit
+    state = descended(bench, iterations=20)
+    assert state.torque[0] <= limit
+    assert state.torque[0] == 200.0 * state.point[0].sum()
+    assert state.cost[0] == pytest.approx(independent(SPACE, Bench(), limit), rel=5e-3)
+    assert SPACE.keeps(bench.flown).all()
+
+
+def test_starts_rest_when_they_stall_or_fall_behind():
+    """Only the best starts are flown on; a converged field is left as it is."""
+    starts = SPACE.drawn_back(np.random.default_rng(3).uniform(size=(3, 4)))
+    bench = Bench()
+    state = first_descent(starts, bench(starts))
+    moved = next_descent(state, SPACE, NO_LIMIT, bench, keep=1)
+    order = np.argsort(state.cost)
+    np.testing.assert_array_equal(moved.point[order[1:]], state.point[order[1:]])
+    assert moved.cost[order[0]] < state.cost[order[0]]
+    settled = replace(moved, stalled=np.full(3, 9))
+    assert next_descent(settled, SPACE, NO_LIMIT, bench, keep=3) is settled
+
+
+@pytest.mark.parametrize("knots", [4, 6, 12, 20])
+def test_probes_keep_the_limits_at_every_corner(knots):
+    """Beside schedules at their limits there are probes that keep them, along every unknown."""
+    space = MorphSpace(Morph(1.0, 2.0, knots=knots), Limits(1.0, 8.0), 2.0)
+    for point in space.drawn_back(np.random.default_rng(1).uniform(size=(6, space.dimension))):
+        found = probes_of(space, point)
+        assert found is not None
+        probes, steps = found
+        assert space.keeps(probes).all()
+        np.testing.assert_allclose(probes[1:] - probes[0], np.diag(steps), atol=1e-15)
+        assert np.abs(probes[0] - point).max() < 0.02
+
+
+def test_trials_above_the_torque_limit_are_drawn_back_to_just_below():
+    """Of schedules above the limit each ends on its ray below it, close to it."""
+    bench = Bench(most_nm=440.0)
+    anchor = SPACE.centre
+    anchors = np.tile(anchor, (5, 1))
+    points = SPACE.drawn_back(LATE + np.random.default_rng(0).normal(0.0, 0.02, (5, 4)))
+    assert np.all(bench(points).peak > 440.0)
+    held = bench(anchors)
+    kept, trials = bench.limit.kept(SPACE, points, anchors, held, bench)
+    assert np.all(trials.peak <= 440.0)
+    np.testing.assert_allclose(trials.peak, 200.0 * kept.sum(axis=1))
+    np.testing.assert_allclose(trials.cost, bench(kept).cost)
+    assert np.all(trials.peak > 0.9 * 440.0)
+    assert SPACE.keeps(kept).all()
+
+
+def test_a_schedule_that_cannot_be_drawn_back_ends_at_its_anchor():
+    """Where the torque jumps at once off the anchor, the anchor is what remains, with its own numbers."""
+
+    def cliff(points):
+        near = np.abs(points - SPACE.centre).max(axis=1) < 1e-12
+        peak = np.where(near, 10.0, np.nan)  # as of a diverged flight
+        return Trials(np.zeros((len(points), 1)), np.zeros(len(points)), peak[:, None], peak)
+
+    anchors = SPACE.centre[None, :]
+    held = Trials.known(np.array([7.0]), np.array([10.0]))
+    kept, trials = TorqueLimit(20.0).kept(SPACE, SPACE.drawn_back(LATE[None, :]), anchors, held, cliff)
+    np.testing.assert_array_equal(kept, anchors)
+    assert (trials.cost[0], trials.peak[0]) == (7.0, 10.0)
+
+
+def test_torque_is_lowered_to_its_least():
+    """Easing the largest torque ends within 2 per cent of its minimum under the limits.
+
+    That is found by an independent solver. The torque here is 200 times the sum of the times: the earliest
+    morph that the limits allow has least.
+    """
+    bench = Bench()
+    start = SPACE.drawn_back(LATE[None, :])
+    state = EaseState(start[0], float(bench(start).peak[0]))
+    while not state.over:
+        before = state.peak
+        state = next_ease(state, SPACE, bench)
+        assert state.peak <= before
+    assert SPACE.keeps(bench.flown).all()
+    least = np.inf
+    for first in (SPACE.centre, start[0]):
+        found = minimize(
+            lambda x: x.sum(),
+            first,
+            constraints={"type": "ineq", "fun": lambda x: SPACE.slack(x[None, :])[0] - HELD},
+            method="SLSQP",
+        )
+        least = min(least, 200.0 * found.fun)
+    assert state.peak == pytest.approx(least, rel=0.02)
