@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from morphcore.geometry.lattice import CoreLaw
+from morphcore.paper.scenario import paper_flights
 from morphcore.paper.stages import Results
 
 Document = dict[str, Any]
@@ -122,8 +123,10 @@ def _independent(found: Document | None) -> Iterator[Asked]:
 
 def _held_out(identification: Document | None) -> Iterator[Asked]:
     ratios: Mapping[str, float | None] = {} if identification is None else held_out_ratios(identification)
+    labels = {each.name: each.label for each in paper_flights()}
     for name, value in ratios.items():
-        yield Asked(f"{name}, held out: J of the equivalent over J of the rigid model", HELD_OUT_RATIO, value)
+        what = f"{labels.get(name, name)}, held out: J of the equivalent over J of the rigid model"
+        yield Asked(what, HELD_OUT_RATIO, value)
 
 
 def _computation(found: Document | None) -> Iterator[Asked]:

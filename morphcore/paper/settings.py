@@ -17,11 +17,11 @@ class Effort:
     """Sizes of the stages.
 
     flexible_step_s : of the flights that are not timed. links : numbers of links a wing of the study.
-    iterations : of our search, at most. swarm_particles, swarm_generations : of the paper's search. timing_rounds : repetitions of every timed
-    flight. all_flights_timed : not only that of two seconds. batch : parameter sets that fly together.
-    finer_lattice : whether the truth's convergence in the lattice is shown. schedule_generations : of the
-    paper's swarm of schedules. front_durations_s : of morphs on the Pareto front. free_values : whether the
-    angles at the knots are sought too.
+    iterations : of our search, at most. swarm_particles, swarm_generations : of the paper's search.
+    timing_rounds : repetitions of every timed flight. all_flights_timed : not only that of two seconds.
+    batch : parameter sets that fly together. finer_lattice : whether the truth's convergence in the lattice
+    is shown. schedule_generations : of the paper's swarm of schedules. front_durations_s : of morphs on the
+    Pareto front. free_values : whether the angles at the knots are sought too.
     """
 
     flexible_step_s: float

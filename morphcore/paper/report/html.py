@@ -98,13 +98,16 @@ def figure(anchor: str, name: str, caption: str, drawn: Figure) -> str:
     """A figure with its caption below it; ``anchor`` keeps the ids of its SVG apart from other figures'."""
     svg = rendered(anchor, drawn, ("svg",))[f"{anchor}.svg"]
     return (
-        f'<figure id="{escape(anchor)}"><div class="picture">{inline_svg(svg, anchor)}</div>'
+        f'<figure id="{escape(anchor)}"><div class="picture">{inline_svg(svg, anchor, caption)}</div>'
         f"<figcaption>{_label(name, caption)}</figcaption></figure>"
     )
 
 
-def inline_svg(svg: bytes, prefix: str) -> str:
-    """An SVG document as an element of a page: no prologue, no metadata, ids with a prefix of their own."""
+def inline_svg(svg: bytes, prefix: str, label: str) -> str:
+    """An SVG document as an element of a page: no prologue, no metadata, ids with a prefix of their own.
+
+    ``label`` is for those who do not see it.
+    """
     text = svg.decode("utf-8")
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
@@ -113,12 +116,10 @@ def inline_svg(svg: bytes, prefix: str) -> str:
     text = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', text)
     text = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", text)
-    return re.sub(r"^<svg[^>]*>", _without_size, text, count=1)
-
-
-def _without_size(tag: re.Match[str]) -> str:
-    """The opening tag of an SVG whose width the page rules; its shape is in the viewBox."""
-    return re.sub(r'\s(width|height|version)="[^"]*"', "", tag[0]).replace("<svg", '<svg role="img"', 1)
+    tag, rest = text.split(">", 1)
+    # the page rules the width; the shape is in the viewBox
+    tag = re.sub(r'\s(width|height|version)="[^"]*"', "", tag)
+    return f'{tag} role="img" aria-label="{escape(label)}">{rest}'
 
 
 # numbers

@@ -16,7 +16,7 @@ STYLE = """
 @media (prefers-color-scheme: dark) {
   :root {
     --ink: #e4e6e9; --soft: #a2a9b2; --page: #16181b; --line: #3a3f45; --band: #1f2226;
-    --mark: #7cb8ec; --good: #6fce93; --bad: #f08a74; --picture: #f6f6f4;
+    --mark: #7cb8ec; --good: #6fce93; --bad: #f08a74; --picture: #ffffff;
   }
 }
 * { box-sizing: border-box; }
