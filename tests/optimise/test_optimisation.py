@@ -113,7 +113,11 @@ def test_every_flown_candidate_keeps_the_limits(
 
 @pytest.mark.parametrize(
     ("search", "limits", "cuts"),
-    [(QUICK, Limits(0.9), (0.0, 0.5, 0.8)), (SWARM, Limits(0.9), (0.0, 0.5)), (QUICK, TORQUE, (0.15,))],
+    [
+        (QUICK, Limits(0.9), (0.0, 0.5, 0.8)),
+        (SWARM, Limits(0.9), (0.0, 0.5)),
+        pytest.param(QUICK, TORQUE, (0.15,), marks=pytest.mark.slow),
+    ],
 )
 def test_resumes_from_any_step_to_the_identical_result(
     search: ScheduleSearch, limits: Limits, cuts: tuple[float, ...]
@@ -164,11 +168,11 @@ def test_the_result_flies_as_it_says() -> None:
             moved = result.schedules[schedule]
             assert flown is not None
             assert moved is not None
-            departure = by_simulation(moved, model, 1.1)
+            departure = by_simulation(moved, model, 1.0)
             assert flown.variation == pytest.approx(np.sum(departure**2), rel=1e-4)
             shown = curves["flights"][name][schedule]["theta_rad"]
             np.testing.assert_allclose(shown, departure[:, 1], atol=1e-6)
-    np.testing.assert_allclose(curves["time_s"], 0.01 * np.arange(111), atol=1e-12)
+    np.testing.assert_allclose(curves["time_s"], 0.01 * np.arange(101), atol=1e-12)
     assert curves["schedules"]["optimum"]["sweep_rad"][-1] == pytest.approx(0.4)
 
 
@@ -208,6 +212,7 @@ def test_time_budget_is_shared_between_the_searches() -> None:
     assert document["search"]["finished"]
 
 
+@pytest.mark.slow
 def test_free_values_are_no_worse_than_fixed_ones() -> None:
     """With the angles at the knots free too, the best schedule disturbs less."""
     limits = Limits(0.9, 6.0)
@@ -235,7 +240,7 @@ def test_a_torque_that_no_schedule_keeps_is_an_error_with_a_way_out() -> None:
 def test_minimum_time_agrees_with_the_front() -> None:
     """The shortest morph below a variation of the front is that point of it, or a shorter one."""
     limits = Limits(0.9, 6.0)
-    front_run = optimisation(replace(SHORT, goal="pareto", front_points=3), limits)
+    front_run = optimisation(replace(SHORT, goal="pareto", front_points=2), limits)
     front = front_run.result(last(front_run).checkpoint).to_document()
     times = [point["duration_s"] for point in front["searched"]]
     assert times[0] >= front_run.space(0.8).quickest[0]
