@@ -303,7 +303,7 @@ def _computation_table(found: Document) -> str:
                     milliseconds(times["total_s"]),
                     percent(flight_share(flown, model)) if model != "flexible" else "100 %",
                     percent(flight_share(flown, model, "total_s")) if model != "flexible" else "100 %",
-                    f"{flown['duration_s'] / times['total_s']:,.3g}",
+                    number(flown["duration_s"] / times["total_s"]),
                     f"{flown['slowest_over_fastest'][model]:.2f}",
                 )
             )
@@ -366,10 +366,10 @@ def _beside_another_program(results: Results) -> list[str]:
     equivalent, flexible = models["equivalent"]["total_s"], models["flexible"]["total_s"]
     return [
         paragraph(
-            f"Beside a flexible program that was not written for this task the ratio is another: the "
-            f"independent program noted {number(noted)} s for the flight at 0.5 rad/s, on a machine of its "
-            f"own. Our equivalent model, lattice and trim included, takes {percent(equivalent / noted)} of "
-            f"that here, our flexible model {percent(flexible / noted)}."
+            "Beside another flexible program the ratio is another: the independent one noted "
+            f"{number(noted)} s for the flight at 0.5 rad/s, on a machine of its own. Our equivalent model, "
+            f"lattice and trim included, takes {percent(equivalent / noted)} of that here, our flexible "
+            f"model {percent(flexible / noted)}."
         )
     ]
 
