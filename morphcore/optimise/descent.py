@@ -31,6 +31,7 @@ FIRST_DAMPING = 3e-2
 LEAST_DAMPING, MOST_DAMPING = 1e-8, 1e6
 STALLED = 1e-4  # relative decrease of the cost that counts as none
 PATIENCE = 2  # iterations without decrease before a start has converged
+LEAST_COST = 1e-12  # rad^2: below, nothing is left to be gained
 STILL = 1e-9  # a step shorter than this is none; unknowns are shares of duration and change
 
 
@@ -125,7 +126,7 @@ def _accepted(
     lowered = state.damping[chosen] * np.array(DAMPING_TRIALS)[winner]
     raised = state.damping[chosen] * max(DAMPING_TRIALS) ** 2
     damping[chosen] = np.clip(np.where(improved, lowered, raised), LEAST_DAMPING, MOST_DAMPING)
-    still = before - after < STALLED * before
+    still = before - after <= STALLED * before
     stalled[chosen] = np.where(still, stalled[chosen] + 1, 0)
     return DescentState(point, cost, torque, damping, stalled, state.iteration + 1)
 
@@ -181,7 +182,7 @@ def _step(
     space: MorphSpace, limit: TorqueLimit, point: Array, cost: float, model: _Linear, damping: float
 ) -> Array:
     """The minimum (d,) of the damped quadratic model under the limits, made to keep them exactly."""
-    J = model.errors_gradient
+    J, cost = model.errors_gradient, max(cost, LEAST_COST)
     normal = J.T @ J / cost
     toward = J.T @ model.errors / cost
     # a floor under Marquardt's scale: an unknown that the attitude does not see must not run to its bound

@@ -6,6 +6,7 @@ the angle; a schedule alone tells them apart. They fly side by side in threads.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from morphcore.threads import in_threads, thread_count
 Array = NDArray[np.float64]
 
 SAMPLE_S = 0.01  # between the rows whose departures are summed
+LONG_FLIGHT = 5_000  # steps: a fifth of a second
 DIVERGED_ANGLE = 3.0  # rad of departure charged for every angle of a row that a diverged flight never reached
 
 
@@ -98,12 +100,14 @@ class MorphFlights:
     def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:
         """Fly schedules of all hinges; with the torque of their motors if asked for.
 
-        ``stop`` is asked between rounds of one flight for each thread; True raises Interrupted.
+        ``stop`` is asked between rounds of one flight for each thread, of long flights within them too, by
+        one thread at a time; True raises Interrupted.
         """
+        within = _one_at_a_time(stop) if stop is not None and self.grid.steps > LONG_FLIGHT else None
         flown: list[tuple[Array, Array]] = [(np.zeros(0), np.zeros(0))] * len(schedules)
 
         def one(number: int) -> None:
-            flown[number] = self._one(schedules[number], torque=torque)
+            flown[number] = self._one(schedules[number], within, torque=torque)
 
         for first in range(0, len(schedules), thread_count()):
             if stop is not None and stop():
@@ -119,13 +123,24 @@ class MorphFlights:
             np.asarray(lost.any(axis=(1, 2))),
         )
 
-    def _one(self, schedule: Schedule, *, torque: bool) -> tuple[Array, Array]:
+    def _one(self, schedule: Schedule, stop: Stop | None, *, torque: bool) -> tuple[Array, Array]:
         """Euler angles (k, 3) at the rows, and torques (n,)."""
         plan = self.path.plan(self.model, schedule, self.grid)
         rows = self.model.state_rows if torque else 4
-        chunks = fly_batch(self.model, plan, self.constants, self.state, record_rows=rows)
+        chunks = fly_batch(self.model, plan, self.constants, self.state, record_rows=rows, stop=stop)
         states = np.concatenate([chunk.rows[..., 0] for chunk in chunks])
         attitude = euler_from_quaternion(states[self.grid.at, :4])
         if not torque:
             return attitude, np.zeros(0)
         return attitude, hinge_torques(self.model, plan, self.constants, states).ravel()
+
+
+def _one_at_a_time(stop: Stop) -> Stop:
+    """The same question, for several threads."""
+    lock = threading.Lock()
+
+    def guarded() -> bool:
+        with lock:
+            return stop()
+
+    return guarded

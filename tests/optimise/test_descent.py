@@ -80,6 +80,25 @@ def test_finds_a_minimum_inside():
     np.testing.assert_allclose(state.point[0], inside, atol=1e-5)
 
 
+def test_nothing_to_gain_is_no_error():
+    """Where no angle with a weight departs at all, the descent rests where it is."""
+
+    def silent(points):
+        return Trials(
+            np.zeros((len(points), 5)),
+            np.zeros(len(points)),
+            np.zeros((len(points), 0)),
+            np.zeros(len(points)),
+        )
+
+    start = SPACE.centre[None, :]
+    state = first_descent(start, silent(start))
+    for _ in range(3):
+        state = next_descent(state, SPACE, NO_LIMIT, silent, keep=1)
+    np.testing.assert_array_equal(state.point, start)
+    assert not state.active.any()
+
+
 def test_nothing_is_flown_that_breaks_a_limit():
     """Probes and trials alike keep the limits, whatever the search does."""
     bench = Bench()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
 from morphcore.optimise.settings import Weights
 from morphcore.simulate.batch import Interrupted
@@ -109,6 +112,22 @@ def test_stop_is_asked_between_flights(flights):
     answers = iter([False, True])
     with pytest.raises(Interrupted):
         flights.fly(SCHEDULES * 2, torque=False, stop=lambda: next(answers))
+
+
+def test_stop_is_asked_within_long_flights(flights, monkeypatch):
+    """A flight of many steps is broken off in its midst, by one question at a time."""
+    monkeypatch.setattr(module, "LONG_FLIGHT", 10)
+    asking, asked = threading.Lock(), []
+
+    def stop():
+        assert asking.acquire(blocking=False)
+        asked.append(None)
+        asking.release()
+        return len(asked) > 2
+
+    with pytest.raises(Interrupted):
+        flights.fly(SCHEDULES[:2], torque=False, stop=stop)
+    assert len(asked) >= 3
 
 
 def test_a_diverged_flight_is_charged(flights):
