@@ -1,7 +1,7 @@
 """MorphID's numeric library: equivalent models of sweep-morphing aircraft from sample flights.
 
 The functions ``identify`` and ``simulate`` share their names with the rooms that hold them, and win: import
-what lies inside a room by ``from morphcore.identify.swarm import ...``.
+what lies inside a room by ``from morphcore.identify.settings import ...``.
 """
 
 from __future__ import annotations

@@ -7,8 +7,11 @@ import numpy as np
 from morphcore.geometry.aircraft import aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
-from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.simulate.flight import simulate
+from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.schedule import Hold
+from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
 
@@ -43,5 +46,10 @@ def warm_up(threads: int | None = None) -> None:
     sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
     small = LatticeSettings(chordwise=1, spanwise=4)
     model = chain_model(aircraft, flight, 2, small)
-    costs(model, physical_guess(model), sample_cases(model, [sample]), "trim")
+    guess = physical_guess(model)
+    costs(model, guess, sample_cases(model, [sample]), "trim")
+    held = flight_plan(model, [Hold()] * len(sides), time_grid(time_s))
+    states = np.zeros((held.grid.steps + 1, model.state_rows))
+    states[:, 0] = 1.0  # an attitude needs a unit quaternion
+    hinge_torques(model, held, lane_constants(model, guess, held.grid.step_s), states)
     simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=small, step_s=0.01)

@@ -18,10 +18,10 @@ from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.state import Phase, SearchState, decode, encode
-from morphcore.identify.swarm import first_swarm, next_swarm
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.swarm import first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]

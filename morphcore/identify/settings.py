@@ -10,10 +10,10 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
-from morphcore.identify.swarm import SwarmSettings
 from morphcore.models.equivalent import MOST_LINKS
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
+from morphcore.swarm import SwarmSettings
 
 Method = Literal["hybrid", "pso", "least_squares"]
 

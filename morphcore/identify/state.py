@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.errors import MorphError
+from morphcore.checkpoint import pack, unpack
 from morphcore.identify.polish import PolishState
-from morphcore.identify.swarm import SwarmState
+from morphcore.swarm import SwarmState
 
 Array = NDArray[np.float64]
 Phase = Literal["baseline", "screen", "swarm", "polish", "done"]
 
-FORMAT = 1  # of the checkpoint; a worker refuses one that it does not know
-
-
-class UnreadableCheckpoint(MorphError):
-    """A checkpoint is damaged or was written by another version."""
-
-    code = "unreadable_checkpoint"
+VERSION = "identification 2"  # of the checkpoint; a worker refuses one that it does not know
 
 
 @dataclass(frozen=True)
@@ -47,33 +38,8 @@ class SearchState:
 
 
 def encode(state: SearchState) -> bytes:
-    """The state as bytes: JSON for the small, arrays exactly as they are."""
-    arrays: dict[str, Array] = {"best": state.best}
-    header: dict[str, Any] = {
-        "format": FORMAT,
-        **{
-            name: getattr(state, name)
-            for name in ("phase", "best_cost", "generation", "flights", "wall_s", "history")
-        },
-    }
-    for name, part in (("swarm", state.swarm), ("polish", state.polish)):
-        if part is None:
-            continue
-        header[name] = {}
-        for item in fields(part):
-            value = getattr(part, item.name)
-            if isinstance(value, np.ndarray):
-                arrays[f"{name}.{item.name}"] = value
-            elif (
-                item.name == "random"
-            ):  # numpy's legacy generator: name, key vector, position, cached normal deviate
-                arrays[f"{name}.random"] = value[1]
-                header[name]["random"] = [value[0], *value[2:]]
-            else:
-                header[name][item.name] = value
-    out = io.BytesIO()
-    np.savez(out, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
-    return out.getvalue()
+    """The state as bytes, exactly as it is."""
+    return pack(state, VERSION)
 
 
 def decode(checkpoint: bytes) -> SearchState:
@@ -83,35 +49,15 @@ def decode(checkpoint: bytes) -> SearchState:
     ------
     UnreadableCheckpoint : the bytes are damaged or of another version.
     """
-    try:
-        with np.load(io.BytesIO(checkpoint), allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        header = json.loads(arrays.pop("header").tobytes())
-        known = header.pop("format") == FORMAT
-    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise UnreadableCheckpoint(
-            f"the checkpoint cannot be read: {error}", hint="start the identification anew"
-        ) from None
-    if not known:
-        raise UnreadableCheckpoint(
-            "the checkpoint is of another version", hint="start the identification anew"
-        )
-    swarm, polish = header.pop("swarm", None), header.pop("polish", None)
+    return unpack(checkpoint, VERSION, _state)
+
+
+def _state(tree: dict[str, Any]) -> SearchState:
+    swarm, polish = tree.pop("swarm"), tree.pop("polish")
     if swarm is not None:
-        random = swarm.pop("random")
-        swarm = SwarmState(
-            **swarm, **_part(arrays, "swarm"), random=(random[0], arrays["swarm.random"], *random[1:])
-        )
-    if polish is not None:
-        polish = PolishState(**polish, **_part(arrays, "polish"))
-    history = tuple(header.pop("history"))
-    return SearchState(**header, best=arrays["best"], history=history, swarm=swarm, polish=polish)
-
-
-def _part(arrays: dict[str, Array], name: str) -> dict[str, Any]:
-    prefix = f"{name}."
-    return {
-        key.removeprefix(prefix): value
-        for key, value in arrays.items()
-        if key.startswith(prefix) and key != f"{prefix}random"
-    }
+        swarm = SwarmState(**{**swarm, "random": tuple(swarm["random"])})
+    return SearchState(
+        **{**tree, "history": tuple(tree["history"])},
+        swarm=swarm,
+        polish=None if polish is None else PolishState(**polish),
+    )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import (
     Identification,
@@ -24,9 +25,9 @@ from morphcore.identify import (
 )
 from morphcore.identify.cost import costs, evaluate, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
-from morphcore.identify.state import UnreadableCheckpoint, decode
-from morphcore.identify.swarm import SwarmSettings
+from morphcore.identify.state import decode
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.swarm import SwarmSettings
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
