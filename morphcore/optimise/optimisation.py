@@ -127,14 +127,23 @@ class ScheduleOptimisation:
         rigid = chain_model(self.aircraft, self.flight, 1, self.lattice)
         return rigid, physical_guess(rigid)
 
-    def flights(self, name: ModelName, duration_s: float) -> MorphFlights:
-        """Flights over the window of one duration."""
+    @property
+    def times_s(self) -> Array:
+        """Times of the rows that count: from the begin of the morph to the end of the longest one's window.
+
+        Whatever its duration, every morph is judged over the same time, or a quick one would look calm
+        because its window ends sooner.
+        """
+        return sample_times(self.morph.duration_s, self.morph.settle_s)
+
+    def flights(self, name: ModelName) -> MorphFlights:
+        """Flights over the window that morphs of all durations share."""
         model, batch = self.chain(name)
         return MorphFlights(
             model,
             batch,
             self.path,
-            sample_times(duration_s, self.morph.settle_s),
+            self.times_s,
             initial_rad=self.morph.initial_rad,
             start=self.start,
             step_s=self.step_s,
@@ -261,7 +270,7 @@ class ScheduleOptimisation:
         waiting = {name: schedule for name, schedule in self.compared(state).items() if schedule is not None}
         name = list(waiting)[len(state.verified)]
         begin, shown, flexible = self._clock(), 0.0, self.flexible
-        end_s = float(sample_times(self.best(state).duration_s, self.morph.settle_s)[-1])
+        end_s = float(self.times_s[-1])
         euler, failure = np.zeros((0, 3)), ""
         try:
             with one_blas_thread():
@@ -296,7 +305,7 @@ class ScheduleOptimisation:
     def _run(self, task: Task) -> SearchRun:
         if task not in self._runs:
             self._runs.clear()  # one at a time: each holds a window's constants
-            flights = self.flights(task.model, task.duration_s)
+            flights = self.flights(task.model)
             self._runs[task] = SearchRun(self.space(task.duration_s), flights, self.search, self.weights)
         return self._runs[task]
 
@@ -332,9 +341,7 @@ class ScheduleOptimisation:
         least = found.torque
         for factor in LONGER:
             duration = factor * found.duration_s
-            run = SearchRun(
-                self.space(duration), self.flights("equivalent", duration), self.search, self.weights
-            )
+            run = SearchRun(self.space(duration), self.flights("equivalent"), self.search, self.weights)
             state = run.begin(np.zeros((0, run.space.dimension)))
             while state.phase in ("baseline", "ease"):
                 state, _ = run.advance(state, stop)

@@ -165,7 +165,7 @@ def schedule_result(
     best, schedules = run.best(state), run.compared(state)
     named = {name: schedule for name, schedule in schedules.items() if schedule is not None}
     flights: dict[str, dict[str, ComparedFlight | None]] = {}
-    benches = {model: run.flights(model, best.duration_s) for model in ("rigid", "equivalent")}
+    benches = {model: run.flights(model) for model in ("rigid", "equivalent")}
     for model, bench in benches.items():
         flown = bench.fly(list(named.values()), torque=judged)
         flights[model] = {name: _compared(flown, i, judged=judged) for i, name in enumerate(named)}
@@ -214,9 +214,7 @@ def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bo
             continue
         constant = None
         if judged:
-            flown = run.flights("equivalent", item.duration_s).fly(
-                [run.constant(item.duration_s)], torque=False
-            )
+            flown = run.flights("equivalent").fly([run.constant(item.duration_s)], torque=False)
             constant = None if flown.diverged[0] else float(flown.variation[0])
         schedule = run.space(item.duration_s).schedule(item.point)
         beaten = item.variation >= least

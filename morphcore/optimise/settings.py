@@ -40,9 +40,10 @@ class Morph:
 
     initial_rad, final_rad : angles before and after it. duration_s : its time; of the goals "minimum_time"
     and "pareto" the longest that is looked at. knots : points of the spline, both ends included: with 6 and
-    fixed values, 4 times are sought. settle_s : how long after it the attitude still counts. free_values :
-    seek the angles at the knots too. goal : least variation in the given duration, least duration with a
-    variation of at most ``max_variation_rad2``, or the front of both, of ``front_points`` durations.
+    fixed values, 4 times are sought. settle_s : how long after ``duration_s`` the attitude still counts, of
+    shorter morphs too. free_values : seek the angles at the knots too. goal : least variation in the given
+    duration, least duration with a variation of at most ``max_variation_rad2``, or the front of both, of
+    ``front_points`` durations.
     """
 
     final_rad: float
