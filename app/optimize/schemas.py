@@ -37,7 +37,8 @@ class Morph(Strict):
         default=6, ge=3, le=20, description="Of the spline, both ends included; the times between are sought."
     )
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S)] = Field(
-        default=2.0, description="How long after `duration_s` the attitude still counts, of shorter morphs too."
+        default=2.0,
+        description="How long after `duration_s` the attitude still counts, of shorter morphs too.",
     )
     free_values: bool = Field(default=False, description="Seek the angles at the knots too.")
     goal: Literal["variation", "minimum_time", "pareto"] = Field(
