@@ -330,7 +330,7 @@ def _attitude(model: ChainModel, batch: ParameterBatch, case: SampleCase) -> Arr
 
 def _machine() -> Figures:
     return {
-        "processor": _processor(),
+        "processor": processor_name(),
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
@@ -341,7 +341,8 @@ def _machine() -> Figures:
     }
 
 
-def _processor() -> str:
+def processor_name() -> str:
+    """What this machine calls its processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -8,11 +8,12 @@ from typing import Any
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.fields import Fields
-from morphcore.identify.identification import Identification, Step
+from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
 from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
+from morphcore.steps import Step
 from morphcore.threads import use_threads
 
 __all__ = [

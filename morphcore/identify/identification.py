@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.steps import Step
 from morphcore.swarm import first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
 
@@ -33,24 +34,6 @@ SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical 
 PRIOR_RAD = 1e-4
 # the field of starts narrows as the polish goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
-
-
-@dataclass(frozen=True)
-class Step:
-    """What one step of an identification leaves.
-
-    fraction : of the whole search, 0..1. best_cost : least J so far, rad^2. flights : flown so far, one per
-    parameter set and sample. checkpoint : complete state; ``steps(checkpoint)`` goes on to the bit-identical
-    result.
-    """
-
-    phase: str
-    generation: int
-    fraction: float
-    best_cost: float
-    flights: int
-    message: str
-    checkpoint: bytes
 
 
 class Identification:

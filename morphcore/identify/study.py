@@ -17,7 +17,7 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import Fields
 from morphcore.identify import identification_from_document
-from morphcore.identify.identification import Clock, Identification, Step
+from morphcore.identify.identification import Clock, Identification
 from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
@@ -26,6 +26,7 @@ from morphcore.identify.study_timing import ROUNDS, FlightTiming, flight_timing,
 from morphcore.models.equivalent import MOST_LINKS, physical_guess
 from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.steps import Step
 from morphcore.threads import one_blas_thread
 
 LINKS = (1, 2, 3, 4, 5, 6)

@@ -106,6 +106,14 @@ class NodePoses:
         move_poses(increments, self.R, self.x, np.empty((7, 3)))
 
 
+def carried(poses: NodePoses, leader: int, motion: Array, nodes: slice) -> Array:
+    """A motion vector (6,) of node ``leader``, moved rigidly to ``nodes``: (m, 6), in their axes."""
+    R = poses.R[leader].T @ poses.R[nodes]
+    arm = (poses.x[nodes] - poses.x[leader]) @ poses.R[leader]
+    linear = motion[3:] + np.cross(motion[:3], arm)
+    return np.concatenate([np.einsum("nij,i->nj", R, motion[:3]), np.einsum("nij,ni->nj", R, linear)], axis=1)
+
+
 class BeamWorkspace:
     """Scratch of one thread for some beams."""
 

@@ -10,7 +10,6 @@ from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.optimise.optimisation import ScheduleOptimisation
-from morphcore.optimise.progress import Step
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import (
     VERIFICATIONS,
@@ -29,6 +28,7 @@ from morphcore.optimise.settings import (
 from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.request import flown_model
+from morphcore.steps import Step
 from morphcore.threads import use_threads
 
 __all__ = [

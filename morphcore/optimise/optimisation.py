@@ -31,7 +31,7 @@ from morphcore.optimise.goals import (
     warm_starts,
 )
 from morphcore.optimise.limits import MorphSpace
-from morphcore.optimise.progress import Step, Told, best_cost, effort, shown_cost
+from morphcore.optimise.progress import Told, best_cost, effort, shown_cost
 from morphcore.optimise.result import ScheduleResult, schedule_result
 from morphcore.optimise.search import SearchRun
 from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
@@ -41,6 +41,7 @@ from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import STEP_S, CommonPath, common_path
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
+from morphcore.steps import Step
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]

@@ -17,24 +17,6 @@ FLEXIBLE_FLIGHTS = 3
 
 
 @dataclass(frozen=True)
-class Step:
-    """What one step of an optimisation leaves.
-
-    fraction : of the whole work, 0..1. best_cost : least J of the equivalent model's search that ran last,
-    rad^2. flights : flown so far. checkpoint : complete state; ``steps(checkpoint)`` goes on to the
-    bit-identical result.
-    """
-
-    phase: str
-    generation: int
-    fraction: float
-    best_cost: float
-    flights: int
-    message: str
-    checkpoint: bytes
-
-
-@dataclass(frozen=True)
 class Told:
     """The words of a step; ``share`` of a flight of the flexible model that is under way."""
 

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from morphcore.bench import processor_name
 from morphcore.threads import thread_count
 
 Document = dict[str, Any]
@@ -30,7 +31,7 @@ def versions() -> dict[str, str]:
 def machine() -> Document:
     """Processor, cores, threads used and operating system."""
     return {
-        "processor": _processor(),
+        "processor": processor_name(),
         "cores": os.cpu_count(),
         "threads": thread_count(),
         "system": f"{platform.system()} {platform.machine()}",
@@ -54,11 +55,3 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:  # run from a source tree that is not installed
         return UNKNOWN
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor() or UNKNOWN
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), UNKNOWN)

@@ -50,9 +50,14 @@ def chain_flight(
         flown.append(chunk.rows[..., 0])
         yield chunk.first / grid.steps, None
     history = np.concatenate(flown)
-    joints = history[:, JOINTS:]
-    require_sound(history[:, VELOCITY:POSITION], history[:, :OMEGA], 2.0, model.flight, grid.times_s)
-    require_sound(history[:, VELOCITY:POSITION], joints, LARGEST_JOINT_ANGLE_RAD, model.flight, grid.times_s)
+    turned = np.abs(history[:, JOINTS:]).max(axis=1, initial=0.0)
+    require_sound(
+        history,
+        history[:, VELOCITY:POSITION],
+        model.flight,
+        grid.times_s,
+        turned < LARGEST_JOINT_ANGLE_RAD,
+    )
     history = history[at]
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])

@@ -21,6 +21,7 @@ from morphcore.multibody.beam import (
     BeamTurnedTooFar,
     BeamWorkspace,
     NodePoses,
+    carried,
     expand_solution,
     factor,
     node_forces,
@@ -236,7 +237,7 @@ def stepped(
 
     Raises
     ------
-    FlightDiverged : Newton's iteration does not arrive, or an element is bent too far.
+    _Lost : Newton's iteration does not arrive. BeamTurnedTooFar : an element is bent too far.
     """
     h, model = rule.step_s, flight.model
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
@@ -244,10 +245,7 @@ def stepped(
     lag, circulation = before.lag, before.circulation
     slow, last = True, np.inf
     for iteration in range(MOST_ITERATIONS):
-        a = rule.averaged(before, A)
-        V, poses = rule.velocity(before, a), before.poses.copy()
-        poses.move(rule.increment(before, a))
-        flight.follow(poses, V, A, path, row)
+        a, V, poses = _moved(flight, before, A, path, row, rule)
         demands = flight.structure(poses, V, A)
         twists = flight.place_lattice(poses, V, wind_N) if iteration == 0 else flight.twists(poses, V)
         wind_B = wind_N @ poses.R[0]
@@ -261,15 +259,23 @@ def stepped(
         A += change
         largest = h * float(np.abs(change).max())
         if largest < TOLERANCE:
-            a = rule.averaged(before, A)
-            V, poses = rule.velocity(before, a), before.poses.copy()
-            poses.move(rule.increment(before, a))
-            flight.follow(poses, V, A, path, row)
+            a, V, poses = _moved(flight, before, A, path, row, rule)
             return FlexibleState(poses, V, A, a, lag, circulation)
         if not np.isfinite(largest):
             break
         slow, last = largest > SLOW * last, largest
     raise _Lost
+
+
+def _moved(
+    flight: FlexibleFlight, before: FlexibleState, A: Array, path: HingePath, row: int, rule: Stepper
+) -> tuple[Array, Array, NodePoses]:
+    """Where twist rates A (n, 6) at the end of a step lead: a, V and poses; the roots' part of A is set."""
+    a = rule.averaged(before, A)
+    V, poses = rule.velocity(before, a), before.poses.copy()
+    poses.move(rule.increment(before, a))
+    flight.follow(poses, V, A, path, row)
+    return a, V, poses
 
 
 class _Lost(Exception):
@@ -309,11 +315,8 @@ def set_in_motion(
     V, A = state.V.copy(), np.zeros_like(state.A)
     flight.follow(poses, V, A, path, 0)
     for root, tip in zip(model.roots, model.tips, strict=True):
-        arm = (poses.x[root : tip + 1] - poses.x[root]) @ poses.R[root]
-        R_rel = poses.R[root].T @ poses.R[root : tip + 1]
-        linear = V[root, 3:] + np.cross(V[root, :3], arm)
-        V[root : tip + 1, :3] = np.einsum("nij,i->nj", R_rel, V[root, :3])
-        V[root : tip + 1, 3:] = np.einsum("nij,ni->nj", R_rel, linear)
+        wing = slice(root, tip + 1)
+        V[wing] = carried(poses, root, V[root], wing)
     circulation = state.circulation
     for iteration in range(MOST_ITERATIONS):
         flight.follow(poses, V, A, path, 0)

@@ -59,7 +59,7 @@ def flexible_flight(
         with one_blas_thread():
             rows += [_row(model, state) for state in islice(states, CHUNK_STEPS)]
     history = np.stack(rows)
-    require_sound(history[:, 6:9], history, np.inf, model.flight, times)
+    require_sound(history, history[:, 6:9], model.flight, times)
     history = history[at]
     record = FlightRecord(
         euler=history[:, :3],

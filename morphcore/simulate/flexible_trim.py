@@ -10,7 +10,14 @@ from scipy.optimize import NoConvergence, newton_krylov
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
-from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, expand_solution, factor, reduce_right
+from morphcore.multibody.beam import (
+    BeamTurnedTooFar,
+    NodePoses,
+    carried,
+    expand_solution,
+    factor,
+    reduce_right,
+)
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.trim import StartMode
 
@@ -72,12 +79,7 @@ class _Balance:
 
     def _rigid(self, poses: NodePoses, motion_B: Array) -> Array:
         """Motion vector of the fuselage, moved rigidly to all nodes, (n, 6)."""
-        R_BX = poses.R[0].T @ poses.R
-        x_B = (poses.x - poses.x[0]) @ poses.R[0]
-        linear = motion_B[3:] + np.cross(motion_B[:3], x_B)
-        return np.concatenate(
-            [np.einsum("nij,i->nj", R_BX, motion_B[:3]), np.einsum("nij,ni->nj", R_BX, linear)], axis=1
-        )
+        return carried(poses, 0, motion_B, slice(None))
 
     def total(self, poses: NodePoses, forces: Array) -> Array:
         """Sum (6,) of force vectors (n, 6) on all nodes, about the reference point in B."""
@@ -99,8 +101,7 @@ class _Balance:
         increments[self.free] = x[:count].reshape(-1, 6)
         poses = self.unbent.copy()
         poses.move(increments)
-        poses.R, poses.x = R_NB @ poses.R, poses.x @ R_NB.T
-        poses.R = np.ascontiguousarray(poses.R)
+        poses.R, poses.x = np.ascontiguousarray(R_NB @ poses.R), poses.x @ R_NB.T
         V = self._rigid(poses, V_B)
         A = np.zeros_like(V)
         demands = flight.structure(poses, V, A)

@@ -35,8 +35,12 @@ class FlightRecord:
     trim: Trim
 
 
-def require_sound(velocity: Array, others: Array, largest: float, flight: Flight, times: Array) -> None:
-    """Check a flight (k times): all finite, no speed absurd, no |others| (k, m) beyond ``largest``.
+def require_sound(
+    history: Array, velocity: Array, flight: Flight, times: Array, within: NDArray[np.bool_] | None = None
+) -> None:
+    """Check a flight (k times): all of its history (k, rows) finite, no speed absurd, all times ``within``.
+
+    velocity : (k, 3) m/s. within : (k,) what the model itself can tell of its domain.
 
     Raises
     ------
@@ -44,11 +48,9 @@ def require_sound(velocity: Array, others: Array, largest: float, flight: Flight
     """
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.sqrt(np.sum(velocity**2, axis=1))
-        sound = (
-            np.all(np.isfinite(others), axis=1)
-            & (speed < LARGEST_SPEED_RATIO * flight.airspeed_m_s)
-            & (np.abs(others).max(axis=1, initial=0.0) < largest)
-        )
+        sound = np.all(np.isfinite(history), axis=1) & (speed < LARGEST_SPEED_RATIO * flight.airspeed_m_s)
+        if within is not None:
+            sound &= within
     if not np.all(sound):
         raise FlightDiverged(time_s=float(times[max(int(np.argmin(sound)) - 1, 0)]))
 
