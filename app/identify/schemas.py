@@ -12,10 +12,9 @@ from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, Start, StepS
 from app.schemas.parameters import MAX_LINKS
 from app.schemas.samples import EXAMPLE_SAMPLE, Sample
+from app.schemas.search import WEEK_S, SwarmSearch
 
 MAX_SAMPLES = 64
-MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
-WEEK_S = 7 * 86_400.0
 
 Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
 Method = Literal["hybrid", "pso", "least_squares"]
@@ -64,20 +63,12 @@ class EquivalentModel(SoughtModel):
     links_per_wing: int = Field(default=3, ge=1, le=MAX_LINKS)
 
 
-class Search(Strict):
+class Search(SwarmSearch):
     """How the parameters are sought; what is left out depends on the method."""
 
     method: Method = "hybrid"
     particles: Annotated[int, Field(ge=1, le=100_000)] | None = None
     generations: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to a particle's best."
-    )
-    c2: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to the swarm's best."
-    )
-    inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")
     max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
         default=None, description="Time budget of the search; the best so far is the result."
     )

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.identify.schemas import MAX_SEED, WEEK_S
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, StepS
 from app.schemas.parameters import EXAMPLE_PARAMETERS, KnownModel
+from app.schemas.search import WEEK_S, SwarmSearch
 from app.simulate.schemas import MAX_ELEMENTS
 
 LONGEST_MORPH_S = 100.0
@@ -71,20 +71,12 @@ class Weights(Strict):
     psi: Weight = 1.0
 
 
-class ScheduleSearch(Strict):
+class ScheduleSearch(SwarmSearch):
     """How the schedule is sought; what is left out depends on the method."""
 
     method: Literal["hybrid", "pso"] = "hybrid"
     particles: Annotated[int, Field(ge=1, le=10_000)] | None = None
     generations: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to a particle's best."
-    )
-    c2: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to the swarm's best."
-    )
-    inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")
     max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
         default=None, description="Time budget of the searches; the best so far is the result."
     )

@@ -12,9 +12,9 @@ from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import FlightStepS, Lattice, Start
 from app.schemas.parameters import KnownModel
 from app.schemas.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
+from app.schemas.search import MAX_SEED
 
 MAX_ELEMENTS = 100
-MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
 
 GustSpeed = Annotated[float, Field(ge=-100.0, le=100.0)]
 Direction = Annotated[
