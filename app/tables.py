@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import (
     JSON,
+    BigInteger,
     Boolean,
     CheckConstraint,
     Column,
@@ -15,6 +16,7 @@ from sqlalchemy import (
     MetaData,
     String,
     Table,
+    text,
 )
 
 metadata = MetaData(
@@ -28,6 +30,8 @@ metadata = MetaData(
 )
 
 STATUSES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired")
+CHUNK_STATUSES = ("open", "running", "done")
+ZERO = text("0")  # what rows that are older than a column count as
 
 jobs = Table(
     "jobs",
@@ -57,10 +61,29 @@ jobs = Table(
     Column("started_at", Double),
     Column("updated_at", Double, nullable=False),
     Column("finished_at", Double),
+    Column("key_id", String(64)),  # the API key that posted it; None where keys are off
+    Column("request_id", String(64)),  # of the call that posted it: leads from its logs to the worker's
+    Column("traceparent", String(128)),  # W3C trace context of that call
+    Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work lies in job_chunks
+    Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
+    Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
+    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),  # request, result and files
     CheckConstraint("status IN ({})".format(", ".join(f"'{name}'" for name in STATUSES)), name="status"),
     Index("ix_jobs_owner_id", "owner", "id"),
     Index("ix_jobs_status_priority_id", "status", "priority", "id"),
     Index("ix_jobs_status_lease_until", "status", "lease_until"),
+    Index("ix_jobs_status_owner_priority_id", "status", "owner", "priority", "id"),  # whose turn, which job
+    Index("ix_jobs_status_finished_at", "status", "finished_at"),  # retention, and how long jobs take
+    Index("ix_jobs_key_id_status", "key_id", "status"),  # what a key has in flight
+)
+
+owners = Table(
+    "owners",
+    metadata,
+    Column("owner", String(64), primary_key=True),
+    Column(
+        "served_at", Double, nullable=False, server_default=ZERO
+    ),  # when a worker last took a job of theirs
 )
 
 
@@ -110,6 +133,28 @@ job_results = Table(
     Column("at", Double, nullable=False),
 )
 
+job_chunks = Table(
+    "job_chunks",
+    metadata,
+    _job_key(),
+    Column("generation", Integer, primary_key=True, autoincrement=False),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("owner", String(64), nullable=False),
+    Column("status", String(16), nullable=False),
+    Column("attempt", Integer, nullable=False),
+    Column("fence", Integer, nullable=False),  # of this chunk: rises with every claim
+    Column("worker", String(128)),
+    Column("lease_until", Double),
+    Column("task", LargeBinary, nullable=False),  # what to fly
+    Column("outcome", LargeBinary),  # what came of it; stored once
+    Column("at", Double, nullable=False),
+    CheckConstraint(
+        "status IN ({})".format(", ".join(f"'{name}'" for name in CHUNK_STATUSES)), name="status"
+    ),
+    Index("ix_job_chunks_status_owner_job_id", "status", "owner", "job_id"),
+    Index("ix_job_chunks_status_lease_until", "status", "lease_until"),
+)
+
 artifacts = Table(
     "artifacts",
     metadata,
@@ -143,7 +188,10 @@ trajectories = Table(
     Column("duration_s", Double, nullable=False),
     Column("document", LargeBinary, nullable=False),  # deflated JSON columns
     Column("created_at", Double, nullable=False),
+    Column("key_id", String(64)),
+    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Index("ix_trajectories_owner_id", "owner", "id"),
+    Index("ix_trajectories_key_id", "key_id"),
 )
 
 models = Table(
@@ -158,4 +206,103 @@ models = Table(
     Column("created_at", Double, nullable=False),
     Index("ix_models_owner_id", "owner", "id"),
     Index("ix_models_job_id", "job_id"),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", String(64), primary_key=True),
+    Column("owner", String(64), nullable=False),  # keys of one owner see the same jobs
+    Column("name", String(64), nullable=False),
+    Column("prefix", String(16), nullable=False, unique=True),  # the part of the key that may be shown
+    Column("secret_sha256", String(64), nullable=False),  # the rest has 256 random bits: no slow hash needed
+    Column("scopes", JSON, nullable=False),
+    Column("max_jobs_in_flight", Integer),  # None: no limit
+    Column("max_flights_per_day", BigInteger),
+    Column("max_stored_bytes", BigInteger),
+    Column("created_at", Double, nullable=False),
+    Column("expires_at", Double),
+    Column("revoked_at", Double),
+    Column("last_used_at", Double),
+    Index("ix_api_keys_owner", "owner"),
+)
+
+key_usage = Table(
+    "key_usage",
+    metadata,
+    Column("key_id", String(64), primary_key=True),
+    Column("day", Integer, primary_key=True, autoincrement=False),  # days since 1970 UTC, database time
+    Column("flights", BigInteger, nullable=False),  # estimated when a job is posted, corrected when it ends
+)
+
+audit_log = Table(
+    "audit_log",
+    metadata,
+    Column("id", String(64), primary_key=True),
+    Column("at", Double, nullable=False),
+    Column("owner", String(64)),
+    Column("key_id", String(64)),
+    Column("action", String(64), nullable=False),  # job.cancel, key.create, auth.refused ...
+    Column("target", String(160)),
+    Column("outcome", String(32), nullable=False),
+    Column("request_id", String(64)),
+    Column("address", String(64)),
+    Column("detail", JSON),
+    Index("ix_audit_log_at", "at"),
+    Index("ix_audit_log_owner_at", "owner", "at"),
+)
+
+webhooks = Table(
+    "webhooks",
+    metadata,
+    Column("id", String(64), primary_key=True),
+    Column("owner", String(64), nullable=False),
+    Column("url", String(2000), nullable=False),
+    Column("events", JSON, nullable=False),  # event types that are sent
+    Column("secret", String(128), nullable=False),  # signing needs it in clear; shown once, when it is made
+    Column("failures", Integer, nullable=False),  # deliveries that were given up, one after the other
+    Column("disabled_at", Double),
+    Column("disabled_reason", String(200)),
+    Column("created_at", Double, nullable=False),
+    Index("ix_webhooks_owner_id", "owner", "id"),
+)
+
+webhook_deliveries = Table(
+    "webhook_deliveries",
+    metadata,
+    Column("id", String(64), primary_key=True),  # the message id: the same in every try
+    Column("webhook_id", String(64), ForeignKey("webhooks.id", ondelete="CASCADE"), nullable=False),
+    Column("job_id", String(64)),  # no foreign key: a delivery outlives its job
+    Column("type", String(64), nullable=False),
+    Column("payload", JSON, nullable=False),
+    Column("status", String(16), nullable=False),  # waiting, delivered, given_up
+    Column("attempt", Integer, nullable=False),
+    Column("fence", Integer, nullable=False),  # rises with every claim by a sender
+    Column("next_at", Double),  # when to try, or until when a sender holds it; None at its end
+    Column("response_status", Integer),
+    Column("error", String(300)),
+    Column("created_at", Double, nullable=False),
+    Column("finished_at", Double),
+    Index("ix_webhook_deliveries_status_next_at", "status", "next_at"),
+    Index("ix_webhook_deliveries_webhook_id_id", "webhook_id", "id"),
+)
+
+workers = Table(
+    "workers",
+    metadata,
+    Column("name", String(128), primary_key=True),
+    Column("version", String(32), nullable=False),
+    Column("slots", Integer, nullable=False),  # jobs it can run at once
+    Column("busy", Integer, nullable=False),
+    Column("started_at", Double, nullable=False),
+    Column("seen_at", Double, nullable=False),  # when it last took part in consuming messages
+    Column("stopped_at", Double),  # it ended as it should
+    Index("ix_workers_seen_at", "seen_at"),
+)
+
+counters = Table(
+    "counters",
+    metadata,
+    Column("name", String(120), primary_key=True),  # with its labels: jobs_finished{status="failed"}
+    Column("value", BigInteger, nullable=False),
 )
