@@ -135,6 +135,10 @@ def upgrade() -> None:
             ["webhook_id"], ["webhooks.id"], name=op.f("fk_webhook_deliveries_webhook_id"), ondelete="CASCADE"
         ),
         sa.PrimaryKeyConstraint("id", name=op.f("pk_webhook_deliveries")),
+        sa.UniqueConstraint("webhook_id", "job_id", name=op.f("uq_webhook_deliveries_webhook_id_job_id")),
+    )
+    op.create_index(
+        "ix_webhook_deliveries_status_finished_at", "webhook_deliveries", ["status", "finished_at"]
     )
     op.create_index("ix_webhook_deliveries_status_next_at", "webhook_deliveries", ["status", "next_at"])
     op.create_index("ix_webhook_deliveries_webhook_id_id", "webhook_deliveries", ["webhook_id", "id"])
@@ -176,6 +180,7 @@ def downgrade() -> None:
     op.drop_column("jobs", "key_id")
     op.drop_index("ix_webhook_deliveries_webhook_id_id", table_name="webhook_deliveries")
     op.drop_index("ix_webhook_deliveries_status_next_at", table_name="webhook_deliveries")
+    op.drop_index("ix_webhook_deliveries_status_finished_at", table_name="webhook_deliveries")
     op.drop_table("webhook_deliveries")
     op.drop_index("ix_job_chunks_status_owner_job_id", table_name="job_chunks")
     op.drop_index("ix_job_chunks_status_lease_until", table_name="job_chunks")
