@@ -17,6 +17,7 @@ from app.health.endpoints import router as health
 from app.http.body_limit import BodyLimit
 from app.http.context import Service
 from app.http.problems import install_problem_handlers
+from app.http.request_id import RequestId
 from app.identify.endpoints import router as identify
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
@@ -56,7 +57,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.router.lifespan_context = _lifespan(chosen)
     install_problem_handlers(app, known_fields=lambda: _request_fields(app))
     app.add_middleware(BodyLimit, max_bytes=chosen.max_body_bytes)
+    _wrap(app)
     return app
+
+
+def _wrap(app: FastAPI) -> None:
+    """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
+    inner = app.build_middleware_stack
+    app.build_middleware_stack = lambda: RequestId(inner())  # type: ignore[method-assign]
 
 
 def _request_fields(app: FastAPI) -> list[str]:

@@ -17,6 +17,7 @@ from starlette.routing import compile_path
 
 from app.documents import finite
 from app.errors import Fault, InvalidRequest, ServiceError
+from app.http.request_id import current_request_id
 from app.schemas.problem import Problem
 
 MEDIA_TYPE = "application/problem+json"
@@ -52,6 +53,7 @@ def problem_document(error: ServiceError, instance: str) -> dict[str, Any]:
         "detail": error.detail or error.title,
         "code": error.code,
         "instance": instance,
+        "request_id": current_request_id(),
         "pointer": error.pointer,
         "hint": error.hint,
         "errors": [

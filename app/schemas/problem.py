@@ -28,6 +28,9 @@ class Problem(BaseModel):
     detail: str
     code: str = Field(description="Stable, for programs.", examples=["invalid_request"])
     instance: str = Field(description="Path of the request.")
+    request_id: str = Field(
+        default="", description="As in the header `X-Request-ID`: leads to this request in the service's log."
+    )
     pointer: str = Field(default="", description="The first field at fault, as in `errors`.")
     hint: str = Field(default="", description="What to do about it.")
     errors: list[ProblemFault] = Field(default=[], description="Every fault that was found, at most 20.")
