@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,16 @@ class ServiceError(Exception):
 
     def __str__(self) -> str:
         return self.detail or self.title
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that the answer must carry."""
+        return {}
+
+    @property
+    def members(self) -> dict[str, Any]:
+        """Members of the problem document beyond the usual ones (RFC 9457, section 3.2)."""
+        return {}
 
 
 class InvalidRequest(ServiceError):
@@ -179,3 +190,120 @@ class JobNotFinished(Conflict):
         super().__init__(
             f"Job {job_id} is {status}.", "#path/job_id", f"POST /jobs/{job_id}/cancel first, then delete it."
         )
+
+
+class Unauthorized(ServiceError):
+    """No key, or one that does not open: unknown, expired and revoked keys are all told the same."""
+
+    status = 401
+    code = "unauthorized"
+    title = "A valid API key is needed"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The request has no valid API key.",
+            "#header/Authorization",
+            "Send `Authorization: Bearer mid_...`; `morphid keys create` makes a key.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """How to authenticate (RFC 9110, section 11.6.1)."""
+        return {"WWW-Authenticate": 'Bearer realm="MorphID"'}
+
+
+class MissingScope(ServiceError):
+    """The key is valid and may not do this."""
+
+    status = 403
+    code = "missing_scope"
+    title = "The API key may not do this"
+
+    def __init__(self, scopes: list[str]) -> None:
+        self.scopes = scopes
+        super().__init__(
+            f"The key lacks the scope {' '.join(scopes)}.",
+            "#header/Authorization",
+            "Use a key with this scope: `morphid keys create --scope ...`; GET /me tells what yours may do.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What would be enough (RFC 6750, section 3.1)."""
+        scope = " ".join(self.scopes)
+        return {"WWW-Authenticate": f'Bearer realm="MorphID", error="insufficient_scope", scope="{scope}"'}
+
+
+class TooManyRequests(ServiceError):
+    """Too much, too fast; ask again later."""
+
+    status = 429
+    code = "too_many_requests"
+    title = "Too many requests"
+
+    def __init__(self, detail: str, hint: str, *, retry_after_s: int) -> None:
+        self.retry_after_s = max(1, retry_after_s)
+        super().__init__(detail, hint=hint)
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s (RFC 9110, section 10.2.3)."""
+        return {"Retry-After": str(self.retry_after_s)}
+
+
+class TooManyRefusals(TooManyRequests):
+    """An address that keeps sending keys that do not open."""
+
+    code = "too_many_refusals"
+    title = "Too many invalid API keys from this address"
+
+    def __init__(self, retry_after_s: int) -> None:
+        super().__init__(
+            "This address has sent too many invalid API keys.",
+            "Correct the key; then ask again after the time of Retry-After.",
+            retry_after_s=retry_after_s,
+        )
+
+
+QUOTA_HINTS = {
+    "jobs_in_flight": "Wait until a job has ended, or cancel one.",
+    "flights_per_day": "Wait until midnight UTC, or ask for less: fewer particles, generations, samples.",
+    "stored_bytes": "Delete jobs that are not needed any more.",
+}
+
+
+class QuotaExceeded(TooManyRequests):
+    """The key's quota has no room for this."""
+
+    code = "quota_exceeded"
+    title = "The API key's quota is used up"
+
+    def __init__(self, quota: str, *, limit: int, used: int, asked: int, retry_after_s: int) -> None:
+        self.quota, self.limit, self.used, self.asked = quota, limit, used, asked
+        words = quota.replace("_", " ")
+        super().__init__(
+            f"The key may have {limit} {words}; {used} are used and this asks for {asked} more.",
+            QUOTA_HINTS.get(quota, "Ask the operator for a larger quota."),
+            retry_after_s=retry_after_s,
+        )
+
+    @property
+    def members(self) -> dict[str, Any]:
+        """Limit and use, for programs."""
+        return {"quota": {"name": self.quota, "limit": self.limit, "used": self.used, "asked": self.asked}}
+
+
+class CrossSiteRequest(ServiceError):
+    """A web page of another site made the browser send this."""
+
+    status = 403
+    code = "cross_site_request"
+    title = "Requests from pages of other sites are refused"
+
+
+class WrongHost(ServiceError):
+    """The request names a host that this service does not answer for."""
+
+    status = 421
+    code = "wrong_host"
+    title = "The service does not answer for this host"

@@ -60,6 +60,7 @@ def problem_document(error: ServiceError, instance: str) -> dict[str, Any]:
             {"code": fault.code, "detail": fault.detail, "pointer": fault.pointer, "hint": fault.hint}
             for fault in error.faults[:MAX_FAULTS]
         ],
+        **error.members,
     }
 
 
@@ -196,7 +197,7 @@ def install_problem_handlers(app: FastAPI, known_fields: Callable[[], Sequence[s
 
     @app.exception_handler(ServiceError)
     async def _service_error(request: Request, error: ServiceError) -> Response:
-        return problem_response(error, request)
+        return problem_response(error, request, error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _invalid(request: Request, error: RequestValidationError) -> Response:

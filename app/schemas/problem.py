@@ -17,6 +17,15 @@ class ProblemFault(BaseModel):
     hint: str = Field(description="What to do about it.")
 
 
+class QuotaUse(BaseModel):
+    """The quota that has no room."""
+
+    name: str = Field(examples=["jobs_in_flight"])
+    limit: int
+    used: int
+    asked: int = Field(description="What the request wants on top.")
+
+
 class Problem(BaseModel):
     """What went wrong, where, and what to do."""
 
@@ -34,3 +43,4 @@ class Problem(BaseModel):
     pointer: str = Field(default="", description="The first field at fault, as in `errors`.")
     hint: str = Field(default="", description="What to do about it.")
     errors: list[ProblemFault] = Field(default=[], description="Every fault that was found, at most 20.")
+    quota: QuotaUse | None = Field(default=None, description="With the code `quota_exceeded`.")

@@ -1,0 +1,163 @@
+"""Quotas of a key, counted in the transaction that uses them: two posts at the limit cannot both pass.
+
+SQLite transactions that write hold the only write lock from their beginning; on Postgres the key's row is
+locked until the commit. Both make charges of one key wait for one another, and nobody else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import case, func, select, update
+
+from app.database import Session, database_time
+from app.errors import QuotaExceeded
+from app.jobs.records import FINISHED
+from app.keys.records import Quota, Usage
+from app.tables import STATUSES, api_keys, jobs, key_usage, trajectories
+
+DAY_S = 86_400
+IN_FLIGHT = tuple(status for status in STATUSES if status not in FINISHED)
+SOON_S = 30  # when to ask again for room that other jobs of the key give back
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What one request wants of a key's quota."""
+
+    jobs: int
+    flights: int
+    size_bytes: int
+
+
+def usage_day(at_s: float) -> int:
+    """Day that a moment of database time is counted to, days since 1970 UTC."""
+    return int(at_s // DAY_S)
+
+
+def charge(session: Session, key_id: str | None, *, flights: int, size_bytes: int = 0) -> None:
+    """Take a new job's share of its key's quota; call it before the job's row is written.
+
+    Parameters
+    ----------
+    key_id
+        None where keys are off: nothing is limited then.
+    flights : int
+        As estimated; `settle` corrects it when the job has ended.
+    size_bytes : int
+        That the job's rows take so far.
+
+    Raises
+    ------
+    QuotaExceeded
+        Naming limit and use.
+    """
+    _charge(session, key_id, _Asked(jobs=1, flights=flights, size_bytes=size_bytes))
+
+
+def charge_bytes(session: Session, key_id: str | None, size_bytes: int) -> None:
+    """Make sure that the key may store `size_bytes` more; the row that is written next does the counting.
+
+    Raises
+    ------
+    QuotaExceeded
+        Naming limit and use.
+    """
+    _charge(session, key_id, _Asked(jobs=0, flights=0, size_bytes=size_bytes))
+
+
+def settle(session: Session, key_id: str | None, *, estimated: int, flown: int, day: int) -> None:
+    """Replace the estimate of a job by what it flew; call it once, when the job ends.
+
+    Parameters
+    ----------
+    estimated : int
+        What `charge` was told, ``jobs.flights_estimated``.
+    flown : int
+        ``jobs.flights``.
+    day : int
+        The day it was charged to: ``usage_day(jobs.created_at)``.
+    """
+    if key_id is None or estimated == flown:
+        return
+    corrected = key_usage.c.flights + (flown - estimated)
+    session.execute(
+        update(key_usage)
+        .where(key_usage.c.key_id == key_id, key_usage.c.day == day)
+        # never below nothing: a job posted in the millisecond of midnight was charged to the day before
+        .values(flights=case((corrected > 0, corrected), else_=0))
+    )
+
+
+def usage(session: Session, key_id: str) -> Usage:
+    """Count what a key uses now."""
+    today = usage_day(_now(session))
+    return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
+
+
+def _charge(session: Session, key_id: str | None, asked: _Asked) -> None:
+    if key_id is None:
+        return
+    limits = (api_keys.c.max_jobs_in_flight, api_keys.c.max_flights_per_day, api_keys.c.max_stored_bytes)
+    row = session.execute(
+        select(*limits).where(api_keys.c.id == key_id).with_for_update()  # nothing on SQLite: see above
+    ).one_or_none()
+    if row is not None:
+        _refuse_excess(session, key_id, Quota(*row), asked)
+    if asked.flights:
+        _add_flights(session, key_id, usage_day(_now(session)), asked.flights)
+
+
+def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -> None:
+    now = _now(session)
+    if quota.max_jobs_in_flight is not None and asked.jobs:
+        _compare("jobs_in_flight", quota.max_jobs_in_flight, _jobs_in_flight(session, key_id), 1, SOON_S)
+    if quota.max_flights_per_day is not None and asked.flights:
+        used = _flights(session, key_id, usage_day(now))
+        until_tomorrow_s = DAY_S - int(now % DAY_S)
+        _compare("flights_per_day", quota.max_flights_per_day, used, asked.flights, until_tomorrow_s)
+    if quota.max_stored_bytes is not None:
+        used = _stored(session, key_id)
+        _compare("stored_bytes", quota.max_stored_bytes, used, asked.size_bytes, SOON_S)
+
+
+def _compare(name: str, limit: int, used: int, asked: int, retry_after_s: int) -> None:
+    if used + asked > limit:
+        raise QuotaExceeded(name, limit=limit, used=used, asked=asked, retry_after_s=retry_after_s)
+
+
+def _now(session: Session) -> float:
+    return float(session.scalar(select(database_time())) or 0.0)
+
+
+def _jobs_in_flight(session: Session, key_id: str) -> int:
+    held = select(func.count()).select_from(jobs).where(jobs.c.key_id == key_id, jobs.c.status.in_(IN_FLIGHT))
+    return int(session.scalar(held) or 0)
+
+
+def _flights(session: Session, key_id: str, day: int) -> int:
+    row = select(key_usage.c.flights).where(key_usage.c.key_id == key_id, key_usage.c.day == day)
+    return int(session.scalar(row) or 0)
+
+
+def _stored(session: Session, key_id: str) -> int:
+    total = 0
+    for table in (jobs, trajectories):
+        size = select(func.coalesce(func.sum(table.c.size_bytes), 0)).where(table.c.key_id == key_id)
+        total += int(session.scalar(size) or 0)
+    return total
+
+
+def _add_flights(session: Session, key_id: str, day: int, flights: int) -> None:
+    if session.dialect.name == "sqlite":
+        from sqlalchemy.dialects.sqlite import insert
+    else:
+        from sqlalchemy.dialects.postgresql import insert  # type: ignore[assignment]  # the same words
+    statement: Any = insert(key_usage).values(key_id=key_id, day=day, flights=flights)
+    session.execute(
+        statement.on_conflict_do_update(
+            index_elements=[key_usage.c.key_id, key_usage.c.day],
+            set_={"flights": key_usage.c.flights + flights},
+        )
+    )
