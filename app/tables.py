@@ -56,7 +56,7 @@ jobs = Table(
     Column("model_id", String(64)),
     Column("partial", Boolean, nullable=False),  # the stored result is the best so far, not the end
     Column("max_seconds", Double),
-    Column("deadline_at", Double),  # set by the first claim
+    Column("deadline_at", Double),  # before the first claim: when it must have begun; then: when it must end
     Column("published_at", Double, nullable=False),  # when a wake-up message was last handed out
     Column("created_at", Double, nullable=False),
     Column("started_at", Double),
@@ -69,14 +69,18 @@ jobs = Table(
     Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
     Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
     Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),  # request, result and files
+    Column("label", String(100)),  # the owner's own word, to find the job again
     CheckConstraint("status IN ({})".format(", ".join(f"'{name}'" for name in STATUSES)), name="status"),
     Index("ix_jobs_owner_id", "owner", "id"),
-    Index("ix_jobs_status_priority_id", "status", "priority", "id"),
+    Index("ix_jobs_owner_label_id", "owner", "label", "id"),
+    Index("ix_jobs_status_published_at", "status", "published_at"),
     Index("ix_jobs_status_lease_until", "status", "lease_until"),
-    Index("ix_jobs_status_owner_priority_id", "status", "owner", "priority", "id"),  # whose turn, which job
     Index("ix_jobs_status_finished_at", "status", "finished_at"),  # retention, and how long jobs take
     Index("ix_jobs_key_id_status", "key_id", "status"),  # what a key has in flight
 )
+
+# whose turn, which job: the most urgent first, then the oldest
+Index("ix_jobs_status_owner_priority_id", jobs.c.status, jobs.c.owner, jobs.c.priority.desc(), jobs.c.id)
 
 owners = Table(
     "owners",

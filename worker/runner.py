@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from app.database import Database
 from app.jobs.records import Claim
-from app.jobs.store import claim_job, next_queued
+from app.jobs.store import claim_job
+from app.jobs.turns import next_unit
 from worker.attempt import Attempt, Ending
 from worker.lease import Vigil
 from worker.numerics import Kernels
@@ -76,7 +77,7 @@ class Runner:
     def _claim(self) -> Claim | None:
         for _ in range(CLAIM_TRIES):
             with self.database.write() as connection:
-                job_id = next_queued(connection)
+                job_id = next_unit(connection)
                 if job_id is None:
                     return None
                 claim = claim_job(connection, job_id, self.worker_name, self.lease_s)

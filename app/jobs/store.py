@@ -20,9 +20,10 @@ from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
 from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
 from app.jobs.rows import JOB_COLUMNS, get_job, insert_event, job_from_row, transition
+from app.jobs.turns import may_start, note_served
 from app.models.left_models import left_model
 from app.models.repository import insert_model
-from app.tables import idempotency_keys, job_checkpoints, job_requests, job_results, jobs
+from app.tables import idempotency_keys, job_checkpoints, job_requests, job_results, jobs, owners
 
 __all__ = [
     "claim_job",
@@ -31,7 +32,6 @@ __all__ = [
     "get_job",
     "load_checkpoint",
     "load_request",
-    "next_queued",
     "release_job",
     "renew_lease",
     "request_cancel",
@@ -96,6 +96,7 @@ def create_job(
     )
     session.execute(insert(job_requests).values(job_id=job_id, document=packed(request), sha256=fingerprint))
     insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
+    session.execute(_insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     return get_job(session, owner, job_id)
 
 
@@ -148,26 +149,18 @@ def load_request(session: Session, job_id: str) -> Document:
     return document
 
 
-def next_queued(session: Session) -> str | None:
-    """Id of the queued job that should run next: highest priority, then oldest."""
-    return session.execute(
-        select(jobs.c.id)
-        .where(jobs.c.status == JobStatus.QUEUED.value)
-        .order_by(jobs.c.priority.desc(), jobs.c.id)
-        .limit(1)
-    ).scalar_one_or_none()
-
-
 def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 60.0) -> Claim | None:
     """Take a queued job: fence and attempt rise by one, the lease runs from now (database time).
 
-    Returns None when the job is not queued any more: someone else was first, or it was cancelled.
+    It is the turn of another owner then. Returns None when the job is not queued any more (someone else was
+    first, or it was cancelled) or its time is over.
     """
     now = database_time()
     row = transition(
         session,
         jobs.c.id == job_id,
         jobs.c.status == JobStatus.QUEUED.value,
+        may_start(),
         event="started",
         payload={"worker": worker_name},
         status=JobStatus.RUNNING.value,
@@ -176,10 +169,11 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
         worker=worker_name,
         lease_until=now + lease_s,
         started_at=case((jobs.c.started_at.is_(None), now), else_=jobs.c.started_at),
-        deadline_at=case((jobs.c.deadline_at.is_(None), now + jobs.c.max_seconds), else_=jobs.c.deadline_at),
+        deadline_at=case((jobs.c.started_at.is_(None), now + jobs.c.max_seconds), else_=jobs.c.deadline_at),
     )
     if row is None:
         return None
+    note_served(session, row.owner)
     return Claim(
         job_id=row.id,
         owner=row.owner,

@@ -153,9 +153,15 @@ def upgrade() -> None:
     op.add_column(
         "jobs", sa.Column("size_bytes", sa.BigInteger(), server_default=sa.text("0"), nullable=False)
     )
+    op.add_column("jobs", sa.Column("label", sa.String(length=100)))
+    op.drop_index("ix_jobs_status_priority_id", table_name="jobs")
+    op.create_index("ix_jobs_status_published_at", "jobs", ["status", "published_at"])
+    op.create_index("ix_jobs_owner_label_id", "jobs", ["owner", "label", "id"])
     op.create_index("ix_jobs_key_id_status", "jobs", ["key_id", "status"])
     op.create_index("ix_jobs_status_finished_at", "jobs", ["status", "finished_at"])
-    op.create_index("ix_jobs_status_owner_priority_id", "jobs", ["status", "owner", "priority", "id"])
+    op.create_index(
+        "ix_jobs_status_owner_priority_id", "jobs", ["status", "owner", sa.text("priority DESC"), "id"]
+    )
     op.add_column("trajectories", sa.Column("key_id", sa.String(length=64)))
     op.add_column(
         "trajectories", sa.Column("size_bytes", sa.BigInteger(), server_default=sa.text("0"), nullable=False)
@@ -171,6 +177,10 @@ def downgrade() -> None:
     op.drop_index("ix_jobs_status_owner_priority_id", table_name="jobs")
     op.drop_index("ix_jobs_status_finished_at", table_name="jobs")
     op.drop_index("ix_jobs_key_id_status", table_name="jobs")
+    op.drop_index("ix_jobs_owner_label_id", table_name="jobs")
+    op.drop_index("ix_jobs_status_published_at", table_name="jobs")
+    op.create_index("ix_jobs_status_priority_id", "jobs", ["status", "priority", "id"])
+    op.drop_column("jobs", "label")
     op.drop_column("jobs", "size_bytes")
     op.drop_column("jobs", "flights")
     op.drop_column("jobs", "flights_estimated")

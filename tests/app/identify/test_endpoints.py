@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.jobs import store
+from app.jobs import store, turns
 from tests.app import calls
 from tests.app.calls import ANSWER_S, JSON, fault
 from tests.app.request_documents import SAMPLE_NAMES, Document, identify_document, sample_document
@@ -32,7 +32,7 @@ def test_accepts_with_the_broker_away(any_service: RunningService) -> None:
     assert (job["status"], job["attempt"], job["progress"]) == ("queued", 0, None)
     assert [sample["name"] for sample in job["request"]["samples"]] == list(SAMPLE_NAMES)
     with any_service.database.read() as session:
-        assert store.next_queued(session) == job["id"]
+        assert turns.next_unit(session) == job["id"]
         stored = store.load_request(session, job["id"])
     assert stored["aircraft"] == document["aircraft"]
     assert stored["flight"] == document["flight"]

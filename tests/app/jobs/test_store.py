@@ -335,21 +335,6 @@ def test_racing_posts_with_one_key_make_one_job(database: Database) -> None:
         assert session.scalar(select(func.count()).select_from(jobs)) == 1
 
 
-def test_queue_order(database: Database) -> None:
-    """Higher priority first, then older first."""
-    old, new, urgent = new_job(database), new_job(database), new_job(database, priority=5)
-    order = []
-    for _ in range(3):
-        with database.write() as session:
-            job_id = store.next_queued(session)
-            assert job_id is not None
-            store.claim_job(session, job_id, "w")
-            order.append(job_id)
-    assert order == [urgent.id, *sorted([old.id, new.id])]
-    with database.read() as session:
-        assert store.next_queued(session) is None
-
-
 def test_another_owner_sees_nothing(database: Database) -> None:
     """A job is not found by anyone but its owner, for reading and for cancelling."""
     job = new_job(database)
