@@ -19,7 +19,7 @@ from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
 from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, shared_trims
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import (
     ChainModel,
     ParameterBatch,
@@ -185,7 +185,7 @@ def benchmark_table(figures: Figures) -> list[tuple[str, str]]:
     ]
     rows += [
         (
-            f"{LANES} models of {links} link{'s' * (links != '1')} a wing, a simulated second",
+            f"{TOGETHER} models of {links} link{'s' * (links != '1')} a wing, a simulated second",
             f"{1e3 * s:.3g} ms",
         )
         for links, s in figures["growth_with_links"]["s_per_simulated_s"].items()
@@ -271,14 +271,14 @@ def growth_with_links(bench: Bench) -> Figures:
     prepared = {}
     for links in bench.effort.links:
         model = chain_model(bench.aircraft, bench.flight, links)
-        case, swarm = bench.cases(model, [name])[0], benchmark_swarm(model, LANES)
+        case, swarm = bench.cases(model, [name])[0], benchmark_swarm(model, TOGETHER)
         prepared[links] = (model, swarm, case, next(iter(shared_trims(model, swarm, [case], "trim")))[1])
     times: dict[int, list[float]] = {links: [] for links in prepared}
     for _ in range(bench.effort.singles):
         for links, flight in prepared.items():
             times[links].append(_fly(bench.clock, *flight) / bench.samples[name].duration_s)
     return {
-        "models": LANES,
+        "models": TOGETHER,
         "s_per_simulated_s": {str(links): statistics.median(values) for links, values in times.items()},
     }
 

@@ -1,9 +1,14 @@
-"""Lanes: the innermost, contiguous axis of every hot array is the particle index, in blocks of ``LANES``.
+"""Lanes: the innermost, contiguous axis of every hot array is the particle index, in blocks of one width.
 
-A kernel's loops ``for l in range(LANES)`` become vector instructions when the compiler knows that rows of an
-array are ``LANES`` apart. Numba passes shapes as run-time values, so each kernel starts with ``if
-not_in_lanes(...): return``: past that line the row length is a known constant. (Without it the same loop runs
-two to three times slower.)
+A kernel's loops ``for l in range(len(lanes))`` become vector instructions when the compiler knows how far
+rows of an array are apart. Numba passes shapes as run-time values, so each kernel starts with ``if
+not_in_lanes(..., lanes): return``: past that line the row length is a known constant. (Without it the same
+loop runs two to three times slower.)
+
+The width is a *type*: ``lanes`` is a tuple of as many zeros, and numba compiles a kernel once per length. So
+one source makes the kernels of a batch (``TOGETHER`` lanes) and those of a flight alone (one lane), which
+would else carry fifteen idle ones along. Both make the same roundings: a flight is the same to the bit in any
+company.
 """
 
 from __future__ import annotations
@@ -13,7 +18,8 @@ import math
 from morphcore.jit import inlined
 
 # two 512-bit or four 256-bit vectors: long enough to amortise loop overhead, short enough for the cache
-LANES = 16
+TOGETHER = 16
+ALONE = 1
 
 TWO_OVER_PI = 2.0 / math.pi
 # pi/2 in two parts (Cody & Waite): the first has trailing zeros, so that n * first is exact
@@ -77,7 +83,17 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     return sine, cosine
 
 
+def lane_width(particles: int) -> int:
+    """Lanes of the blocks that hold so many particles."""
+    return ALONE if particles == 1 else TOGETHER
+
+
+def lane_type(width: int) -> tuple[int, ...]:
+    """What tells a kernel its width: a tuple of that length (its elements mean nothing)."""
+    return (0,) * width
+
+
 @inlined
-def not_in_lanes(a) -> bool:
-    """Whether the row length differs from LANES (never; the test tells the compiler, see the head)."""
-    return a.shape[1] != LANES
+def not_in_lanes(a, lanes) -> bool:
+    """Whether the row length differs from the width (never; the test tells the compiler, see the head)."""
+    return a.shape[1] != len(lanes)

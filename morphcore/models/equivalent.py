@@ -12,7 +12,7 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
-from morphcore.lanes import LANES
+from morphcore.lanes import lane_width
 from morphcore.models.kernels.layout import (
     AERO_C,
     FORCE_C,
@@ -174,7 +174,7 @@ def physical_guess(model: ChainModel, division: Array | None = None, *, wing_set
 
 @dataclass(frozen=True)
 class LaneConstants:
-    """Parameter sets laid out for the kernels: ``rows`` (b, rows, LANES) and ``ranges`` (b, links, 2).
+    """Parameter sets laid out for the kernels: ``rows`` (b, rows, width) and ``ranges`` (b, links, 2).
 
     The last block is filled up with copies of the last particle. ``ranges`` gives, for each link, the strips
     that it may touch in any lane of the block.
@@ -191,15 +191,16 @@ class LaneConstants:
 
 
 def to_lanes(values: Array) -> Array:
-    """(p, rows) -> (blocks, rows, LANES), the last block filled up with copies of the last particle."""
+    """(p, rows) -> (blocks, rows, width), the last block filled up with copies of the last particle."""
     particles = values.shape[0]
-    blocks = -(-particles // LANES)
-    index = np.minimum(np.arange(blocks * LANES), particles - 1)
-    return np.ascontiguousarray(values[index].reshape(blocks, LANES, -1).transpose(0, 2, 1))
+    width = lane_width(particles)
+    blocks = -(-particles // width)
+    index = np.minimum(np.arange(blocks * width), particles - 1)
+    return np.ascontiguousarray(values[index].reshape(blocks, width, -1).transpose(0, 2, 1))
 
 
 def from_lanes(blocks: Array, particles: int) -> Array:
-    """(blocks, rows, LANES) -> (p, rows)."""
+    """(blocks, rows, width) -> (p, rows)."""
     return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:particles])
 
 

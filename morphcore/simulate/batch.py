@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.lanes import LANES
+from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
 from morphcore.models.kernels.layout import JOINTS
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
@@ -102,14 +102,14 @@ def fly_batch(
     """
     particles = state.shape[0]
     blocks = to_lanes(state)
-    count = blocks.shape[0]
+    count, _, width = blocks.shape
     threads = thread_count()
     bounds = _groups(count, threads)
     groups = bounds.size - 1
     rows, columns = model.lattice.operator_shape
-    work = np.zeros((groups, 3, model.state_rows, LANES))
-    scratch = np.zeros((groups, model.scratch_rows, LANES))
-    inputs, outputs = np.zeros((groups, columns, LANES)), np.zeros((groups, rows, LANES))
+    work = np.zeros((groups, 3, model.state_rows, width))
+    scratch = np.zeros((groups, model.scratch_rows, width))
+    inputs, outputs = np.zeros((groups, columns, width)), np.zeros((groups, rows, width))
     shared = shared_numbers(model)
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
     length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
@@ -120,7 +120,7 @@ def fly_batch(
         operators, strips = plan.table.between(first, last + 1)
         hinges, wind_N = plan.hinges[first : last + 1], plan.wind_N[first : last + 1]
         accelerations = plan.mean_accelerations[first:last]
-        record = np.empty((last - first, record_rows, count, LANES))
+        record = np.empty((last - first, record_rows, count, width))
         common = (
             model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, wind_N,
             constants.rows, plan.grid.step_s, blocks,
@@ -133,7 +133,14 @@ def fly_batch(
 def _fly_group(
     bounds: NDArray[np.int64], common: tuple[Any, ...], own: tuple[Array, ...], record: Array, group: int
 ) -> None:
-    fly(bounds[group], bounds[group + 1], *common, *(array[group] for array in own), record)
+    fly(
+        lane_type(record.shape[-1]),
+        bounds[group],
+        bounds[group + 1],
+        *common,
+        *(array[group] for array in own),
+        record,
+    )
 
 
 def _groups(blocks: int, threads: int) -> NDArray[np.int64]:
@@ -148,7 +155,7 @@ def state_rates(
 ) -> Array:
     """Time derivative (p, state_rows) of the states (p, state_rows) at one grid time of a plan."""
     blocks = to_lanes(state)
-    count = blocks.shape[0]
+    count, _, width = blocks.shape
     rows, columns = model.lattice.operator_shape
     operators, strips = plan.table.between(row, row + 1)
     rates = np.zeros_like(blocks)  # stays zero for the lag states
@@ -156,13 +163,15 @@ def state_rates(
     common = (
         model.surfaces, constants.ranges, shared_numbers(model), strips, plan.hinges[row : row + 1],
         plan.accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
-        np.zeros((model.state_rows, LANES)), blocks,
+        np.zeros((model.state_rows, width)), blocks,
     )  # fmt: skip
 
     def group_rates(group: int) -> None:
-        scratch = np.zeros((model.scratch_rows, LANES))
-        inputs, outputs = np.zeros((columns, LANES)), np.zeros((rows, LANES))
-        rates_of_blocks(bounds[group], bounds[group + 1], *common, scratch, inputs, outputs, rates)
+        scratch = np.zeros((model.scratch_rows, width))
+        inputs, outputs = np.zeros((columns, width)), np.zeros((rows, width))
+        rates_of_blocks(
+            lane_type(width), bounds[group], bounds[group + 1], *common, scratch, inputs, outputs, rates
+        )
 
     in_threads(group_rates, bounds.size - 1)
     return from_lanes(rates, state.shape[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.lanes import LANES
+from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.kernels.torque import torques
@@ -30,14 +30,16 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
     """
     rows, columns = model.lattice.operator_shape
     out = np.empty((states.shape[0], len(model.aircraft.surfaces)))
-    zero, block, rates = np.zeros((3, model.state_rows, LANES))
-    scratch = np.zeros((model.scratch_rows, LANES))
-    inputs, outputs = np.zeros((columns, LANES)), np.zeros((rows, LANES))
+    width = constants.rows.shape[-1]
+    zero, block, rates = np.zeros((3, model.state_rows, width))
+    scratch = np.zeros((model.scratch_rows, width))
+    inputs, outputs = np.zeros((columns, width)), np.zeros((rows, width))
     shared = shared_numbers(model)
     for first in range(0, states.shape[0], CHUNK):
         part = slice(first, min(first + CHUNK, states.shape[0]))
         operators, strips = plan.table.between(part.start, part.stop)
         torques(
+            lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], plan.accelerations[part],
             operators, plan.wind_N[part], constants.rows[0], states[part], zero, block, scratch, inputs,
             outputs, rates, out[part],

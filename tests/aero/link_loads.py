@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from morphcore.aero.operator import BODY_AFT
 from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_normals, solve_circulation
 from morphcore.geometry.lattice import surface_pose
-from morphcore.lanes import LANES
+from morphcore.lanes import ALONE, lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants, to_lanes
 from morphcore.models.kernels.chain import accelerations
 from morphcore.models.kernels.layout import S_FREE
@@ -33,12 +33,13 @@ def lane_loads(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, state
     constants: LaneConstants = lane_constants(model, batch, plan.grid.step_s)
     operators, strips = plan.table.between(0, 1)
     rows, columns = model.lattice.operator_shape
-    scratch = np.zeros((model.scratch_rows, LANES))
+    scratch = np.zeros((model.scratch_rows, ALONE))
     accelerations(
+        lane_type(ALONE),
         model.surfaces, constants.ranges[0], shared_numbers(model), strips[0], plan.hinges[0],
         plan.accelerations[0], operators[0], plan.wind_N[0], constants.rows[0], to_lanes(state[None])[0],
         scratch,
-        np.zeros((columns, LANES)), np.zeros((rows, LANES)),
+        np.zeros((columns, ALONE)), np.zeros((rows, ALONE)),
     )  # fmt: skip
     twist = scratch[S_FREE : S_FREE + 6 * model.links, 0].reshape(-1, 6)
     wrench = scratch[S_FREE + 6 * model.links : S_FREE + 12 * model.links, 0].reshape(-1, 6)

@@ -9,7 +9,7 @@ import pytest
 
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2, JONES_MEAN_LAG, lagged_motion
 from morphcore.geometry.lattice import LatticeSettings
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER, lane_type
 from morphcore.models.equivalent import chain_model, lag_weights, lane_constants, physical_guess
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import initial_state, state_rates
@@ -172,17 +172,17 @@ def test_zero_lag_is_quasi_steady():
 
 def lag_response(motion, lag_s, step_s):
     """What the circulation answers to (k,) for a motion (k,) of one link, sampled every step."""
-    link = np.zeros((LINK_ROWS, LANES))
+    link = np.zeros((LINK_ROWS, TOGETHER))
     link[10:] = lag_weights(np.array(lag_s), step_s)[:, None]
-    aero = np.array([1.0, 0.0])[:, None] * np.ones(LANES)
-    slow, fast, previous = np.zeros((3, 3, LANES))
+    aero = np.array([1.0, 0.0])[:, None] * np.ones(TOGETHER)
+    slow, fast, previous = np.zeros((3, 3, TOGETHER))
     previous[:] = motion[0]  # a jump just before the start, if there is one
-    effective, out = np.empty((3, LANES)), []
+    effective, out = np.empty((3, TOGETHER)), []
     for value in motion:
-        twist = np.full((6, LANES), value)
-        lagged_motion(link, twist, slow, fast, previous, aero, effective)
+        twist = np.full((6, TOGETHER), value)
+        lagged_motion(lane_type(TOGETHER), link, twist, slow, fast, previous, aero, effective)
         out.append(effective[0, 0])
-        lag_advance(link, twist, slow, fast, previous)
+        lag_advance(lane_type(TOGETHER), link, twist, slow, fast, previous)
         # the state is now that of the step's begin; the next sample closes it
     return np.array(out)
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import lane_constants
 from morphcore.models.kernels.layout import JOINTS
 from morphcore.models.tree import chain_tree, link_bodies, link_ends
@@ -140,11 +140,11 @@ def full_rates(particles, order=None):
 
 def test_lanes_are_independent_and_order_does_not_matter():
     """A particle's rates are bit for bit the same alone, in any lane and company, on one thread or two."""
-    particles = 3 * LANES + 5
+    particles = 3 * TOGETHER + 5
     together = full_rates(particles)
     order = np.random.default_rng(0).permutation(particles)
     np.testing.assert_array_equal(full_rates(particles, order), together[order])
-    for alone in (0, LANES, particles - 1):
+    for alone in (0, TOGETHER, particles - 1):
         np.testing.assert_array_equal(full_rates(particles, np.array([alone]))[0], together[alone])
     threads = thread_count()
     try:
@@ -156,8 +156,8 @@ def test_lanes_are_independent_and_order_does_not_matter():
 
 def test_padding_lanes_are_harmless():
     """The lanes that fill up the last block change nothing in the others."""
-    together = full_rates(LANES + 1)
-    np.testing.assert_array_equal(full_rates(LANES + 1, np.arange(LANES)), together[:LANES])
+    together = full_rates(TOGETHER + 1)
+    np.testing.assert_array_equal(full_rates(TOGETHER + 1, np.arange(TOGETHER)), together[:TOGETHER])
     assert np.isfinite(together).all()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2
 from morphcore.errors import InvalidInput
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER, lane_width
 from morphcore.models.equivalent import (
     chain_model,
     from_lanes,
@@ -41,12 +41,13 @@ def test_number_of_links_is_limited(links):
     assert "8" in caught.value.hint
 
 
-@pytest.mark.parametrize("particles", [1, LANES - 1, LANES, 2 * LANES + 3])
+@pytest.mark.parametrize("particles", [1, TOGETHER - 1, TOGETHER, 2 * TOGETHER + 3])
 def test_lanes_there_and_back(particles):
     """Laying out in lanes loses nothing; the lanes left over hold the last particle."""
     values = np.random.default_rng(particles).normal(size=(particles, 7))
     blocks = to_lanes(values)
-    assert blocks.shape == (-(-particles // LANES), 7, LANES)
+    width = lane_width(particles)
+    assert blocks.shape == (-(-particles // width), 7, width)
     np.testing.assert_array_equal(from_lanes(blocks, particles), values)
     flat = blocks.transpose(0, 2, 1).reshape(-1, 7)
     np.testing.assert_array_equal(flat[particles:], np.tile(values[-1], (flat.shape[0] - particles, 1)))

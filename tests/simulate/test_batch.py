@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from morphcore.frames import wrap_angle
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import lane_constants, physical_guess
 from morphcore.simulate.batch import BLOCKS_PER_GROUP, LONGEST_CHUNK, Interrupted, fly_batch
 from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
@@ -30,7 +30,7 @@ UNLIKE = (ConstantRate(0.0, 0.6, 0.3, ramp_s=0.1), ConstantRate(0.1, 0.4, 0.4, r
 def flown():
     """Many random parameter sets, flown together for half a second."""
     model = example_model(3)
-    batch = random_batch(np.random.default_rng(0), model, 2 * LANES * BLOCKS_PER_GROUP + 3)
+    batch = random_batch(np.random.default_rng(0), model, 2 * TOGETHER * BLOCKS_PER_GROUP + 3)
     plan = plan_of(model, UNLIKE, 0.5, STEP_S)
     return model, batch, plan, fly_trimmed(model, plan, batch)
 
@@ -55,7 +55,7 @@ def test_company_does_not_matter(flown):
     particles = states.shape[1]
     order = np.random.default_rng(1).permutation(particles)
     np.testing.assert_array_equal(again(flown, order), states[:, order])
-    for alone in (0, LANES + 1, particles - 1):
+    for alone in (0, TOGETHER + 1, particles - 1):
         np.testing.assert_array_equal(again(flown, np.array([alone]))[:, 0], states[:, alone])
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 
 from morphcore.jit import kernel
-from morphcore.lanes import LANES, not_in_lanes
+from morphcore.lanes import not_in_lanes
 
 OUTPUTS = 5
 AERO_ROWS = 2  # lift factor, centre shift (m, forward)
@@ -33,21 +33,26 @@ LINK0, LINKS, STRIP0, STRIPS, PAIR0 = 0, 1, 2, 3, 4
 
 
 @kernel
-def lagged_motion(link, twist, slow, fast, previous, aero, effective):
+def lagged_motion(lanes, link, twist, slow, fast, previous, aero, effective):
     """Fill in what the circulation answers to: a link's (v_z, omega_x, omega_y) after lag, times lift factor.
 
     ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at
     ``previous``; what its linear change since then adds, in proportion to the lag weights of the link, is
     added here.
     """
-    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
+    if (
+        not_in_lanes(link, lanes)
+        or not_in_lanes(twist, lanes)
+        or not_in_lanes(slow, lanes)
+        or not_in_lanes(fast, lanes)
+    ):
         return
-    if not_in_lanes(previous) or not_in_lanes(aero) or not_in_lanes(effective):
+    if not_in_lanes(previous, lanes) or not_in_lanes(aero, lanes) or not_in_lanes(effective, lanes):
         return
     now = 1.0 - JONES_A1 - JONES_A2
     for i in range(3):
         source = twist[(5, 0, 1)[i]]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             motion = source[l]
             change = motion - previous[i, l]
             effective[i, l] = aero[0, l] * (
@@ -58,14 +63,14 @@ def lagged_motion(link, twist, slow, fast, previous, aero, effective):
 
 
 @kernel
-def strip_inputs(surface, ranges, overlap, effective, inputs):
+def strip_inputs(lanes, surface, ranges, overlap, effective, inputs):
     """Normal velocity of each strip of a surface at the link axis and its slope along x: two rows a strip."""
-    if not_in_lanes(overlap) or not_in_lanes(effective) or not_in_lanes(inputs):
+    if not_in_lanes(overlap, lanes) or not_in_lanes(effective, lanes) or not_in_lanes(inputs, lanes):
         return
     strip0, strips = surface[STRIP0], surface[STRIPS]
     for j in range(2 * strip0, 2 * (strip0 + strips)):
         row = inputs[j]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             row[l] = 0.0
     for k in range(surface[LINKS]):
         link = surface[LINK0] + k
@@ -74,23 +79,23 @@ def strip_inputs(surface, ranges, overlap, effective, inputs):
             pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
             part = overlap[pair : pair + 2]
             out = inputs[2 * (strip0 + j) : 2 * (strip0 + j) + 2]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 weight = part[0, l]
                 out[0, l] += weight * (motion[0, l] + part[1, l] * motion[1, l])
                 out[1, l] -= weight * motion[2, l]
 
 
 @kernel
-def lane_product(matrix, inputs, outputs):
-    """outputs = matrix @ inputs, (rows, columns) x (columns, LANES); rows a multiple of 8, columns of 4."""
-    if not_in_lanes(inputs) or not_in_lanes(outputs):
+def lane_product(lanes, matrix, inputs, outputs):
+    """outputs = matrix @ inputs, (rows, columns) x (columns, width); rows a multiple of 8, columns of 4."""
+    if not_in_lanes(inputs, lanes) or not_in_lanes(outputs, lanes):
         return
     rows, columns = matrix.shape
     for o in range(0, rows, 8):
         y = outputs[o : o + 8]
         m = matrix[o : o + 8]
         for r in range(8):
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 y[r, l] = 0.0
         for i in range(0, columns, 4):
             x = inputs[i : i + 4]
@@ -102,7 +107,7 @@ def lane_product(matrix, inputs, outputs):
             a5, b5, c5, d5 = m[5, i], m[5, i + 1], m[5, i + 2], m[5, i + 3]
             a6, b6, c6, d6 = m[6, i], m[6, i + 1], m[6, i + 2], m[6, i + 3]
             a7, b7, c7, d7 = m[7, i], m[7, i + 1], m[7, i + 2], m[7, i + 3]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 p, q, s, t = x[0, l], x[1, l], x[2, l], x[3, l]
                 y[0, l] += a0 * p + b0 * q + c0 * s + d0 * t
                 y[1, l] += a1 * p + b1 * q + c1 * s + d1 * t
@@ -115,20 +120,27 @@ def lane_product(matrix, inputs, outputs):
 
 
 @kernel
-def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench):
+def link_wrench(
+    lanes, surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench
+):
     """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, and profile drag.
 
     ``strips`` (n, 3): trailing edge x and circulation centre x of each strip from the link axis, m, and the
     slope dx/dy of the trailing edge. ``sums``: 13 scratch rows. Profile drag is quadratic in the velocity at
     the link's centre of drag area.
     """
-    if not_in_lanes(overlap) or not_in_lanes(outputs) or not_in_lanes(link) or not_in_lanes(twist):
+    if (
+        not_in_lanes(overlap, lanes)
+        or not_in_lanes(outputs, lanes)
+        or not_in_lanes(link, lanes)
+        or not_in_lanes(twist, lanes)
+    ):
         return
-    if not_in_lanes(aero) or not_in_lanes(sums) or not_in_lanes(wrench):
+    if not_in_lanes(aero, lanes) or not_in_lanes(sums, lanes) or not_in_lanes(wrench, lanes):
         return
     for i in range(13):
         row = sums[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             row[l] = 0.0
     number = surface[LINK0] + k
     slope = strips[surface[STRIP0], 2]  # one for the whole surface: taper is linear
@@ -138,7 +150,7 @@ def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero,
         strip = surface[STRIP0] + j
         out = outputs[OUTPUTS * strip : OUTPUTS * strip + OUTPUTS]
         edge, centre = strips[strip, 0], strips[strip, 1]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             weight, y = part[0, l], part[1, l]
             g = weight * out[0, l]
             moment = weight * out[1, l]
@@ -155,7 +167,7 @@ def link_wrench(surface, k, ranges, strips, overlap, outputs, link, twist, aero,
             sums[10, l] += g * out[3, l]
             sums[11, l] += g * y * out[3, l]
             sums[12, l] += g * out[4, l]
-    for l in range(LANES):
+    for l in range(len(lanes)):
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
         ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
         g0, g1, g2 = sums[0, l], sums[1, l], sums[2, l]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
 from morphcore.jit import kernel
-from morphcore.lanes import LANES, not_in_lanes
+from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
     AERO_C,
     DENSITY,
@@ -40,12 +40,12 @@ from morphcore.multibody.kernels.hinge import carry_through_hinge, hinge_acceler
 
 
 @kernel
-def body_axes(state, wind, gravity, scratch):
+def body_axes(lanes, state, wind, gravity, scratch):
     """Fill the scratch block with the twist relative to the air, and wind and gravity in B."""
-    if not_in_lanes(state) or not_in_lanes(scratch):
+    if not_in_lanes(state, lanes) or not_in_lanes(scratch, lanes):
         return
     wn, we, wd = wind[0], wind[1], wind[2]
-    for l in range(LANES):
+    for l in range(len(lanes)):
         a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
         nx, ny, nz = a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)
         ex, ey, ez = 2.0 * (b * c + a * d), a * a - b * b + c * c - d * d, 2.0 * (c * d - a * b)
@@ -58,21 +58,26 @@ def body_axes(state, wind, gravity, scratch):
 
 
 @kernel
-def start_base(constants, twist, shared, inertia, force):
+def start_base(lanes, constants, twist, shared, inertia, force):
     """Fuselage inertia, its bias force v x* I v, less the constant force and moment."""
-    if not_in_lanes(constants) or not_in_lanes(twist) or not_in_lanes(inertia) or not_in_lanes(force):
+    if (
+        not_in_lanes(constants, lanes)
+        or not_in_lanes(twist, lanes)
+        or not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+    ):
         return
     for i in range(21):
         value = shared[FUSELAGE + i]
         row = inertia[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             row[l] = value
     for i in range(6):
         row = force[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             row[l] = 0.0
-    add_bias(inertia, twist, force)  # momentum of the fuselage
-    for l in range(LANES):
+    add_bias(lanes, inertia, twist, force)  # momentum of the fuselage
+    for l in range(len(lanes)):
         hx, hy, hz = force[0, l], force[1, l], force[2, l]
         gx, gy, gz = force[3, l], force[4, l], force[5, l]
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
@@ -86,17 +91,18 @@ def start_base(constants, twist, shared, inertia, force):
 
 
 @kernel
-def clear(block):
+def clear(lanes, block):
     """Zero some rows."""
-    if not_in_lanes(block):
+    if not_in_lanes(block, lanes):
         return
     for i in range(block.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             block[i, l] = 0.0
 
 
 @kernel
 def accelerations(
+    lanes,
     surfaces,
     ranges,
     shared,
@@ -129,7 +135,7 @@ def accelerations(
     aero = constants[AERO_C : AERO_C + 2]
     density = shared[DENSITY]
 
-    body_axes(state, wind, shared[GRAVITY], scratch)
+    body_axes(lanes, state, wind, shared[GRAVITY], scratch)
     base_twist = scratch[S_TWIST : S_TWIST + 6]
 
     # root -> tips: twists
@@ -140,6 +146,7 @@ def accelerations(
             twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
             if k == 0:
                 hinge_twist(
+                    lanes,
                     base_twist,
                     hinges[s],
                     hinge_accelerations[s],
@@ -149,6 +156,7 @@ def accelerations(
             else:
                 c = 3 * joint_number
                 gimbal_twist(
+                    lanes,
                     scratch[w_twist + 6 * link - 6 : w_twist + 6 * link],
                     constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                     state[s_q + c : s_q + c + 3],
@@ -158,6 +166,7 @@ def accelerations(
                 )
                 joint_number += 1
             lagged_motion(
+                lanes,
                 constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                 twist,
                 state[s_slow + 3 * link : s_slow + 3 * link + 3],
@@ -170,13 +179,13 @@ def accelerations(
     # air loads
     effective = scratch[w_effective : w_effective + 3 * links]
     for s in range(surfaces.shape[0]):
-        strip_inputs(surfaces[s], ranges, overlap, effective, inputs)
-    lane_product(operator, inputs, outputs)
+        strip_inputs(lanes, surfaces[s], ranges, overlap, effective, inputs)
+    lane_product(lanes, operator, inputs, outputs)
     for s in range(surfaces.shape[0]):
         for k in range(surfaces[s, LINKS]):
             link = surfaces[s, LINK0] + k
             link_wrench(
-                surfaces[s], k, ranges, strips, overlap, outputs,
+                lanes, surfaces[s], k, ranges, strips, overlap, outputs,
                 constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                 scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                 aero, density,
@@ -185,12 +194,12 @@ def accelerations(
             )  # fmt: skip
 
     articulate(
-        surfaces, shared, hinges, constants, scratch, links, coordinates,
+        lanes, surfaces, shared, hinges, constants, scratch, links, coordinates,
     )  # fmt: skip
 
 
 @kernel
-def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates):
+def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coordinates):
     """Articulated-body pass over the twists, wrenches and joint forces in the scratch block."""
     w_twist, w_wrench, w_bias, w_acceleration, _ = link_rows_of_scratch(links)
     w_tau, w_added, w_joint_acceleration, w_joint, _ = joint_rows_of_scratch(links, coordinates)
@@ -199,16 +208,17 @@ def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates)
     base_acceleration = scratch[S_BASE_ACCELERATION : S_BASE_ACCELERATION + 6]
     inertia = scratch[S_INERTIA : S_INERTIA + 21]
     carried = scratch[S_CARRIED : S_CARRIED + 6]
-    start_base(constants, scratch[S_TWIST : S_TWIST + 6], shared, base_inertia, base_force)
+    start_base(lanes, constants, scratch[S_TWIST : S_TWIST + 6], shared, base_inertia, base_force)
 
     # tips -> root: articulated inertia and bias force
     last_joint = coordinates // 3
     for s in range(surfaces.shape[0] - 1, -1, -1):
-        clear(scratch[S_INERTIA : S_CARRIED + 6])
+        clear(lanes, scratch[S_INERTIA : S_CARRIED + 6])
         for k in range(surfaces[s, LINKS] - 1, -1, -1):
             link = surfaces[s, LINK0] + k
             rows = constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS]
             add_link(
+                lanes,
                 rows,
                 scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                 scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
@@ -216,23 +226,24 @@ def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates)
                 carried,
             )
             if k == 0:
-                add_bias(inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
-                carry_through_hinge(hinges[s], inertia, carried)
-                accumulate(inertia, carried, base_inertia, base_force)
+                add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
+                carry_through_hinge(lanes, hinges[s], inertia, carried)
+                accumulate(lanes, inertia, carried, base_inertia, base_force)
             else:
                 last_joint -= 1
                 c = 3 * last_joint
                 joint = scratch[w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)]
-                add_bias(inertia, joint[11:17], carried)
+                add_bias(lanes, inertia, joint[11:17], carried)
                 eliminate_gimbal(
+                    lanes,
                     scratch[w_tau + c : w_tau + c + 3],
                     scratch[w_added + c : w_added + c + 3],
                     joint,
                     inertia,
                     carried,
                 )
-                carry_through_gimbal(rows, joint, inertia, carried)
-    solve_base(base_inertia, base_force, scratch[S_FACTOR : S_FACTOR + 21], base_acceleration)
+                carry_through_gimbal(lanes, rows, joint, inertia, carried)
+    solve_base(lanes, base_inertia, base_force, scratch[S_FACTOR : S_FACTOR + 21], base_acceleration)
 
     # root -> tips: accelerations
     joint_number = 0
@@ -242,10 +253,11 @@ def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates)
             own = scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6]
             if k == 0:
                 bias = scratch[w_bias + 6 * link : w_bias + 6 * link + 6]
-                hinge_acceleration(base_acceleration, hinges[s], bias, own)
+                hinge_acceleration(lanes, base_acceleration, hinges[s], bias, own)
             else:
                 c = 3 * joint_number
                 gimbal_acceleration(
+                    lanes,
                     scratch[w_acceleration + 6 * link - 6 : w_acceleration + 6 * link],
                     constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                     scratch[w_joint + JOINT_ROWS * joint_number : w_joint + JOINT_ROWS * (joint_number + 1)],
@@ -256,11 +268,11 @@ def articulate(surfaces, shared, hinges, constants, scratch, links, coordinates)
 
 
 @kernel
-def base_rates(state, scratch, rates):
+def base_rates(lanes, state, scratch, rates):
     """Rates of attitude, body velocities and position from the spatial acceleration in the scratch block."""
-    if not_in_lanes(state) or not_in_lanes(scratch) or not_in_lanes(rates):
+    if not_in_lanes(state, lanes) or not_in_lanes(scratch, lanes) or not_in_lanes(rates, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
         p, q, r = state[4, l], state[5, l], state[6, l]
         u, v, w = state[7, l], state[8, l], state[9, l]

@@ -4,7 +4,7 @@ Featherstone (2008), table 7.1 (articulated bodies) and section 9.2 (hybrid dyna
 revolutes of a gimbal joined into one joint of three degrees of freedom, which is the same by elimination of
 its massless frames.
 
-Rows of the lane arrays ((rows, LANES), see lanes.py):
+Rows of the lane arrays ((rows, width), see lanes.py):
 
 - twist, spatial acceleration, wrench, bias force: 6 rows, angular part first, in link axes at the link's
   origin;
@@ -15,7 +15,7 @@ Rows of the lane arrays ((rows, LANES), see lanes.py):
 from __future__ import annotations
 
 from morphcore.jit import inlined, kernel
-from morphcore.lanes import LANES, not_in_lanes
+from morphcore.lanes import not_in_lanes
 
 # mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area, weights of the lag (4)
 LINK_ROWS = 14
@@ -135,13 +135,13 @@ def carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia,
 
 
 @kernel
-def add_link(link, twist, wrench, inertia, force):
+def add_link(lanes, link, twist, wrench, inertia, force):
     """Add a flat link's rigid inertia and its bias force v x* I v - wrench to what it carries already."""
-    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(wrench):
+    if not_in_lanes(link, lanes) or not_in_lanes(twist, lanes) or not_in_lanes(wrench, lanes):
         return
-    if not_in_lanes(inertia) or not_in_lanes(force):
+    if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         m, mx, my = link[0, l], link[1, l], link[2, l]
         ixx, iyy, izz, ixy = link[3, l], link[4, l], link[5, l], link[6, l]
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
@@ -173,11 +173,11 @@ def add_link(link, twist, wrench, inertia, force):
 
 
 @kernel
-def add_bias(inertia, bias, force):
+def add_bias(lanes, inertia, bias, force):
     """force += I c."""
-    if not_in_lanes(inertia) or not_in_lanes(bias) or not_in_lanes(force):
+    if not_in_lanes(inertia, lanes) or not_in_lanes(bias, lanes) or not_in_lanes(force, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         a0, a1, a2, b0, b1, b2 = bias[0, l], bias[1, l], bias[2, l], bias[3, l], bias[4, l], bias[5, l]
         force[0, l] += (
             inertia[0, l] * a0 + inertia[1, l] * a1 + inertia[2, l] * a2
@@ -206,29 +206,34 @@ def add_bias(inertia, bias, force):
 
 
 @kernel
-def accumulate(inertia, force, total_inertia, total_force):
+def accumulate(lanes, inertia, force, total_inertia, total_force):
     """Add a surface's articulated inertia and force to the fuselage's."""
     if (
-        not_in_lanes(inertia)
-        or not_in_lanes(force)
-        or not_in_lanes(total_inertia)
-        or not_in_lanes(total_force)
+        not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+        or not_in_lanes(total_inertia, lanes)
+        or not_in_lanes(total_force, lanes)
     ):
         return
     for i in range(21):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             total_inertia[i, l] += inertia[i, l]
     for i in range(6):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             total_force[i, l] += force[i, l]
 
 
 @kernel
-def solve_base(inertia, force, factor, acceleration):
+def solve_base(lanes, inertia, force, factor, acceleration):
     """Base acceleration from I a = -p, by L D L^T; ``factor`` holds 21 scratch rows."""
-    if not_in_lanes(inertia) or not_in_lanes(force) or not_in_lanes(factor) or not_in_lanes(acceleration):
+    if (
+        not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+        or not_in_lanes(factor, lanes)
+        or not_in_lanes(acceleration, lanes)
+    ):
         return
-    for l in range(LANES):  # into the lower triangle, row by row
+    for l in range(len(lanes)):  # into the lower triangle, row by row
         factor[0, l] = inertia[0, l]
         factor[1, l], factor[2, l] = inertia[1, l], inertia[3, l]
         factor[3, l], factor[4, l], factor[5, l] = inertia[2, l], inertia[4, l], inertia[5, l]
@@ -246,35 +251,35 @@ def solve_base(inertia, force, factor, acceleration):
                 a, b = factor[row + k], factor[col + k]
                 d = factor[k * (k + 1) // 2 + k]
                 c = factor[row + j]
-                for l in range(LANES):
+                for l in range(len(lanes)):
                     c[l] -= a[l] * b[l] * d[l]
             c = factor[row + j]
             d = factor[col + j]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 c[l] /= d[l]
         e = factor[row + i]
         for k in range(i):
             a = factor[row + k]
             d = factor[k * (k + 1) // 2 + k]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 e[l] -= a[l] * a[l] * d[l]
     for i in range(6):
         row = i * (i + 1) // 2
         x = acceleration[i]
         p = force[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             x[l] = -p[l]
         for k in range(i):
             a, y = factor[row + k], acceleration[k]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 x[l] -= a[l] * y[l]
     for i in range(6):
         d, x = factor[i * (i + 1) // 2 + i], acceleration[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             x[l] /= d[l]
     for i in range(5, -1, -1):
         x = acceleration[i]
         for k in range(i + 1, 6):
             a, y = factor[k * (k + 1) // 2 + i], acceleration[k]
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 x[l] -= a[l] * y[l]

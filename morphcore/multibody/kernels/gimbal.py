@@ -10,23 +10,28 @@ The joint rates' projection is S = [R's first row; (sin lag, cos lag, 0); (0, 0,
 from __future__ import annotations
 
 from morphcore.jit import kernel
-from morphcore.lanes import LANES, not_in_lanes, sine_cosine
+from morphcore.lanes import not_in_lanes, sine_cosine
 from morphcore.multibody.kernels.articulated import carry_lane
 
 JOINT_ROWS = 44
 
 
 @kernel
-def gimbal_twist(twist_parent, link, q, v, joint, twist):
+def gimbal_twist(lanes, twist_parent, link, q, v, joint, twist):
     """Twist of a link from its parent's and its gimbal's motion; fills R, S and the bias acceleration.
 
     Bias: c = dS/dt qd + v x S qd; Featherstone (2008), equation 3.42.
     """
-    if not_in_lanes(twist_parent) or not_in_lanes(link) or not_in_lanes(q) or not_in_lanes(v):
+    if (
+        not_in_lanes(twist_parent, lanes)
+        or not_in_lanes(link, lanes)
+        or not_in_lanes(q, lanes)
+        or not_in_lanes(v, lanes)
+    ):
         return
-    if not_in_lanes(joint) or not_in_lanes(twist):
+    if not_in_lanes(joint, lanes) or not_in_lanes(twist, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         s1, c1 = sine_cosine(q[0, l])
         s2, c2 = sine_cosine(q[1, l])
         s3, c3 = sine_cosine(q[2, l])
@@ -68,17 +73,17 @@ def gimbal_twist(twist_parent, link, q, v, joint, twist):
 
 
 @kernel
-def eliminate_gimbal(tau, added, joint, inertia, force):
+def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
     """Articulate inertia and bias force through a gimbal: I - U D^-1 U^T and p + U D^-1 u.
 
     ``tau`` (3 rows) is the joint force, ``added`` (3 rows) what the implicit step adds to the joint-space
     diagonal.
     """
-    if not_in_lanes(tau) or not_in_lanes(added) or not_in_lanes(joint):
+    if not_in_lanes(tau, lanes) or not_in_lanes(added, lanes) or not_in_lanes(joint, lanes):
         return
-    if not_in_lanes(inertia) or not_in_lanes(force):
+    if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         s10, s11, s12 = joint[0, l], joint[1, l], joint[2, l]
         s20, s21 = joint[9, l], joint[10, l]
         i0, i1, i2, i3, i4, i5 = (
@@ -183,11 +188,16 @@ def eliminate_gimbal(tau, added, joint, inertia, force):
 
 
 @kernel
-def carry_through_gimbal(link, joint, inertia, force):
+def carry_through_gimbal(lanes, link, joint, inertia, force):
     """Express what a link carries, in place, in its parent's axes and at its parent's origin."""
-    if not_in_lanes(link) or not_in_lanes(joint) or not_in_lanes(inertia) or not_in_lanes(force):
+    if (
+        not_in_lanes(link, lanes)
+        or not_in_lanes(joint, lanes)
+        or not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+    ):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         r00, r01, r02 = joint[0, l], joint[1, l], joint[2, l]
         r10, r11, r12 = joint[3, l], joint[4, l], joint[5, l]
         r20, r21, r22 = joint[6, l], joint[7, l], joint[8, l]
@@ -195,13 +205,13 @@ def carry_through_gimbal(link, joint, inertia, force):
 
 
 @kernel
-def gimbal_acceleration(parent, link, joint, acceleration, joint_acceleration):
+def gimbal_acceleration(lanes, parent, link, joint, acceleration, joint_acceleration):
     """Joint accelerations D^-1 (u - U^T a) and the link's own acceleration."""
-    if not_in_lanes(parent) or not_in_lanes(link) or not_in_lanes(joint):
+    if not_in_lanes(parent, lanes) or not_in_lanes(link, lanes) or not_in_lanes(joint, lanes):
         return
-    if not_in_lanes(acceleration) or not_in_lanes(joint_acceleration):
+    if not_in_lanes(acceleration, lanes) or not_in_lanes(joint_acceleration, lanes):
         return
-    for l in range(LANES):
+    for l in range(len(lanes)):
         r00, r01, r02 = joint[0, l], joint[1, l], joint[2, l]
         r10, r11, r12 = joint[3, l], joint[4, l], joint[5, l]
         r20, r21, r22 = joint[6, l], joint[7, l], joint[8, l]

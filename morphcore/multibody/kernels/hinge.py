@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from morphcore.jit import kernel
-from morphcore.lanes import LANES, not_in_lanes
+from morphcore.lanes import not_in_lanes
 from morphcore.multibody.kernels.articulated import carry_lane
 
 # rotation W -> B (9), motion subspace S of the hinge in W (6), rate, origin of the first link in B (3)
@@ -12,9 +12,9 @@ H_SUBSPACE, H_RATE, H_ORIGIN = 9, 15, 16
 
 
 @kernel
-def hinge_twist(twist_base, hinge, acceleration, twist, bias):
+def hinge_twist(lanes, twist_base, hinge, acceleration, twist, bias):
     """Twist of a surface's first link and its acceleration but for the base's: hinge motion is prescribed."""
-    if not_in_lanes(twist_base) or not_in_lanes(twist) or not_in_lanes(bias):
+    if not_in_lanes(twist_base, lanes) or not_in_lanes(twist, lanes) or not_in_lanes(bias, lanes):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
@@ -25,7 +25,7 @@ def hinge_twist(twist_base, hinge, acceleration, twist, bias):
     ex, ey, ez = hinge[9] * acceleration, hinge[10] * acceleration, hinge[11] * acceleration
     fx, fy, fz = hinge[12] * acceleration, hinge[13] * acceleration, hinge[14] * acceleration
     px, py, pz = hinge[16], hinge[17], hinge[18]
-    for l in range(LANES):
+    for l in range(len(lanes)):
         ax, ay, az = twist_base[0, l], twist_base[1, l], twist_base[2, l]
         bx = twist_base[3, l] + ay * pz - az * py
         by = twist_base[4, l] + az * px - ax * pz
@@ -47,28 +47,28 @@ def hinge_twist(twist_base, hinge, acceleration, twist, bias):
 
 
 @kernel
-def carry_through_hinge(hinge, inertia, force):
+def carry_through_hinge(lanes, hinge, inertia, force):
     """Express what a surface carries, in place, in B at the fuselage reference point."""
-    if not_in_lanes(inertia) or not_in_lanes(force):
+    if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
     px, py, pz = hinge[16], hinge[17], hinge[18]
-    for l in range(LANES):
+    for l in range(len(lanes)):
         carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l)
 
 
 @kernel
-def hinge_acceleration(base, hinge, bias, acceleration):
+def hinge_acceleration(lanes, base, hinge, bias, acceleration):
     """Acceleration of a surface's first link from the base's."""
-    if not_in_lanes(base) or not_in_lanes(bias) or not_in_lanes(acceleration):
+    if not_in_lanes(base, lanes) or not_in_lanes(bias, lanes) or not_in_lanes(acceleration, lanes):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
     px, py, pz = hinge[16], hinge[17], hinge[18]
-    for l in range(LANES):
+    for l in range(len(lanes)):
         ax, ay, az = base[0, l], base[1, l], base[2, l]
         bx = base[3, l] + ay * pz - az * py
         by = base[4, l] + az * px - ax * pz

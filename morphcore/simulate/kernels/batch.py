@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from morphcore.jit import entry_kernel
-from morphcore.lanes import LANES
 from morphcore.simulate.kernels.step import instant_rates, step_block
 
 
 @entry_kernel
 def fly(
+    lanes,
     first, last, surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants,
     step, state, work, scratch, inputs, outputs, record,
 ):  # fmt: skip
@@ -20,30 +20,32 @@ def fly(
     ----------
     surfaces : (s, 5); ranges : (b, n, 2); shared : (23,). strips : (t + 1, j, 3); hinges : (t + 1, s,
     HINGE_ROWS); hinge_accelerations : (t, s); operators : (t + 1, rows, columns); wind : (t + 1, 3).
-    constants : (b, rows, LANES). step : s. state : (b, rows, LANES), advanced in place. work : (3, rows,
-    LANES); scratch, inputs, outputs : (rows, LANES), the caller's own. record : (t, r, b, LANES): the first r
+    constants : (b, rows, width). step : s. state : (b, rows, width), advanced in place. work : (3, rows,
+    width); scratch, inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r
     rows of the state after each step.
     """
     for n in range(record.shape[0]):
         for b in range(first, last):
             step_block(
-                surfaces, ranges[b], shared, strips[n : n + 2], hinges[n : n + 2],
+                lanes, surfaces, ranges[b], shared, strips[n : n + 2], hinges[n : n + 2],
                 hinge_accelerations[n], operators[n : n + 2], wind[n : n + 2], constants[b], state[b], step,
                 work[0], work[1], work[2], scratch, inputs, outputs,
             )  # fmt: skip
             for r in range(record.shape[1]):
-                for l in range(LANES):
+                for l in range(len(lanes)):
                     record[n, r, b, l] = state[b, r, l]
 
 
 @entry_kernel
 def rates_of_blocks(
+    lanes,
     first, last, surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants,
     zero, state, scratch, inputs, outputs, rates,
 ):  # fmt: skip
     """Time derivative of some blocks' states at one instant, springs and dampers included (trim, tests)."""
     for b in range(first, last):
         instant_rates(
+            lanes,
             surfaces, ranges[b], shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0],
             constants[b], state[b], zero, scratch, inputs, outputs, rates[b],
         )  # fmt: skip

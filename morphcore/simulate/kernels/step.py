@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from morphcore.jit import kernel
-from morphcore.lanes import LANES, not_in_lanes
+from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.chain import accelerations, base_rates, clear
 from morphcore.models.kernels.layout import (
     JOINTS,
@@ -41,30 +41,45 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 @kernel
-def joint_forces(stiffness, damping, q, v, step, tau, added):
+def joint_forces(lanes, stiffness, damping, q, v, step, tau, added):
     """First stage: tau = -K (q + gamma h v) - C v and the added diagonal gamma h C + (gamma h)^2 K."""
-    if not_in_lanes(stiffness) or not_in_lanes(damping) or not_in_lanes(q) or not_in_lanes(v):
+    if (
+        not_in_lanes(stiffness, lanes)
+        or not_in_lanes(damping, lanes)
+        or not_in_lanes(q, lanes)
+        or not_in_lanes(v, lanes)
+    ):
         return
-    if not_in_lanes(tau) or not_in_lanes(added):
+    if not_in_lanes(tau, lanes) or not_in_lanes(added, lanes):
         return
     g = GAMMA * step
     for i in range(q.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             k, c = stiffness[i, l], damping[i, l]
             added[i, l] = g * (c + g * k)
             tau[i, l] = -k * (q[i, l] + g * v[i, l]) - c * v[i, l]
 
 
 @kernel
-def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step, tau, added):
+def second_joint_forces(lanes, stiffness, damping, q, v, angle_rate, acceleration, step, tau, added):
     """Second stage: tau for y = k2 + 2 k1 (see the module's head), from k1's angle rate and acceleration."""
-    if not_in_lanes(stiffness) or not_in_lanes(damping) or not_in_lanes(q) or not_in_lanes(v):
+    if (
+        not_in_lanes(stiffness, lanes)
+        or not_in_lanes(damping, lanes)
+        or not_in_lanes(q, lanes)
+        or not_in_lanes(v, lanes)
+    ):
         return
-    if not_in_lanes(angle_rate) or not_in_lanes(acceleration) or not_in_lanes(tau) or not_in_lanes(added):
+    if (
+        not_in_lanes(angle_rate, lanes)
+        or not_in_lanes(acceleration, lanes)
+        or not_in_lanes(tau, lanes)
+        or not_in_lanes(added, lanes)
+    ):
         return
     g = GAMMA * step
     for i in range(q.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             k, c = stiffness[i, l], damping[i, l]
             added[i, l] = g * (c + g * k)
             remainder = v[i, l] - 2.0 * angle_rate[i, l]
@@ -72,30 +87,40 @@ def second_joint_forces(stiffness, damping, q, v, angle_rate, acceleration, step
 
 
 @kernel
-def joint_rates(v, acceleration, step, first, second, angle_rate, velocity_rate):
+def joint_rates(lanes, v, acceleration, step, first, second, angle_rate, velocity_rate):
     """Rates of a stage's joint angles and velocities, less twice k1's (``first``, ``second``)."""
-    if not_in_lanes(v) or not_in_lanes(acceleration) or not_in_lanes(first) or not_in_lanes(second):
+    if (
+        not_in_lanes(v, lanes)
+        or not_in_lanes(acceleration, lanes)
+        or not_in_lanes(first, lanes)
+        or not_in_lanes(second, lanes)
+    ):
         return
-    if not_in_lanes(angle_rate) or not_in_lanes(velocity_rate):
+    if not_in_lanes(angle_rate, lanes) or not_in_lanes(velocity_rate, lanes):
         return
     g = GAMMA * step
     for i in range(v.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             rate = acceleration[i, l] - 2.0 * second[i, l]
             velocity_rate[i, l] = rate
             angle_rate[i, l] = v[i, l] - 2.0 * first[i, l] + g * rate
 
 
 @kernel
-def lag_advance(link, twist, slow, fast, previous):
+def lag_advance(lanes, link, twist, slow, fast, previous):
     """Carry a link's lag states over a step that begins at the given twist (rows as in ``lagged_motion``)."""
-    if not_in_lanes(link) or not_in_lanes(twist) or not_in_lanes(slow) or not_in_lanes(fast):
+    if (
+        not_in_lanes(link, lanes)
+        or not_in_lanes(twist, lanes)
+        or not_in_lanes(slow, lanes)
+        or not_in_lanes(fast, lanes)
+    ):
         return
-    if not_in_lanes(previous):
+    if not_in_lanes(previous, lanes):
         return
     for i in range(3):
         source = twist[(5, 0, 1)[i]]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             motion = source[l]
             change = motion - previous[i, l]
             slow[i, l] = motion + link[10, l] * (slow[i, l] + link[11, l] * change - motion)
@@ -104,24 +129,24 @@ def lag_advance(link, twist, slow, fast, previous):
 
 
 @kernel
-def advance(state, first, step, out):
+def advance(lanes, state, first, step, out):
     """out = state + h k1."""
-    if not_in_lanes(state) or not_in_lanes(first) or not_in_lanes(out):
+    if not_in_lanes(state, lanes) or not_in_lanes(first, lanes) or not_in_lanes(out, lanes):
         return
     for i in range(state.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             out[i, l] = state[i, l] + step * first[i, l]
 
 
 @kernel
-def finish(state, first, second, step):
+def finish(lanes, state, first, second, step):
     """state += h (3/2 k1 + 1/2 k2), with the attitude quaternion made unit again."""
-    if not_in_lanes(state) or not_in_lanes(first) or not_in_lanes(second):
+    if not_in_lanes(state, lanes) or not_in_lanes(first, lanes) or not_in_lanes(second, lanes):
         return
     for i in range(state.shape[0]):
-        for l in range(LANES):
+        for l in range(len(lanes)):
             state[i, l] += step * (1.5 * first[i, l] + 0.5 * second[i, l])
-    for l in range(LANES):
+    for l in range(len(lanes)):
         a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
         scale = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
         state[0, l], state[1, l], state[2, l], state[3, l] = a * scale, b * scale, c * scale, d * scale
@@ -129,6 +154,7 @@ def finish(state, first, second, step):
 
 @kernel
 def stage(
+    lanes,
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, first,
     step, rates, scratch, inputs, outputs,
 ):  # fmt: skip
@@ -138,6 +164,7 @@ def stage(
     _, _, w_joint_acceleration, _, _ = joint_rows_of_scratch(links, coordinates)
     s_q, s_v, s_slow, _, _, _ = state_rows(links, coordinates)
     accelerations(
+        lanes,
         surfaces,
         ranges,
         shared,
@@ -152,19 +179,20 @@ def stage(
         inputs,
         outputs,
     )
-    base_rates(state, scratch, rates)
+    base_rates(lanes, state, scratch, rates)
     for i in range(JOINTS):
         k1, k2 = first[i], rates[i]
-        for l in range(LANES):
+        for l in range(len(lanes)):
             k2[l] -= 2.0 * k1[l]
     joint_rates(
-        state[s_v:s_slow], scratch[w_joint_acceleration : w_joint_acceleration + coordinates], step,
+        lanes, state[s_v:s_slow], scratch[w_joint_acceleration : w_joint_acceleration + coordinates], step,
         first[s_q:s_v], first[s_v:s_slow], rates[s_q:s_v], rates[s_v:s_slow],
     )  # fmt: skip
 
 
 @kernel
 def step_block(
+    lanes,
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, state, step,
     first, second, middle, scratch, inputs, outputs,
 ):  # fmt: skip
@@ -183,22 +211,24 @@ def step_block(
     damping = constants[c_damping : c_damping + coordinates]
     tau, added = scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates]
 
-    joint_forces(stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
-    clear(second)
+    joint_forces(lanes, stiffness, damping, state[s_q:s_v], state[s_v:s_slow], step, tau, added)
+    clear(lanes, second)
     stage(
+        lanes,
         surfaces, ranges, shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0], constants,
         state, second, step, first, scratch, inputs, outputs,
     )  # fmt: skip
-    advance(state[:s_slow], first[:s_slow], step, middle[:s_slow])
+    advance(lanes, state[:s_slow], first[:s_slow], step, middle[:s_slow])
     for link in range(links):
         slow, fast, previous = s_slow + 3 * link, s_fast + 3 * link, s_previous + 3 * link
         lag_advance(
-            constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * (link + 1)],
+            lanes, constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * (link + 1)],
             scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6],
             state[slow : slow + 3], state[fast : fast + 3], state[previous : previous + 3],
         )  # fmt: skip
-    advance(state[s_slow:], state[s_slow:], 0.0, middle[s_slow:])
+    advance(lanes, state[s_slow:], state[s_slow:], 0.0, middle[s_slow:])
     second_joint_forces(
+        lanes,
         stiffness,
         damping,
         middle[s_q:s_v],
@@ -210,14 +240,16 @@ def step_block(
         added,
     )
     stage(
+        lanes,
         surfaces, ranges, shared, strips[1], hinges[1], hinge_accelerations, operators[1], wind[1], constants,
         middle, first, step, second, scratch, inputs, outputs,
     )  # fmt: skip
-    finish(state[:s_slow], first[:s_slow], second[:s_slow], step)
+    finish(lanes, state[:s_slow], first[:s_slow], second[:s_slow], step)
 
 
 @kernel
 def instant_rates(
+    lanes,
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero,
     scratch, inputs, outputs, rates,
 ):  # fmt: skip
@@ -231,12 +263,14 @@ def instant_rates(
     s_q, s_v, s_slow, _, _, _ = state_rows(links, coordinates)
     c_stiffness, c_damping, _ = constant_rows(links, coordinates)
     joint_forces(
+        lanes,
         constants[c_stiffness : c_stiffness + coordinates],
         constants[c_damping : c_damping + coordinates],
         state[s_q:s_v], state[s_v:s_slow], 0.0,
         scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
     )  # fmt: skip
     stage(
+        lanes,
         surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero,
         0.0, rates, scratch, inputs, outputs,
     )  # fmt: skip

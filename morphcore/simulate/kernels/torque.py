@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from morphcore.jit import entry_kernel
-from morphcore.lanes import LANES
 from morphcore.models.kernels.chain import clear
 from morphcore.models.kernels.layout import (
     LINKS_C,
@@ -20,6 +19,7 @@ from morphcore.simulate.kernels.step import instant_rates
 
 @entry_kernel
 def torques(
+    lanes,
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, states, zero,
     block, scratch, inputs, outputs, rates, out,
 ):  # fmt: skip
@@ -32,7 +32,7 @@ def torques(
     Parameters (t instants, s surfaces)
     ----------
     states : (t, rows) of one flight; the others as in ``rates_of_blocks``, with a leading axis t.
-    block : (rows, LANES) and the rest of the scratch: the caller's own. out : (t, s) N m, along the positive
+    block : (rows, width) and the rest of the scratch: the caller's own. out : (t, s) N m, along the positive
     hinge coordinates; zero without a hinge.
     """
     links = ranges.shape[0]
@@ -43,33 +43,37 @@ def torques(
     force = scratch[S_CARRIED : S_CARRIED + 6]
     for n in range(states.shape[0]):
         for i in range(states.shape[1]):
-            for l in range(LANES):
+            for l in range(len(lanes)):
                 block[i, l] = states[n, i]
         instant_rates(
+            lanes,
             surfaces, ranges, shared, strips[n], hinges[n], hinge_accelerations[n], operators[n], wind[n],
             constants, block, zero, scratch, inputs, outputs, rates,
         )  # fmt: skip
         last_joint = coordinates // 3
         for s in range(surfaces.shape[0] - 1, -1, -1):
-            clear(force)
+            clear(lanes, force)
             for k in range(surfaces[s, 1] - 1, -1, -1):
                 link = surfaces[s, 0] + k
                 rows = constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS]
-                clear(inertia)  # of this link alone
+                clear(lanes, inertia)  # of this link alone
                 add_link(
+                    lanes,
                     rows,
                     scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                     scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
                     inertia,
                     force,
                 )
-                add_bias(inertia, scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6], force)
+                add_bias(
+                    lanes, inertia, scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6], force
+                )
                 if k > 0:
                     last_joint -= 1
                     joint = scratch[
                         w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)
                     ]
-                    carry_through_gimbal(rows, joint, inertia, force)
+                    carry_through_gimbal(lanes, rows, joint, inertia, force)
             torque = 0.0
             for i in range(6):
                 torque += hinges[n, s, H_SUBSPACE + i] * force[i, 0]
