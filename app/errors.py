@@ -307,3 +307,41 @@ class WrongHost(ServiceError):
     status = 421
     code = "wrong_host"
     title = "The service does not answer for this host"
+
+
+class DatabaseAway(ServiceError):
+    """The database restarts, cannot be reached or is too busy; no promise was made."""
+
+    status = 503
+    code = "database_unavailable"
+    title = "The database does not answer"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The database does not answer at the moment.",
+            hint="Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s."""
+        return {"Retry-After": "2"}
+
+
+class StorageFull(ServiceError):
+    """The database has no room for what the request would store."""
+
+    status = 503
+    code = "storage_full"
+    title = "The service's storage is full"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The database has no room left; nothing was stored.",
+            hint="Delete finished jobs that are not needed, or ask the operator for more disk space.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s: people have to make room."""
+        return {"Retry-After": "60"}

@@ -10,13 +10,15 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from app.http.problems import MEDIA_TYPE
+from app.errors import DatabaseAway, StorageFull
+from app.http.problems import MEDIA_TYPE, documented
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
 from app.version import VERSION
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"
+WITHOUT_DATABASE = frozenset({"/livez"})
 DESCRIPTION = """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
 
 Long work is a job: the POST answers `202` with a job at once; follow it by `GET /jobs/{id}`
@@ -48,10 +50,27 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             tags=TAGS,
             license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         )
+        _add_outages(document)
         _name_problem_media_type(document)
         _add_upload_schemas(document)
         app.openapi_schema = document
     return app.openapi_schema
+
+
+def _add_outages(document: dict[str, Any]) -> None:
+    """Whatever asks the database can meet one that is away or full."""
+    entry = documented(DatabaseAway, StorageFull)[DatabaseAway.status]
+    response = {
+        "description": entry["description"],
+        "headers": {
+            "Retry-After": {"description": "When to repeat the request, s.", "schema": {"type": "string"}}
+        },
+        "content": {"application/json": {"schema": {"$ref": PROBLEM}}},
+    }
+    for path, operations in document["paths"].items():
+        if path not in WITHOUT_DATABASE:
+            for operation in operations.values():
+                operation["responses"].setdefault(str(DatabaseAway.status), response)
 
 
 def _name_problem_media_type(document: dict[str, Any]) -> None:
