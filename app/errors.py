@@ -151,6 +151,16 @@ class ArtifactNotFound(NotFound):
         )
 
 
+class WebhookNotFound(NotFound):
+    """No such webhook, or another owner's."""
+
+    code = "webhook_not_found"
+    title = "There is no such webhook"
+
+    def __init__(self, webhook_id: str) -> None:
+        super().__init__(f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours.")
+
+
 class Conflict(ServiceError):
     """The thing is not in a state in which this can be done."""
 
@@ -192,6 +202,28 @@ class JobNotFinished(Conflict):
         )
 
 
+class TooManyWebhooks(Conflict):
+    """The owner has as many webhooks as one may have."""
+
+    code = "too_many_webhooks"
+    title = "There are too many webhooks"
+
+    def __init__(self, limit: int) -> None:
+        super().__init__(f"You have {limit} webhooks.", hint="Delete one that is not needed any more.")
+
+
+class WebhookDisabled(Conflict):
+    """A disabled webhook is sent nothing."""
+
+    code = "webhook_disabled"
+    title = "The webhook is disabled"
+
+    def __init__(self, webhook_id: str) -> None:
+        super().__init__(
+            f"Webhook {webhook_id} is disabled.", "#path/webhook_id", "POST /webhooks/{id}/enable first."
+        )
+
+
 class Unauthorized(ServiceError):
     """No key, or one that does not open: unknown, expired and revoked keys are all told the same."""
 
@@ -210,6 +242,22 @@ class Unauthorized(ServiceError):
     def headers(self) -> dict[str, str]:
         """How to authenticate (RFC 9110, section 11.6.1)."""
         return {"WWW-Authenticate": 'Bearer realm="MorphID"'}
+
+
+class KeysUnknown(ServiceError):
+    """The database does not answer, so nobody knows whose key it is."""
+
+    status = 503
+    code = "keys_unknown"
+    title = "API keys cannot be looked up now"
+
+    def __init__(self) -> None:
+        super().__init__("The database does not answer.", hint="Ask again in a moment.")
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s."""
+        return {"Retry-After": "2"}
 
 
 class MissingScope(ServiceError):

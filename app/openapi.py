@@ -34,6 +34,7 @@ TAGS = [
     {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
     {"name": "trajectories", "description": "Sample flights as files."},
     {"name": "models", "description": "Identified models."},
+    {"name": "webhooks", "description": "Messages to an address of yours when jobs end."},
     {"name": "health", "description": "For machines."},
 ]
 
