@@ -6,11 +6,13 @@ import logging
 import time
 from collections.abc import Callable
 from enum import Enum
+from typing import TypeVar
 
 from sqlalchemy import Connection
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
+from app.database_errors import DatabaseTrouble, trouble_of
 from app.jobs.records import Claim, JobStatus
 from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
 from worker.lease import StopReason, Vigil
@@ -28,11 +30,15 @@ from worker.operations import (
 from worker.progress import Pace
 
 log = logging.getLogger(__name__)
+Answer = TypeVar("Answer")
 
 SAVE_EVERY_S = (
     0.5  # a generation may take milliseconds; two writes a second serve the user's eye and the disk
 )
-PERSIST_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # a database that restarts is back within these
+FIRST_PAUSE_S = 0.5  # before the job store is asked again; doubles
+LONGEST_PAUSE_S = 4.0
+FULL_TRIES = 4  # somebody may be making room; then the job says that there is none
+SHUTDOWN_PATIENCE_S = 5.0  # a worker that ends waits so long for the job store; then the reaper does the rest
 
 
 class Ending(Enum):
@@ -57,6 +63,10 @@ ENDINGS = {
 
 class StaleClaim(Exception):
     """The store refused a write: the job is someone else's now."""
+
+
+class StorageFull(Exception):
+    """The job store has no room for what should be written; what was there before still is."""
 
 
 class Attempt:
@@ -100,22 +110,11 @@ class Attempt:
             return self._run(find_operation)
         except StaleClaim:
             return Ending.ABANDONED
-        except WorkRefused as error:
-            return self._fail(_error(error.code, error.detail, hint=error.hint, pointer=error.pointer))
-        except MemoryError:
-            hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
-            return self._fail(_error("out_of_memory", "the job needs more memory than there is", hint=hint))
-        except UnknownOperation as error:
-            return self._fail(_error("unknown_operation", str(error), hint="update the workers"))
-        except Exception:
-            log.exception("job %s: unforeseen", self._claim.job_id)
-            hint = f"the worker's log tells more about {self._claim.job_id}; please report it"
-            return self._fail(_error("internal_error", "the worker met an unforeseen error", hint=hint))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
+            return self._fail(_told(error, self._claim.job_id))
 
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
-        with self._database.read() as connection:
-            request = load_request(connection, self._claim.job_id)
-            self._checkpoint = load_checkpoint(connection, self._claim)
+        request, self._checkpoint = self._patiently(self._load)
         if not self._prepare_kernels():
             return self._stopped()
         self._work = find_operation(self._claim.operation)(request, self._kernels.threads)
@@ -123,11 +122,18 @@ class Attempt:
             for step in self._work.steps(self._checkpoint, self._vigil.should_stop):
                 self._note(step)
         except WorkInterrupted:
+            self._vigil.heed()
             return self._stopped()
         if self._checkpoint is None:
             raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
         self._save_unsaved()
-        return self._finish(JobStatus.SUCCEEDED, outcome=self._work.outcome(self._checkpoint))
+        outcome = self._work.outcome(self._checkpoint)
+        self._vigil.heed()
+        return self._finish(JobStatus.SUCCEEDED, outcome=outcome)
+
+    def _load(self) -> tuple[Document, bytes | None]:
+        with self._database.read() as connection:
+            return load_request(connection, self._claim.job_id), load_checkpoint(connection, self._claim)
 
     def _prepare_kernels(self) -> bool:
         if self._kernels.ready:
@@ -172,10 +178,19 @@ class Attempt:
 
     def _fail(self, error: Document) -> Ending:
         log.warning("job %s failed: %s", self._claim.job_id, error)
+        self._vigil.heed()
+        best = self._best_so_far()
+        # as much of the best as there is room for: with its files, without, only why the job failed
+        choices = [] if best is None else [best, Outcome(best.document)]
         try:
-            return self._finish(JobStatus.FAILED, outcome=self._best_so_far(), error=error)
-        except StaleClaim:
-            return Ending.ABANDONED
+            for outcome in choices:
+                try:
+                    return self._finish(JobStatus.FAILED, outcome=outcome, error=error)
+                except StorageFull:
+                    log.warning("job %s: no room for what it leaves", self._claim.job_id)
+            return self._finish(JobStatus.FAILED, error=error)
+        except (StaleClaim, StorageFull):
+            return Ending.ABANDONED  # without room for a sentence the reaper tries it later
 
     def _best_so_far(self) -> Outcome | None:
         if self._work is None or self._checkpoint is None:
@@ -203,25 +218,59 @@ class Attempt:
         return ENDINGS[status]
 
     def _persist(self, write: Callable[[Connection], bool]) -> None:
-        """Write in a transaction of its own; wait out a database that restarts.
+        """Write in a transaction of its own; wait out a job store that is away.
 
         Raises
         ------
-        StaleClaim : the store refused the write.
+        StaleClaim : the store refused the write, or this worker ends before the store is back.
+        StorageFull : there is no room.
         """
-        for pause_s in (*PERSIST_PAUSES_S, None):
+
+        def once() -> bool:
+            with self._database.write() as connection:
+                return write(connection)
+
+        if not self._patiently(once):
+            raise StaleClaim
+
+    def _patiently(self, action: Callable[[], Answer]) -> Answer:
+        """Do something with the job store as often as it takes; nobody else can have the job meanwhile."""
+        pause_s, tries, shutdown_at = FIRST_PAUSE_S, 0, None
+        while True:
             try:
-                with self._database.write() as connection:
-                    accepted = write(connection)
-            except OperationalError:
-                if pause_s is None:
+                return action()
+            except SQLAlchemyError as error:
+                trouble, tries = trouble_of(error), tries + 1
+                if trouble is None:
                     raise
-                log.warning("job %s: the job store does not answer, trying again", self._claim.job_id)
-                self._sleep(pause_s)
-            else:
-                if not accepted:
+                if trouble is DatabaseTrouble.FULL and tries == FULL_TRIES:
+                    raise StorageFull from error
+                log.warning("job %s: the job store is %s, trying again", self._claim.job_id, trouble.value)
+            if self._vigil.reason is StopReason.LOST:
+                raise StaleClaim
+            if self._vigil.reason is StopReason.SHUTDOWN:
+                shutdown_at = self._clock() if shutdown_at is None else shutdown_at
+                if self._clock() - shutdown_at > SHUTDOWN_PATIENCE_S:
                     raise StaleClaim
-                return
+            self._sleep(min(pause_s, 1.0) if shutdown_at is not None else pause_s)
+            pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
+
+
+def _told(error: Exception, job_id: str) -> Document:
+    """Say to the user what went wrong."""
+    if isinstance(error, WorkRefused):
+        return _error(error.code, error.detail, hint=error.hint, pointer=error.pointer)
+    if isinstance(error, MemoryError):
+        hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
+        return _error("out_of_memory", "the job needs more memory than there is", hint=hint)
+    if isinstance(error, StorageFull):
+        hint = "make room (delete finished jobs, or grow the disk) and submit the job again"
+        return _error("storage_full", "the job store has no room for what the job wrote", hint=hint)
+    if isinstance(error, UnknownOperation):
+        return _error("unknown_operation", str(error), hint="update the workers")
+    log.error("job %s: unforeseen", job_id, exc_info=error)
+    hint = f"the worker's log tells more about {job_id}; please report it"
+    return _error("internal_error", "the worker met an unforeseen error", hint=hint)
 
 
 def _error(code: str, detail: str, *, hint: str = "", pointer: str = "") -> Document:

@@ -15,9 +15,8 @@ from typing import Self
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
-from app.errors import JobNotFound
-from app.jobs.records import Claim, JobStatus, LeaseState
-from app.jobs.store import get_job, renew_lease
+from app.jobs.records import Claim, LeaseState
+from app.jobs.store import look_at_lease, renew_lease
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +77,7 @@ class Vigil:
         self._look_every_s = min(look_every_s, heartbeat_s)
         self._on_stuck = on_stuck
         self._stuck_after_s = stuck_after_s
+        self._heeded = False
         self._over = threading.Event()
         self._reason: StopReason | None = None
         self._thread = threading.Thread(target=self._watch, name=f"vigil-{claim.job_id}", daemon=True)
@@ -105,27 +105,30 @@ class Vigil:
         """Note that a write was refused: the claim is stale."""
         self._reason = StopReason.LOST
 
+    def heed(self) -> None:
+        """Note that the work itself has stopped: its end is written as soon as the store lets it."""
+        self._heeded = True
+
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
         asked_at: float | None = None
         while not self._over.wait(self._look_every_s):
             now = time.monotonic()
             try:
-                if now - renewed_at >= self._heartbeat_s or self._changed():
-                    state = self._renew()
+                if now - renewed_at >= self._heartbeat_s:
+                    self._judge(self._renew())
                     renewed_at = now
-                    self._judge(state)
-            except JobNotFound:
-                self.lose()
-            except SQLAlchemyError:
-                log.warning("the job store does not answer; lease of %s not renewed", self._claim.job_id)
-                if now - renewed_at > self._lease_s:
-                    self.lose()
+                else:
+                    self._judge(self._look())
+            except SQLAlchemyError as error:
+                # The claim is not lost by that: nobody can take the job while the job store is away for all,
+                # and if it is away only for us, the fence keeps our writes out.
+                log.warning("job %s: lease not looked after: %s", self._claim.job_id, type(error).__name__)
             if self._reason is None and self._shutting_down():
                 self._reason = StopReason.SHUTDOWN
             if self._reason is StopReason.LOST:
                 break
-            if self._reason is not None:
+            if self._reason is not None and not self._heeded:
                 asked_at = now if asked_at is None else asked_at
                 if now - asked_at > self._stuck_after_s:
                     break
@@ -134,12 +137,9 @@ class Vigil:
             log.critical("job %s does not heed its stop signal; ending this process", self._claim.job_id)
             self._on_stuck()
 
-    def _changed(self) -> bool:
-        """Whether the row says anything but "running" (a read; the heartbeat then finds out what)."""
+    def _look(self) -> LeaseState:
         with self._database.read() as connection:
-            job = get_job(connection, self._claim.owner, self._claim.job_id)
-        overdue = job.deadline_at is not None and job.deadline_at.timestamp() < time.time()
-        return self._reason is None and (job.status is not JobStatus.RUNNING or overdue)
+            return look_at_lease(connection, self._claim)
 
     def _renew(self) -> LeaseState:
         with self._database.write() as connection:
