@@ -28,9 +28,10 @@ from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
-from morphcore.simulate.trajectory import MOST_ROWS, Trajectory
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.threads import use_threads
+from samplefiles.columns import MOST_ROWS
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.simulate.csv_columns import read_csv_columns
+from morphcore.simulate.file_columns import read_file_columns
 from morphcore.simulate.schedule import Schedule, Tabulated
 
 Array = NDArray[np.float64]
@@ -35,19 +35,17 @@ def load_schedule_csv(path: str | Path) -> dict[str, Tabulated]:
     InvalidInput : a column is missing or holds something that is not a finite number, there are too few rows,
         or time does not rise.
     """
-    table = read_csv_columns(path)
-    columns = table.quantities(SCHEDULE_COLUMNS)
+    table = read_file_columns(path, SCHEDULE_COLUMNS)
+    columns = table.values
     time_s = columns["t"]
     if not LEAST_ROWS <= time_s.size <= MOST_ROWS:
         raise InvalidInput(f"{path} holds {time_s.size} rows", hint=f"give {LEAST_ROWS} to {MOST_ROWS} rows")
     falls = np.flatnonzero(np.diff(time_s) <= 0.0)
     if falls.size:
         raise InvalidInput(
-            f"{path}, line {table.lines[falls[0] + 1]}: time does not rise",
+            f"{table.place(falls[0] + 1)}: time does not rise",
             hint="sort the rows by time and drop doubles",
         )
-    for column in columns.values():
-        column.setflags(write=False)
     return {side: Tabulated(time_s, columns[f"sweep_{side}"]) for side in ("left", "right")}
 
 

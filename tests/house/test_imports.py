@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("app", "worker", "morphcore", "cli")
+PACKAGES = ("app", "worker", "morphcore", "cli", "samplefiles")
 KERNELS_MAY_IMPORT = {"__future__", "math", "numpy", "numba", "typing", "collections.abc"}
 WORKER_MAY_KNOW = ("app.jobs.", "app.settings", "app.database", "app.errors")
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
