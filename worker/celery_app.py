@@ -24,6 +24,9 @@ from worker import numerics, shutdown
 QUEUE = "morphid"
 RUN_JOB = "morphid.run_job"
 REAP = "morphid.reap"
+REAP_EXPIRES_S = (
+    24 * 3600.0
+)  # by the worker's clock, which may be hours off: short lives would never reach it
 REAP_EVERY_S = 10.0  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
 
 
@@ -48,7 +51,7 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
             "reap": {
                 "task": REAP,
                 "schedule": reap_every_s,
-                "options": {"expires": reap_every_s, "queue": QUEUE},
+                "options": {"expires": REAP_EXPIRES_S, "queue": QUEUE},
             }
         },
     )
@@ -79,7 +82,7 @@ def _in_each_child(**_: Any) -> None:
 @worker_ready.connect
 def _look_at_the_table(**_: Any) -> None:
     # hints sent while no worker was there may be lost: publish every queued row again
-    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=60)
+    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=REAP_EXPIRES_S)
 
 
 @worker_shutting_down.connect
