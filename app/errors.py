@@ -244,22 +244,6 @@ class Unauthorized(ServiceError):
         return {"WWW-Authenticate": 'Bearer realm="MorphID"'}
 
 
-class KeysUnknown(ServiceError):
-    """The database does not answer, so nobody knows whose key it is."""
-
-    status = 503
-    code = "keys_unknown"
-    title = "API keys cannot be looked up now"
-
-    def __init__(self) -> None:
-        super().__init__("The database does not answer.", hint="Ask again in a moment.")
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """When to ask again, s."""
-        return {"Retry-After": "2"}
-
-
 class MissingScope(ServiceError):
     """The key is valid and may not do this."""
 

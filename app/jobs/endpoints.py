@@ -9,7 +9,7 @@ from fastapi import APIRouter, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import OwnerDep, ServiceDep, demands
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
@@ -18,6 +18,7 @@ from app.jobs.event_stream import stream_events, wait_for_end
 from app.jobs.records import JobStatus
 from app.jobs.results import JobResult
 from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
+from app.keys.records import Scope
 
 router = APIRouter(tags=["jobs"])
 
@@ -43,7 +44,13 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("/jobs", operation_id="list_jobs", summary="List jobs", responses=documented(InvalidRequest))
+@router.get(
+    "/jobs",
+    dependencies=[demands(Scope.JOBS_READ)],
+    operation_id="list_jobs",
+    summary="List jobs",
+    responses=documented(InvalidRequest),
+)
 def list_jobs(
     app: ServiceDep,
     owner: OwnerDep,
@@ -68,6 +75,7 @@ def list_jobs(
 
 @router.get(
     "/jobs/{job_id}",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job",
     summary="Look at a job",
     responses=documented(InvalidRequest, JobNotFound),
@@ -80,6 +88,7 @@ async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: Prefe
 
 @router.get(
     "/jobs/{job_id}/events",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_events",
     summary="Follow a job",
     response_class=JSONResponse,
@@ -122,6 +131,7 @@ async def get_job_events(
 
 @router.get(
     "/jobs/{job_id}/result",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_result",
     summary="Get the result of a job",
     response_model=JobResult,
@@ -139,6 +149,7 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
 
 @router.get(
     "/jobs/{job_id}/artifacts",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="list_job_artifacts",
     summary="List the files of a job",
     responses=documented(InvalidRequest, JobNotFound),
@@ -162,6 +173,7 @@ def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Artif
 
 @router.get(
     "/jobs/{job_id}/artifacts/{name}",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_artifact",
     summary="Get a file of a job",
     response_class=Response,
@@ -187,6 +199,7 @@ def get_job_artifact(
 
 @router.post(
     "/jobs/{job_id}/cancel",
+    dependencies=[demands(Scope.JOBS_WRITE)],
     operation_id="cancel_job",
     summary="Cancel a job",
     responses=documented(InvalidRequest, JobNotFound),
@@ -203,6 +216,7 @@ def cancel_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Job:
 
 @router.delete(
     "/jobs/{job_id}",
+    dependencies=[demands(Scope.JOBS_WRITE)],
     operation_id="delete_job",
     summary="Delete a finished job",
     status_code=204,

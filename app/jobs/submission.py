@@ -22,7 +22,7 @@ from app.errors import (
     MalformedBody,
     UnsupportedMediaType,
 )
-from app.http.context import OwnerDep, Service, ServiceDep
+from app.http.context import OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import JsonRoute
 from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
 from app.http.problems import documented
@@ -30,6 +30,7 @@ from app.jobs import store
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob
 from app.jobs.schemas import Job, Operation
+from app.keys.records import Scope
 
 Cost = TypeVar("Cost")
 Request = TypeVar("Request")
@@ -93,7 +94,7 @@ class OperationRouter(APIRouter):
     """
 
     def __init__(self, operation: Operation) -> None:
-        super().__init__(tags=[operation], route_class=JsonRoute)
+        super().__init__(tags=[operation], route_class=JsonRoute, dependencies=[demands(Scope.JOBS_WRITE)])
         self.operation = operation
 
     def submission(self, summary: str) -> Callable[..., Any]:

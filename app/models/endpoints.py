@@ -7,12 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query
 
 from app.errors import InvalidRequest, ModelNotFound
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import OwnerDep, ServiceDep, demands
 from app.http.problems import documented
+from app.keys.records import Scope
 from app.models import service
 from app.models.schemas import IdentifiedModel, ModelPage
 
-router = APIRouter(tags=["models"])
+router = APIRouter(tags=["models"], dependencies=[demands(Scope.DATA_READ)])
 
 ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 

@@ -18,9 +18,10 @@ from app.errors import (
     TrajectoryNotFound,
     UnsupportedMediaType,
 )
-from app.http.context import OwnerDep, Service, ServiceDep
+from app.http.context import OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import parse_json
 from app.http.problems import documented
+from app.keys.records import Scope
 from app.trajectories import repository, service
 from app.trajectories.schemas import Trajectory, TrajectorySummary, TrajectoryUpload
 
@@ -57,6 +58,7 @@ REQUEST_BODY: dict[str, Any] = {
 
 @router.post(
     "/trajectories",
+    dependencies=[demands(Scope.DATA_WRITE)],
     operation_id="upload_trajectory",
     summary="Upload a sample flight",
     status_code=201,
@@ -134,6 +136,7 @@ def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
 
 @router.get(
     "/trajectories/{trajectory_id}",
+    dependencies=[demands(Scope.DATA_READ)],
     operation_id="get_trajectory",
     summary="Read a sample flight back",
     responses=documented(InvalidRequest, TrajectoryNotFound),

@@ -15,9 +15,10 @@ from app.errors import (
     WebhookDisabled,
     WebhookNotFound,
 )
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import OwnerDep, ServiceDep, demands
 from app.http.json_body import JsonRoute
 from app.http.problems import documented
+from app.keys.records import Scope
 from app.webhooks import repository, service
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.schemas import (
@@ -30,7 +31,7 @@ from app.webhooks.schemas import (
     WebhookRequest,
 )
 
-router = APIRouter(tags=["webhooks"], route_class=JsonRoute)
+router = APIRouter(tags=["webhooks"], route_class=JsonRoute, dependencies=[demands(Scope.WEBHOOKS)])
 
 ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]

@@ -1,0 +1,32 @@
+"""What a caller may know of its own key. Keys are made and revoked on the command line only."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from app.http.context import CallerDep, ServiceDep, demands
+from app.keys import quota, repository
+from app.keys.schemas import KeyAbout, LimitAndUse, Me, Quotas
+
+router = APIRouter(tags=["keys"])
+
+
+@router.get("/me", operation_id="get_me", summary="Who am I, and what may I do?", dependencies=[demands()])
+def get_me(app: ServiceDep, caller: CallerDep) -> Me:
+    """Tell the caller's owner, and its key's scopes, quotas and use."""
+    scopes = sorted(caller.scopes)
+    if caller.key_id is None:
+        return Me(owner=caller.owner, scopes=scopes, key=None, quotas=None)
+    with app.database.read() as session:
+        key = repository.key_by_id(session, caller.key_id)
+        used = quota.usage(session, caller.key_id)
+    return Me(
+        owner=caller.owner,
+        scopes=scopes,
+        key=KeyAbout(id=key.id, name=key.name, prefix=key.prefix, expires_at=key.expires_at),
+        quotas=Quotas(
+            jobs_in_flight=LimitAndUse(used=used.jobs_in_flight, limit=key.quota.max_jobs_in_flight),
+            flights_per_day=LimitAndUse(used=used.flights_today, limit=key.quota.max_flights_per_day),
+            stored_bytes=LimitAndUse(used=used.stored_bytes, limit=key.quota.max_stored_bytes),
+        ),
+    )

@@ -1,0 +1,42 @@
+"""The caller's own key on the wire."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pydantic import BaseModel, Field
+
+from app.keys.records import Scope
+
+
+class KeyAbout(BaseModel):
+    """The key that the request was made with."""
+
+    id: str = Field(examples=["key_01k0c3v9fh8x2m4n6p8q0r2s4t"])
+    name: str = Field(examples=["laboratory"])
+    prefix: str = Field(description="The part of the key that may be shown.", examples=["4k7m2x9q"])
+    expires_at: datetime | None
+
+
+class LimitAndUse(BaseModel):
+    """One quota: what is used of it; no limit when `limit` is null."""
+
+    used: int
+    limit: int | None
+
+
+class Quotas(BaseModel):
+    """How much the key may use, and uses now."""
+
+    jobs_in_flight: LimitAndUse
+    flights_per_day: LimitAndUse = Field(description="Since midnight UTC; running jobs by their estimate.")
+    stored_bytes: LimitAndUse
+
+
+class Me(BaseModel):
+    """Who the caller is, what it may do, and how much."""
+
+    owner: str = Field(description="Keys of one owner see the same things.", examples=["aeroelastics"])
+    scopes: list[Scope]
+    key: KeyAbout | None = Field(description="Null where the service demands no keys.")
+    quotas: Quotas | None = Field(description="Null where the service demands no keys.")
