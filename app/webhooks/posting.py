@@ -177,16 +177,14 @@ def _why(failure: Exception) -> str:
 
     if isinstance(failure, AddressRefused):
         return f"Refused: {failure}"
-    chain: BaseException | None = failure
+    chain: BaseException | None = failure if isinstance(failure, httpx.ConnectError) else None
     while chain is not None:
         if isinstance(chain, ssl.SSLCertVerificationError):
             return "The receiver's certificate is not valid for its name."
-        if isinstance(chain, ssl.SSLError):
-            return "No secure connection came about."
         chain = chain.__cause__ or chain.__context__
     sentences: tuple[tuple[tuple[type[Exception], ...], str], ...] = (
         ((TimeoutError, httpx.TimeoutException), "There was no answer in time."),
-        ((httpx.ConnectError,), "The receiver cannot be connected to."),
+        ((httpx.ConnectError,), "No (secure) connection came about."),
         ((httpx.HTTPError,), "The exchange broke off."),
         ((OSError,), "The name is not known."),
     )
