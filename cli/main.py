@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import typer
 
+from cli.commands.audit import audit
 from cli.commands.bench import bench
 from cli.commands.database import database
 from cli.commands.identify import identify
 from cli.commands.jobs import jobs
+from cli.commands.keys import keys
 from cli.commands.optimize import optimize
 from cli.commands.options import EXIT_CODES
 from cli.commands.paper import paper
@@ -30,6 +32,8 @@ app = typer.Typer(
 for command in (serve, identify, study, simulate, optimize, paper, bench):
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(jobs, name="jobs")
+app.add_typer(keys, name="keys")
+app.add_typer(audit, name="audit")
 app.add_typer(database, name="db")
 
 
