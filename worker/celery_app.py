@@ -11,15 +11,20 @@ from typing import Any
 
 from celery import Celery
 from celery.signals import (
+    setup_logging,
     worker_init,
     worker_process_init,
+    worker_process_shutdown,
     worker_ready,
     worker_shutdown,
     worker_shutting_down,
 )
 
+from app.observability.logs import configure_logging
+from app.observability.tracing import stop_tracing
 from app.settings import Settings, load_settings
 from worker import numerics, shutdown
+from worker.presence import Presence
 
 QUEUE = "morphid"
 RUN_JOB = "morphid.run_job"
@@ -55,6 +60,7 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
             }
         },
     )
+    celery.steps["consumer"].add(Presence)
     return celery
 
 
@@ -63,7 +69,13 @@ def threads_per_job() -> int:
     return numerics.share_cores(int(os.environ.get("MORPHID_WORKERS", "1")))
 
 
-app = make_app(load_settings(), reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+settings = load_settings()
+app = make_app(settings, reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+
+
+@setup_logging.connect
+def _log_in_our_way(**_: Any) -> None:
+    configure_logging(settings.log_format, settings.log_level)
 
 
 @worker_init.connect
@@ -77,6 +89,11 @@ def _in_each_child(**_: Any) -> None:
     from worker import tasks
 
     tasks.enter_process()
+
+
+@worker_process_shutdown.connect
+def _at_the_end_of_each_child(**_: Any) -> None:
+    stop_tracing()
 
 
 @worker_ready.connect

@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextvars import copy_context
 from enum import Enum
 from types import TracebackType
 from typing import Self
@@ -80,7 +81,12 @@ class Vigil:
         self._heeded = False
         self._over = threading.Event()
         self._reason: StopReason | None = None
-        self._thread = threading.Thread(target=self._watch, name=f"vigil-{claim.job_id}", daemon=True)
+        self._thread = threading.Thread(
+            target=copy_context().run,  # its lines say whose job it watches
+            args=(self._watch,),
+            name=f"vigil-{claim.job_id}",
+            daemon=True,
+        )
 
     def __enter__(self) -> Self:
         self._thread.start()

@@ -15,6 +15,7 @@ from worker.attempt import Attempt, Ending
 from worker.lease import Vigil
 from worker.numerics import Kernels
 from worker.operations import Begin, find_operation
+from worker.telling import told
 
 log = logging.getLogger(__name__)
 
@@ -60,6 +61,10 @@ class Runner:
         claim = None if self.shutting_down() else self._claim()
         if claim is None:
             return Ending.NOTHING_QUEUED, None
+        with told(claim):
+            return self._attempt(claim), claim.job_id
+
+    def _attempt(self, claim: Claim) -> Ending:
         log.info("job %s: attempt %d of %d", claim.job_id, claim.attempt, claim.max_attempts)
         vigil = Vigil(
             self.database,
@@ -72,7 +77,7 @@ class Runner:
             attempt = Attempt(self.database, claim, vigil, self.kernels, clock=self.clock)
             ending = attempt.run(self.find_operation)
         log.info("job %s: %s", claim.job_id, ending.value)
-        return ending, claim.job_id
+        return ending
 
     def _claim(self) -> Claim | None:
         for _ in range(CLAIM_TRIES):

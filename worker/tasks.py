@@ -16,6 +16,7 @@ from app.database_errors import trouble_of
 from app.jobs.reaper import reap
 from app.jobs.records import ReapReport
 from app.jobs.turns import next_unit
+from app.observability.tracing import forget_tracing, start_tracing
 from app.settings import load_settings
 from worker import numerics, shutdown
 from worker.attempt import Ending
@@ -59,7 +60,9 @@ def enter_process() -> Process:
     """Give this process its database and kernels, made on first use."""
     if os.getpid() not in _processes:
         _processes.clear()
+        forget_tracing()
         process = _processes[os.getpid()] = Process(threads_per_job())
+        start_tracing("morphid-worker", process.settings.traces)
         process.kernels.start()
     return _processes[os.getpid()]
 
