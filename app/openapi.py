@@ -23,6 +23,7 @@ from app.http.problems import MEDIA_TYPE, documented
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
 from app.version import VERSION
+from app.webhooks.endpoints import messages
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"
@@ -69,6 +70,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             summary="Equivalent models of sweep-morphing aircraft from sample flights",
             description=DESCRIPTION,
             routes=app.routes,
+            webhooks=messages.routes,
             tags=TAGS,
             license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         )
@@ -93,7 +95,10 @@ def _add_outages(document: dict[str, Any]) -> None:
     for path, operations in document["paths"].items():
         if path not in WITHOUT_DATABASE:
             for operation in operations.values():
-                operation["responses"].setdefault(str(DatabaseAway.status), response)
+                known = operation["responses"].setdefault(str(DatabaseAway.status), dict(response))
+                if known["description"] != response["description"]:  # the route has a reason of its own
+                    known["description"] += f"; {response['description']}"
+                    known["headers"] = response["headers"]
 
 
 def _add_refusals(document: dict[str, Any]) -> None:

@@ -6,6 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import (
     BodyTooLarge,
     InvalidRequest,
@@ -15,7 +17,7 @@ from app.errors import (
     WebhookDisabled,
     WebhookNotFound,
 )
-from app.http.context import OwnerDep, ServiceDep, demands
+from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.json_body import JsonRoute
 from app.http.problems import documented
 from app.keys.records import Scope
@@ -25,6 +27,7 @@ from app.webhooks.schemas import (
     EXAMPLE_WEBHOOK,
     Delivery,
     DeliveryPage,
+    Message,
     NewWebhook,
     Webhook,
     WebhookList,
@@ -44,14 +47,16 @@ WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
     status_code=201,
     responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, TooManyWebhooks),
 )
-def create_webhook(app: ServiceDep, owner: OwnerDep, request: WebhookRequest) -> NewWebhook:
+def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) -> NewWebhook:
     """Register an address; the answer holds the secret that signs every message, this once.
 
     Messages follow Standard Webhooks. Each end of a job is sent at least once, in no fixed order.
     """
     service.check_address(AddressPolicy(allow_private=app.settings.webhook_allow_private), request.url)
     with app.database.write() as session:
-        return service.create(session, owner, request)
+        made = service.create(session, caller.owner, request)
+        note(session, caller, Action.WEBHOOK_CREATE, made.id)
+        return made
 
 
 @router.get("/webhooks", operation_id="list_webhooks", summary="List webhooks")
@@ -80,10 +85,11 @@ def get_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Webh
     status_code=204,
     responses=documented(InvalidRequest, WebhookNotFound),
 )
-def delete_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> None:
+def delete_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> None:
     """Delete a webhook with its deliveries, sent or not."""
     with app.database.write() as session:
-        repository.delete_webhook(session, owner, webhook_id)
+        repository.delete_webhook(session, caller.owner, webhook_id)
+        note(session, caller, Action.WEBHOOK_DELETE, webhook_id)
 
 
 @router.post(
@@ -92,10 +98,12 @@ def delete_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> N
     summary="Enable a webhook",
     responses=documented(InvalidRequest, WebhookNotFound),
 )
-def enable_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Webhook:
+def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> Webhook:
     """Send to a webhook again that was disabled. Jobs that ended meanwhile are not told: list them."""
     with app.database.write() as session:
-        return service.enable(session, owner, webhook_id)
+        enabled = service.enable(session, caller.owner, webhook_id)
+        note(session, caller, Action.WEBHOOK_UPDATE, webhook_id)
+        return enabled
 
 
 @router.post(
@@ -127,3 +135,20 @@ def list_webhook_deliveries(
     """Messages with the fate of their last try, newest first."""
     with app.database.read() as session:
         return service.delivery_page(session, owner, webhook_id, cursor=cursor, limit=limit)
+
+
+messages = APIRouter(tags=["webhooks"])  # not served: what receivers are sent, for the OpenAPI document
+
+
+@messages.post(
+    "job_ended",
+    operation_id="job_ended",
+    summary="A job has ended",
+    responses={
+        204: {"description": "Any 2xx: the message was taken."},
+        "default": {"description": "Not taken: it is sent again. 410 disables the webhook."},
+    },
+    status_code=204,
+)
+def job_ended(message: Message) -> None:
+    """Sent to webhooks by Standard Webhooks: `webhook-id`, `webhook-timestamp` and `webhook-signature`."""
