@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import zlib
+from dataclasses import dataclass
 from typing import Any
 
 Document = dict[str, Any]
@@ -50,6 +51,15 @@ def unpacked_json(data: bytes) -> bytes:
     return zlib.decompress(data)
 
 
-def digest(document: Any) -> str:
-    """SHA-256 of the canonical JSON, as hexadecimal text."""
-    return hashlib.sha256(json_bytes(document)).hexdigest()
+@dataclass(frozen=True, slots=True)
+class Sealed:
+    """A document ready to be stored: deflated, with the SHA-256 of its canonical JSON as hexadecimal text."""
+
+    data: bytes
+    sha256: str
+
+
+def sealed(document: Any) -> Sealed:
+    """Deflate and sum a document once; megabytes take a while, so do it before a transaction begins."""
+    text = json_bytes(document)
+    return Sealed(zlib.compress(text, DEFLATE_LEVEL), hashlib.sha256(text).hexdigest())

@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import Table, insert, select
 
 from app.database import Session, database_time
-from app.documents import Document, digest, finite, packed
+from app.documents import Document, Sealed, finite, sealed
 from app.errors import IdempotencyConflict
 from app.identifiers import new_identifier
 from app.jobs.records import Job, JobStatus
@@ -36,7 +36,33 @@ class Origin:
     traceparent: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What was agreed on how a job is run.
+
+    Attributes
+    ----------
+    priority : int
+        Inside its owner the highest runs first.
+    label : str or None
+        The owner's own word for it.
+    max_attempts : int
+        Claims before a job whose workers are lost is given up.
+    max_seconds : float or None
+        Deadline counted from the first claim, s.
+    expires_in_s : float or None
+        A job that has not begun after this time is not begun any more.
+    """
+
+    priority: int = 0
+    label: str | None = None
+    max_attempts: int = 3
+    max_seconds: float | None = None
+    expires_in_s: float | None = None
+
+
 NO_ORIGIN = Origin()
+USUAL_TERMS = Terms()
 
 
 def create_job(
@@ -44,33 +70,25 @@ def create_job(
     *,
     owner: str,
     operation: str,
-    request: Document,
-    idempotency_key: str | None = None,
-    priority: int = 0,
-    label: str | None = None,
-    max_attempts: int = 3,
-    max_seconds: float | None = None,
-    expires_in_s: float | None = None,
+    request: Document | Sealed,
     summary: Document | None = None,
     flights_estimated: int = 0,
+    terms: Terms = USUAL_TERMS,
     origin: Origin = NO_ORIGIN,
+    idempotency_key: str | None = None,
 ) -> Job:
     """Write a queued job; publish its id after the commit.
 
     Parameters
     ----------
-    request : dict
+    request : dict or Sealed
         The whole request, every sample inline: what `load_request` gives the worker.
-    idempotency_key : str, optional
-        With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
-    max_seconds : float, optional
-        Deadline counted from the first claim, s.
-    expires_in_s : float, optional
-        A job that has not begun after this time is not begun any more.
     summary : dict, optional
         The few small facts of the request that listings show.
     flights_estimated : int
         Charged to the key until the job has ended and its flights are known.
+    idempotency_key : str, optional
+        With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
 
     Raises
     ------
@@ -80,29 +98,30 @@ def create_job(
         The API key may not have another such job.
     """
     job_id = new_identifier("job")
-    fingerprint = digest(request)
+    document = request if isinstance(request, Sealed) else sealed(request)
     if idempotency_key is not None:
-        earlier = _take_idempotency_key(session, owner, idempotency_key, operation, fingerprint, job_id)
+        earlier = _take_idempotency_key(session, owner, idempotency_key, operation, document.sha256, job_id)
         if earlier is not None:
             return earlier
-    document = packed(request)
-    quota.charge(session, origin.key_id, flights=flights_estimated, size_bytes=len(document))
+    size_bytes = len(document.data)
+    quota.charge(session, origin.key_id, flights=flights_estimated, size_bytes=size_bytes)
+    starts_by = None if terms.expires_in_s is None else database_time() + terms.expires_in_s
     session.execute(
         insert(jobs).values(
             id=job_id,
             owner=owner,
             operation=operation,
             status=JobStatus.QUEUED.value,
-            priority=priority,
-            label=label,
+            priority=terms.priority,
+            label=terms.label,
             summary=finite(summary or {}),
             attempt=0,
-            max_attempts=max_attempts,
+            max_attempts=terms.max_attempts,
             fence=0,
             event_seq=1,
             partial=False,
-            max_seconds=max_seconds,
-            deadline_at=None if expires_in_s is None else database_time() + expires_in_s,
+            max_seconds=terms.max_seconds,
+            deadline_at=starts_by,
             published_at=database_time(),
             created_at=database_time(),
             updated_at=database_time(),
@@ -110,10 +129,10 @@ def create_job(
             request_id=origin.request_id,
             traceparent=origin.traceparent,
             flights_estimated=flights_estimated,
-            size_bytes=len(document),
+            size_bytes=size_bytes,
         )
     )
-    session.execute(insert(job_requests).values(job_id=job_id, document=document, sha256=fingerprint))
+    session.execute(insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256))
     insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
     session.execute(_insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     return get_job(session, owner, job_id)

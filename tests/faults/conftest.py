@@ -15,6 +15,7 @@ from sqlalchemy import select
 
 from app.database import Database, upgrade
 from app.documents import unpacked
+from app.jobs.creation import Terms
 from app.jobs.queue import publish
 from app.jobs.records import Job
 from app.jobs.store import create_job, get_job
@@ -83,7 +84,7 @@ class Rig:
                 owner=OWNER,
                 operation="walk",
                 request={"seed": 7, **request},
-                max_attempts=max_attempts,
+                terms=Terms(max_attempts=max_attempts),
             )
         if published:
             assert publish(job.id, self.broker.url)
