@@ -6,13 +6,8 @@ import logging
 import time
 from collections.abc import Callable
 from enum import Enum
-from typing import TypeVar
-
-from sqlalchemy import Connection
-from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
-from app.database_errors import DatabaseTrouble, trouble_of
 from app.jobs.records import Claim, JobStatus
 from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
 from worker.lease import StopReason, Vigil
@@ -27,18 +22,15 @@ from worker.operations import (
     WorkInterrupted,
     WorkRefused,
 )
+from worker.patience import Patient, StaleClaim, StorageFull
 from worker.progress import Pace
+from worker.telling import Phases
 
 log = logging.getLogger(__name__)
-Answer = TypeVar("Answer")
 
 SAVE_EVERY_S = (
     0.5  # a generation may take milliseconds; two writes a second serve the user's eye and the disk
 )
-FIRST_PAUSE_S = 0.5  # before the job store is asked again; doubles
-LONGEST_PAUSE_S = 4.0
-FULL_TRIES = 4  # somebody may be making room; then the job says that there is none
-SHUTDOWN_PATIENCE_S = 5.0  # a worker that ends waits so long for the job store; then the reaper does the rest
 
 
 class Ending(Enum):
@@ -61,15 +53,7 @@ ENDINGS = {
 }
 
 
-class StaleClaim(Exception):
-    """The store refused a write: the job is someone else's now."""
-
-
-class StorageFull(Exception):
-    """The job store has no room for what should be written; what was there before still is."""
-
-
-class Attempt:
+class Attempt(Patient):
     """The work on one claimed job.
 
     Parameters
@@ -92,13 +76,11 @@ class Attempt:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._database = database
+        super().__init__(database, vigil, claim.job_id, clock=clock, sleep=sleep)
         self._claim = claim
-        self._vigil = vigil
         self._kernels = kernels
-        self._clock = clock
-        self._sleep = sleep
         self._pace = Pace(clock)
+        self._phases = Phases(clock=clock)
         self._work: Work | None = None
         self._checkpoint: bytes | None = None
         self._unsaved: Step | None = None
@@ -112,6 +94,8 @@ class Attempt:
             return Ending.ABANDONED
         except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
             return self._fail(_told(error, self._claim.job_id))
+        finally:
+            self._phases.close()
 
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
         request, self._checkpoint = self._patiently(self._load)
@@ -145,6 +129,7 @@ class Attempt:
     # progress
 
     def _note(self, step: Step) -> None:
+        self._phases.note(step.progress.get("phase"))
         self._checkpoint, self._unsaved = step.checkpoint, step
         if self._clock() - self._saved_at >= SAVE_EVERY_S:
             self._save_unsaved()
@@ -216,44 +201,6 @@ class Attempt:
             )
         )
         return ENDINGS[status]
-
-    def _persist(self, write: Callable[[Connection], bool]) -> None:
-        """Write in a transaction of its own; wait out a job store that is away.
-
-        Raises
-        ------
-        StaleClaim : the store refused the write, or this worker ends before the store is back.
-        StorageFull : there is no room.
-        """
-
-        def once() -> bool:
-            with self._database.write() as connection:
-                return write(connection)
-
-        if not self._patiently(once):
-            raise StaleClaim
-
-    def _patiently(self, action: Callable[[], Answer]) -> Answer:
-        """Do something with the job store as often as it takes; nobody else can have the job meanwhile."""
-        pause_s, tries, shutdown_at = FIRST_PAUSE_S, 0, None
-        while True:
-            try:
-                return action()
-            except SQLAlchemyError as error:
-                trouble, tries = trouble_of(error), tries + 1
-                if trouble is None:
-                    raise
-                if trouble is DatabaseTrouble.FULL and tries == FULL_TRIES:
-                    raise StorageFull from error
-                log.warning("job %s: the job store is %s, trying again", self._claim.job_id, trouble.value)
-            if self._vigil.reason is StopReason.LOST:
-                raise StaleClaim
-            if self._vigil.reason is StopReason.SHUTDOWN:
-                shutdown_at = self._clock() if shutdown_at is None else shutdown_at
-                if self._clock() - shutdown_at > SHUTDOWN_PATIENCE_S:
-                    raise StaleClaim
-            self._sleep(min(pause_s, 1.0) if shutdown_at is not None else pause_s)
-            pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
 
 def _told(error: Exception, job_id: str) -> Document:
