@@ -377,3 +377,35 @@ class StorageFull(ServiceError):
     def headers(self) -> dict[str, str]:
         """When to ask again, s: people have to make room."""
         return {"Retry-After": "60"}
+
+
+class SlowBody(ServiceError):
+    """The body arrives too slowly to be worth a connection."""
+
+    status = 408
+    code = "slow_body"
+    title = "The body did not arrive in time"
+
+    def __init__(self) -> None:
+        super().__init__("The body arrived too slowly, or not at all.", hint="Send it again, in one go.")
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """The connection is of no more use."""
+        return {"Connection": "close"}
+
+
+class ServiceBusy(ServiceError):
+    """As many bodies or files are being read as this process can bear."""
+
+    status = 503
+    code = "service_busy"
+    title = "The service is busy"
+
+    def __init__(self, detail: str = "") -> None:
+        super().__init__(detail, hint="Send the request again in a few seconds.")
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s."""
+        return {"Retry-After": "5"}

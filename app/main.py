@@ -16,7 +16,7 @@ from app.afterwards import Afterwards
 from app.database import Database, upgrade
 from app.health.endpoints import router as health
 from app.health.service import Health
-from app.http.body_limit import BodyLimit
+from app.http.body_limit import BodyLimit, BodyLimits
 from app.http.context import Service
 from app.http.gate import Gate
 from app.http.observed import Observed
@@ -34,6 +34,8 @@ from app.observability.logs import configure_logging
 from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
 from app.optimize.endpoints import router as optimize
+from app.parsing.confinement import Limits
+from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
 from app.simulate.endpoints import router as simulate
 from app.study.endpoints import router as study
@@ -71,7 +73,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app = routed_app()
     app.router.lifespan_context = _lifespan(chosen)
     install_problem_handlers(app, known_fields=lambda: _request_fields(app))
-    app.add_middleware(BodyLimit, max_bytes=chosen.max_body_bytes)
+    limits = BodyLimits(
+        chosen.max_body_bytes, chosen.body_grace_s, max_total_bytes=16 * chosen.max_body_bytes
+    )
+    app.add_middleware(BodyLimit, limits=limits)
     app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
     _wrap(app)
     return app
@@ -101,7 +106,8 @@ def _lifespan(settings: Settings) -> Any:
         watcher = JobWatcher(database, settings.event_poll_s)
         afterwards = Afterwards(database)
         keys = KeyRing(database, afterwards)
-        app.state.service = Service(settings, database, publisher, watcher, keys, afterwards)
+        parsers = ParserPool(settings.parsers, Limits(settings.parser_memory_bytes))
+        app.state.service = Service(settings, database, publisher, watcher, keys, afterwards, parsers)
         app.state.health = Health(database, settings)
         afterwards.start()
         publisher.start()

@@ -62,6 +62,27 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(
         default=64 * 2**20, ge=1024, description="Largest request body, counted as it streams."
     )
+    body_grace_s: float = Field(
+        default=20.0, gt=0.0, le=3600.0, description="Time to send a body of any size; larger ones get more."
+    )
+    max_connections: int = Field(
+        default=4096, ge=8, le=100_000, description="Connections at once; event streams count."
+    )
+    header_timeout_s: float = Field(
+        default=10.0, gt=0.0, le=600.0, description="Time to send the headers of a request."
+    )
+    write_timeout_s: float = Field(
+        default=30.0, gt=0.0, le=3600.0, description="A client that reads nothing for so long is hung up on."
+    )
+    parsers: int = Field(
+        default=2,
+        ge=1,
+        le=64,
+        description="Uploads and large bodies that are read at once, each by a process.",
+    )
+    parser_memory_bytes: int = Field(
+        default=512 * 2**20, ge=128 * 2**20, description="Memory of each of these processes."
+    )
     max_wait_s: float = Field(
         default=60.0, ge=0.0, le=600.0, description="Longest `Prefer: wait` that is honoured."
     )

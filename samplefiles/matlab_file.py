@@ -30,11 +30,7 @@ def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     """
     _refuse_hdf5(stream)
     try:
-        from scipy.io import whosmat
-
-        stream.seek(0)
-        contents: Contents = {name or "": (shape, kind) for name, shape, kind in whosmat(stream)}  # type: ignore[arg-type]  # takes streams too
-        return _read(stream, contents, wanted)
+        return _read(stream, _contents(stream), wanted)
     except (FileFault, MemoryError):
         raise
     except NotImplementedError:
@@ -61,6 +57,17 @@ def _hdf5() -> FileFault:
         "this is a MATLAB 7.3 (HDF5) file",
         "save it as version 7: save('flight.mat', ..., '-v7')",
     )
+
+
+def _contents(stream: BinaryIO) -> Contents:
+    """Every variable's shape and class, from the headers alone."""
+    from scipy.io import whosmat
+
+    stream.seek(0)
+    try:
+        return {name or "": (shape, kind) for name, shape, kind in whosmat(stream)}  # type: ignore[arg-type]
+    except TypeError:  # the size of MATLAB's own objects is unknown outside of MATLAB
+        raise _object_fault("") from None
 
 
 def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns:

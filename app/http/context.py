@@ -16,6 +16,7 @@ from app.jobs.queue import Publisher
 from app.jobs.watch import JobWatcher
 from app.keys.keyring import KeyRing
 from app.keys.records import Quota, Scope
+from app.parsing.pool import ParserPool
 from app.settings import Settings
 
 LOCAL_OWNER = "local"  # everyone, where no keys are demanded
@@ -37,6 +38,7 @@ class Service:
     watcher: JobWatcher
     keys: KeyRing
     afterwards: Afterwards
+    parsers: ParserPool
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,15 +12,15 @@ from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
 from app.errors import (
-    BodyTooLarge,
     InvalidRequest,
     MalformedBody,
+    QuotaExceeded,
     TrajectoryNotFound,
     UnsupportedMediaType,
 )
-from app.http.context import OwnerDep, Service, ServiceDep, demands
-from app.http.json_body import parse_json
-from app.http.problems import documented
+from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
+from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
+from app.http.problems import documented, escaped
 from app.keys.records import Scope
 from app.trajectories import repository, service
 from app.trajectories.schemas import Trajectory, TrajectorySummary, TrajectoryUpload
@@ -36,7 +36,8 @@ FORM_SCHEMA: dict[str, Any] = {
         "file": {
             "type": "string",
             "format": "binary",
-            "description": "CSV: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
+            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), told by the ending "
+            "of its name: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
         },
         "name": {
             "type": "string",
@@ -62,66 +63,66 @@ REQUEST_BODY: dict[str, Any] = {
     operation_id="upload_trajectory",
     summary="Upload a sample flight",
     status_code=201,
-    responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest),
+    responses=documented(*BODY_ERRORS, QuotaExceeded),
     openapi_extra=REQUEST_BODY,
 )
 async def upload_trajectory(
-    request: Request, response: Response, app: ServiceDep, owner: OwnerDep
+    request: Request, response: Response, app: ServiceDep, caller: CallerDep
 ) -> TrajectorySummary:
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
-    kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    kind = media_type(request)
     if kind == "multipart/form-data":
-        stored = await _from_form(request, app, owner)
-    elif kind == "application/json" or kind.endswith("+json"):
-        body = await request.body()
-        stored = await run_in_threadpool(_from_json, body, app, owner)
+        upload, pointer = await _from_form(request, app), "/file"
+    elif is_json(kind):
+        upload, pointer = _checked(await json_document(request)), ""
     else:
         raise UnsupportedMediaType(
-            f"The body is announced as {kind or 'nothing'!r}.",
+            f"The body is announced as {kind[:60] or 'nothing'!r}.",
             "#header/Content-Type",
-            "Send multipart/form-data with a CSV `file` (curl -F file=@flight.csv), or application/json.",
+            "Send multipart/form-data with a `file` (curl -F file=@flight.csv), or application/json.",
         )
+
+    def store() -> repository.StoredTrajectory:
+        with app.database.write() as session:
+            return service.store_trajectory(session, caller, upload, pointer)
+
+    stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"
     return _summary(stored)
 
 
-async def _from_form(request: Request, app: Service, owner: str) -> repository.StoredTrajectory:
+async def _from_form(request: Request, app: Service) -> TrajectoryUpload:
     try:
         form = await request.form(max_files=1, max_fields=4, max_part_size=MAX_NAME_BYTES)
     except HTTPException as error:
-        hint = "One part `file` with the CSV and optionally one part `name`."
+        hint = "One part `file` with the flight and optionally one part `name`."
         raise MalformedBody(f"The form cannot be read: {error.detail}", hint=hint) from None
     try:
         file, name = form.get("file"), form.get("name")
         if not isinstance(file, UploadFile):
             raise InvalidRequest(
-                "The form has no file.", "/file", "Send the CSV as the part `file`: curl -F file=@flight.csv"
+                "The form has no file.", "/file", "Send it as the part `file`: curl -F file=@flight.csv"
             )
         unknown = set(form) - {"file", "name"}
         if unknown:
             raise InvalidRequest(
-                "The form has unknown parts.", f"/{min(unknown)[:60]}", "Only `file` and `name` are read."
+                "The form has unknown parts.",
+                f"/{escaped(min(unknown)[:60])}",
+                "Only `file` and `name` are read.",
             )
-
-        def read_and_store() -> repository.StoredTrajectory:
-            upload = service.from_csv(file.file, file.filename or "", name if isinstance(name, str) else None)
-            with app.database.write() as session:
-                return service.store_trajectory(session, owner, upload, "/file")
-
-        return await run_in_threadpool(read_and_store)
+        filename = file.filename or ""
+        columns = await app.parsers.flight(service.file_kind(filename), file.file, "/file")
+        return service.upload_of(columns, filename, name if isinstance(name, str) else None)
     finally:
         await form.close()
 
 
-def _from_json(body: bytes, app: Service, owner: str) -> repository.StoredTrajectory:
-    document = parse_json(body)
+def _checked(document: Any) -> TrajectoryUpload:
     try:
-        upload = TrajectoryUpload.model_validate(document)
+        return TrajectoryUpload.model_validate(document)
     except ValidationError as error:
         items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors(include_url=False)]
         raise RequestValidationError(items, body=document) from None
-    with app.database.write() as session:
-        return service.store_trajectory(session, owner, upload, "")
 
 
 def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:

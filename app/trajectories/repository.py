@@ -14,6 +14,7 @@ from app.errors import TrajectoryNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment
 from app.tables import trajectories
+from app.trajectories.schemas import TrajectoryUpload
 
 Columns = dict[str, list[float]]
 
@@ -29,18 +30,27 @@ class StoredTrajectory:
     created_at: datetime
 
 
-def insert_trajectory(session: Session, owner: str, name: str, columns: Columns) -> StoredTrajectory:
-    """Store a flight whose columns were checked."""
-    time_s = columns["time_s"]
+def stored_form(columns: Columns) -> bytes:
+    """The columns as they are stored; this takes longer than all the rest, so it is done once."""
+    return packed(columns)
+
+
+def insert_trajectory(
+    session: Session, owner: str, key_id: str | None, flight: TrajectoryUpload, document: bytes
+) -> StoredTrajectory:
+    """Store a flight whose columns were checked; `document` is their stored form."""
+    time_s = flight.time_s
     row = session.execute(
         insert(trajectories)
         .values(
             id=new_identifier("traj"),
             owner=owner,
-            name=name,
+            key_id=key_id,
+            name=flight.name,
             rows=len(time_s),
             duration_s=time_s[-1] - time_s[0],
-            document=packed(columns),
+            document=document,
+            size_bytes=len(document),
             created_at=database_time(),
         )
         .returning(
