@@ -29,6 +29,17 @@ class _Exchange:
     status: int = 0
     answered_s: float = 0.0
 
+    def answer(self, scope: Scope, status: int) -> None:
+        """Note that the answer begins; streams go on for as long as their clients like."""
+        self.status = status
+        self.answered_s = time.perf_counter() - self.began
+        LATENCY.labels(
+            method=scope["method"] if scope["method"] in METHODS else "other",
+            route=_route(scope),
+            status=f"{status // 100}xx",
+            waited="yes" if "wait" in _header(scope, b"prefer") else "no",
+        ).observe(self.answered_s)
+
 
 class Observed:
     """ASGI middleware around everything but the request id.
@@ -50,8 +61,7 @@ class Observed:
 
         async def watched_send(message: Message) -> None:
             if message["type"] == "http.response.start":
-                exchange.status = message["status"]
-                exchange.answered_s = time.perf_counter() - exchange.began
+                exchange.answer(scope, message["status"])
             await send(message)
 
         with (
@@ -68,8 +78,7 @@ class Observed:
             finally:
                 route = _route(scope)
                 if exchange.status == 0:
-                    exchange.status = CLIENT_WENT
-                    exchange.answered_s = time.perf_counter() - exchange.began
+                    exchange.answer(scope, CLIENT_WENT)
                 traced.rename(f"{scope['method']} {route}")
                 traced.note({"http.route": route, "http.response.status_code": exchange.status})
                 if exchange.status >= 500:
@@ -78,13 +87,6 @@ class Observed:
 
 
 def _tell(scope: Scope, exchange: _Exchange, route: str) -> None:
-    method = scope["method"] if scope["method"] in METHODS else "other"
-    LATENCY.labels(
-        method=method,
-        route=route,
-        status=f"{exchange.status // 100}xx",
-        waited="yes" if b"wait" in _header(scope, b"prefer").encode() else "no",
-    ).observe(exchange.answered_s)
     level = logging.WARNING if exchange.status >= 500 else logging.INFO
     if route in QUIET_ROUTES and exchange.status < 400:
         level = logging.DEBUG
