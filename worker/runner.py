@@ -82,10 +82,10 @@ class Runner:
     def _claim(self) -> Claim | None:
         for _ in range(CLAIM_TRIES):
             with self.database.write() as connection:
-                job_id = next_unit(connection)
-                if job_id is None:
+                unit = next_unit(connection)
+                if unit is None:
                     return None
-                claim = claim_job(connection, job_id, self.worker_name, self.lease_s)
+                claim = claim_job(connection, unit.job_id, self.worker_name, self.lease_s)
             if claim is not None:
                 return claim
         return None

@@ -101,9 +101,9 @@ def run_job(job_id: str) -> None:
 def pass_on() -> None:
     """Wake somebody for the next queued job unless a message is on its way: a lost one costs nothing."""
     with enter_process().database.read() as connection:
-        job_id = next_unit(connection)
-    if job_id is not None and messages_waiting() == 0:
-        publish(job_id)
+        unit = next_unit(connection)
+    if unit is not None and messages_waiting() == 0:
+        publish(unit.job_id)
 
 
 def messages_waiting() -> int:

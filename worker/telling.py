@@ -17,7 +17,7 @@ def told(claim: Claim) -> Iterator[None]:
     with bound(
         job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker
     ):
-        if claim.attempt == 1:
+        if claim.attempt == 1 and claim.waited_s > 0.0:
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
             f"attempt {claim.operation}",

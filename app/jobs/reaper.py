@@ -11,6 +11,7 @@ from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
+from app.jobs.chunk_reaper import reap_chunks
 from app.jobs.records import HELD, JobStatus, ReapReport
 from app.jobs.rows import transition
 from app.jobs.waiting import idle_slots
@@ -64,12 +65,14 @@ def reap(
         )
         if changed is not None:
             done[kind].append(row.id)
+    spread = reap_chunks(session, clock, republish_after_s)
+    unheard = _unheard(session, clock, republish_after_s, set(done["requeued"]))
     return ReapReport(
         requeued=tuple(done["requeued"]),
-        failed=tuple(done["failed"]),
-        cancelled=tuple(done["cancelled"]),
+        failed=(*done["failed"], *spread.failed),
+        cancelled=(*done["cancelled"], *spread.cancelled),
         expired=tuple(done["expired"]),
-        publish=(*done["requeued"], *_unheard(session, clock, republish_after_s, set(done["requeued"]))),
+        publish=(*done["requeued"], *spread.publish, *unheard),
     )
 
 
@@ -131,8 +134,8 @@ def _unheard(
 ) -> tuple[str, ...]:
     """Queued jobs whose message may have been lost; they are marked as published now.
 
-    As many as there are idle workers: a message is a wake-up for whatever job is next, and who ends a job asks
-    for the next one himself. So the longest queue sends no more messages than somebody has a use for.
+    As many as there are idle workers: a message is a wake-up for whatever job is next, and whoever ends a job
+    passes on the next one. So the longest queue sends no more messages than somebody has a use for.
     """
     wanted = min(max(idle_slots(session), 1), PUBLISH_LIMIT)
     ids = session.scalars(

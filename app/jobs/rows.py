@@ -13,7 +13,7 @@ from app.errors import JobNotFound
 from app.jobs.records import FINISHED, Job, JobStatus, moment, optional_moment
 from app.keys import quota
 from app.observability.job_counts import note_transition
-from app.tables import job_events, jobs
+from app.tables import job_chunks, job_events, jobs
 from app.webhooks.outbox import note_end
 
 JOB_COLUMNS = (
@@ -130,6 +130,8 @@ def transition(
             day=quota.usage_day(row.created_at),
         )
         note_end(session, row)
+        # nobody flies for it any more
+        session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
     return row
 
 

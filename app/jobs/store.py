@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, select, update
+from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, or_, select, update
 
 from app.database import Session, database_time
 from app.documents import Document, finite, packed, unpacked
 from app.errors import JobNotFound
 from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
+from app.jobs.chunk_rows import at_rest
 from app.jobs.creation import create_job
 from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
 from app.jobs.rows import get_job, job_from_row, thin_events, transition
@@ -80,6 +81,11 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
     if row is None:
         return None
     note_served(session, row.owner)
+    return claim_from_row(row, worker_name)
+
+
+def claim_from_row(row: Row[Any], worker_name: str) -> Claim:
+    """Turn the row of a job that was just claimed into the claim."""
     return Claim(
         job_id=row.id,
         owner=row.owner,
@@ -95,7 +101,8 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
     )
 
 
-def _held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
+def held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
+    """Tell the row of a claim as long as the claim holds."""
     return (jobs.c.id == claim.job_id, jobs.c.fence == claim.fence, jobs.c.status.in_(HELD))
 
 
@@ -104,7 +111,7 @@ def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseS
     return _lease_state(
         session.execute(
             update(jobs)
-            .where(*_held_by(claim))
+            .where(*held_by(claim))
             .values(lease_until=database_time() + lease_s)
             .returning(*LEASE_COLUMNS)
         ).one_or_none()
@@ -113,7 +120,7 @@ def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseS
 
 def look_at_lease(session: Session, claim: Claim) -> LeaseState:
     """Learn whether to stop, writing nothing: cheap enough to ask several times a second."""
-    return _lease_state(session.execute(select(*LEASE_COLUMNS).where(*_held_by(claim))).one_or_none())
+    return _lease_state(session.execute(select(*LEASE_COLUMNS).where(*held_by(claim))).one_or_none())
 
 
 def _lease_state(row: Row[Any] | None) -> LeaseState:
@@ -144,18 +151,23 @@ def save_progress(session: Session, claim: Claim, progress: Document, checkpoint
     values: Document = {"progress": clean}
     if clean.get("flights") is not None:
         values["flights"] = int(clean["flights"])
-    row = transition(session, *_held_by(claim), event="progress", payload=clean, **values)
+    row = transition(session, *held_by(claim), event="progress", payload=clean, **values)
     if row is None:
         return False
     thin_events(session, row.id, row.event_seq)
     if checkpoint is not None:
-        session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
-        session.execute(
-            insert(job_checkpoints).values(
-                job_id=claim.job_id, data=checkpoint, fence=claim.fence, at=database_time()
-            )
-        )
+        replace_checkpoint(session, claim, checkpoint)
     return True
+
+
+def replace_checkpoint(session: Session, claim: Claim, checkpoint: bytes) -> None:
+    """Write the checkpoint of a claimed job; only in a transaction that has proved the claim."""
+    session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
+    session.execute(
+        insert(job_checkpoints).values(
+            job_id=claim.job_id, data=checkpoint, fence=claim.fence, at=database_time()
+        )
+    )
 
 
 def load_checkpoint(session: Session, claim: Claim) -> bytes | None:
@@ -214,7 +226,7 @@ def finish_job(
     document = None if result is None else packed({**result, "partial": True} if partial else result)
     files = artifacts or {}
     values["size_bytes"] = jobs.c.size_bytes + len(document or b"") + sum(map(len, files.values()))
-    row = transition(session, *_held_by(claim), event=ending, payload=payload, **values)
+    row = transition(session, *held_by(claim), event=ending, payload=payload, **values)
     if row is None:
         return False
     if document is not None:
@@ -246,7 +258,7 @@ def release_job(session: Session, claim: Claim) -> bool:
     cancelling = jobs.c.status == JobStatus.CANCELLING.value
     row = transition(
         session,
-        *_held_by(claim),
+        *held_by(claim),
         event="released",
         payload={"worker": claim.worker},
         status=case((cancelling, literal(JobStatus.CANCELLED.value)), else_=literal(JobStatus.QUEUED.value)),
@@ -262,6 +274,9 @@ def release_job(session: Session, claim: Claim) -> bool:
 def request_cancel(session: Session, owner: str, job_id: str) -> Job:
     """Ask a job to end: a queued one does at once, a running one winds down, a finished one stays as it is.
 
+    A spread job at which nobody works just now ends at once as well: there is nobody to wind it down.
+    Otherwise publish the id after the commit, so that some worker does.
+
     Raises
     ------
     JobNotFound
@@ -271,9 +286,10 @@ def request_cancel(session: Session, owner: str, job_id: str) -> Job:
         session,
         jobs.c.id == job_id,
         jobs.c.owner == owner,
-        jobs.c.status == JobStatus.QUEUED.value,
+        or_(jobs.c.status == JobStatus.QUEUED.value, at_rest()),
         event="cancelled",
         status=JobStatus.CANCELLED.value,
+        fence=jobs.c.fence + 1,
         finished_at=database_time(),
     )
     if row is None:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from sqlalchemy import Row, and_, func, or_, select
 
 from app.database import Session, database_time
+from app.jobs.chunk_rows import HANDED_OUT, RUNNING
 from app.jobs.records import HELD, Job, JobStatus
-from app.tables import jobs, owners, workers
+from app.tables import job_chunks, jobs, owners, workers
 
 ALIVE_S = 60.0  # a worker that was not seen for so long is not counted on
 RECENT = 50  # finished jobs that tell how long jobs take
@@ -62,9 +63,10 @@ def live_slots(session: Session) -> int:
 
 
 def running(session: Session) -> int:
-    """Jobs in workers' hands."""
-    held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD))
-    return int(session.scalar(held) or 0)
+    """Jobs, and chunks of spread ones, in workers' hands."""
+    held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), ~HANDED_OUT)
+    flown = select(func.count()).select_from(job_chunks).where(job_chunks.c.status == RUNNING)
+    return int(session.scalar(held) or 0) + int(session.scalar(flown) or 0)
 
 
 def idle_slots(session: Session) -> int:

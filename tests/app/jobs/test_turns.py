@@ -10,6 +10,7 @@ from sqlalchemy import delete, update
 
 from app.database import Database, database_time
 from app.jobs import store
+from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.creation import Terms
 from app.jobs.records import Claim
 from app.jobs.turns import next_job_of, next_unit, owners_in_turn
@@ -20,8 +21,8 @@ from tests.app.jobs.test_store import new_job
 def served(database: Database) -> Claim | None:
     """Play a worker: take the job whose turn it is, in one transaction."""
     with database.write() as session:
-        job_id = next_unit(session)
-        return None if job_id is None else store.claim_job(session, job_id, "w")
+        unit = next_unit(session)
+        return None if unit is None else store.claim_job(session, unit.job_id, "w")
 
 
 def order(database: Database, *, finish: bool) -> list[str]:
@@ -122,5 +123,5 @@ def test_too_late_to_start(database: Database) -> None:
     late, other = new_job(database), new_job(database)
     with database.write() as session:
         session.execute(update(jobs).where(jobs.c.id == late.id).values(deadline_at=database_time() - 1.0))
-        assert next_unit(session) == other.id
+        assert next_unit(session) == Unit(UnitKind.JOB, other.id)
         assert store.claim_job(session, late.id, "w") is None
