@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution, SpreadExecution
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, Start, StepS
@@ -94,6 +95,7 @@ class SamplesRequest(Strict):
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SoughtModel
     search: Search = Search()
+    execution: Execution = Execution()
 
 
 class IdentifyRequest(SamplesRequest):
@@ -102,6 +104,7 @@ class IdentifyRequest(SamplesRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
 
     model: EquivalentModel = EquivalentModel()
+    execution: SpreadExecution = SpreadExecution()
 
 
 class CostEstimate(BaseModel):

@@ -132,7 +132,9 @@ def create_job(
             size_bytes=size_bytes,
         )
     )
-    session.execute(insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256))
+    session.execute(
+        insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256)
+    )
     insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
     session.execute(_insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     return get_job(session, owner, job_id)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
+from pydantic import AwareDatetime
 
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
 from app.http.context import OwnerDep, ServiceDep, demands
@@ -16,9 +17,11 @@ from app.jobs import repository, service, store
 from app.jobs.artifacts import media_type
 from app.jobs.event_stream import stream_events, wait_for_end
 from app.jobs.records import JobStatus
+from app.jobs.repository import JobFilter
 from app.jobs.results import JobResult
 from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
 from app.keys.records import Scope
+from app.schemas.execution import Label
 
 router = APIRouter(tags=["jobs"])
 
@@ -44,6 +47,19 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
 }
 
 
+def _wanted(
+    status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
+    operation: Annotated[Operation | None, Query()] = None,
+    label: Annotated[Label | None, Query(description="The `execution.label` of the request.")] = None,
+    created_after: Annotated[AwareDatetime | None, Query(description="From this moment on.")] = None,
+    created_before: Annotated[AwareDatetime | None, Query(description="Before this moment.")] = None,
+) -> JobFilter:
+    return JobFilter(tuple(status or ()), operation, label, created_after, created_before)
+
+
+JobFilterDep = Annotated[JobFilter, Depends(_wanted)]
+
+
 @router.get(
     "/jobs",
     dependencies=[demands(Scope.JOBS_READ)],
@@ -54,23 +70,15 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
 def list_jobs(
     app: ServiceDep,
     owner: OwnerDep,
+    wanted: JobFilterDep,
     cursor: Annotated[
         str | None, Query(pattern=r"^[A-Za-z0-9_]{1,64}$", description="From `next_cursor`.")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
-    operation: Annotated[Operation | None, Query()] = None,
 ) -> JobPage:
     """Your jobs, newest first, a page at a time."""
     with app.database.read() as session:
-        return service.page(
-            session,
-            owner,
-            cursor=cursor,
-            limit=limit,
-            statuses=[item.value for item in status or []],
-            operation=operation,
-        )
+        return service.page(session, owner, wanted, cursor=cursor, limit=limit)
 
 
 @router.get(
@@ -83,7 +91,7 @@ def list_jobs(
 async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: PreferHeader = None) -> Job:
     """Status, progress, times and error of a job; with `Prefer: wait=n` it answers when the job has ended."""
     wait_s = wait_seconds(prefer, app.settings.max_wait_s)
-    return Job.of(await wait_for_end(app, owner, job_id, wait_s))
+    return await wait_for_end(app, owner, job_id, wait_s)
 
 
 @router.get(

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution
 from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, StepS
@@ -119,6 +120,7 @@ class OptimizeRequest(Strict):
         default="flexible", description="Fly the schedules again in the flexible model: minutes."
     )
     flexible: VerifyingModel = VerifyingModel()
+    execution: Execution = Execution()
 
 
 class ScheduleCost(BaseModel):

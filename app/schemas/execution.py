@@ -24,15 +24,15 @@ class Execution(Strict):
         default=0,
         ge=-MAX_PRIORITY,
         le=MAX_PRIORITY,
-        description="Among your own jobs the highest runs first. Other owners' turns come between all the same.",
+        description="Among your own jobs the highest runs first; other owners take their turns all the same.",
     )
     label: Label | None = Field(
         default=None, description="A word of your own, to find the job again: `GET /jobs?label=`."
     )
     max_attempts: Annotated[int, Field(ge=1, le=MAX_ATTEMPTS)] | None = Field(
         default=None,
-        description="How often the job may be begun again after its worker was lost, the first time included; "
-        "the service's own number when left out.",
+        description="How often the job may be begun, again after its worker was lost; the service's own "
+        "number when left out.",
     )
     expires_in_s: Annotated[float, Field(ge=1.0, le=MONTH_S)] | None = Field(
         default=None, description="A job that has not begun by then is not begun any more: it is `expired`."

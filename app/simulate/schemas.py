@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import FlightStepS, Lattice, Start
@@ -101,6 +102,7 @@ class SimulateRequest(Strict):
         default=0.01, description="Between the rows of the trajectory."
     )
     environment: Environment | None = None
+    execution: Execution = Execution()
 
 
 class FlightCost(BaseModel):

@@ -83,5 +83,6 @@ def identification_from_document(document: dict[str, Any], threads: int | None =
     samples = [trajectory_from_document(item, f"/samples/{i}") for i, item in enumerate(listed)]
     model = model_settings(fields.raw("model", {}))
     search = search_settings(fields.raw("search", {}))
+    fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     return Identification(aircraft, flight, samples, model, search)

@@ -204,6 +204,7 @@ def simulation_from_document(document: Document, threads: int | None = None) -> 
     duration_s = fields.number("duration_s", above=0.0, most=LONGEST_FLIGHT_S)
     output_step_s = fields.number("output_step_s", default=OUTPUT_STEP_S, above=0.0, most=LONGEST_FLIGHT_S)
     environment, seed = environment_from_document(fields.raw("environment", {}))
+    fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     rows = duration_s / output_step_s + 1
     if not 3 <= rows <= MOST_ROWS:
