@@ -16,6 +16,7 @@ METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
 UNROUTED = "unrouted"  # refused before a route was found, or there is none
 STATIC = "/static"
 QUIET_ROUTES = frozenset({"/livez", "/readyz", "/metrics", STATIC})  # asked by machines all day
+MAX_PATH = 300  # characters in a line of the log
 CLIENT_WENT = 499  # nginx' number for a client that did not wait for its answer
 
 access = logging.getLogger("morphid.access")
@@ -96,7 +97,7 @@ def _tell(scope: Scope, exchange: _Exchange, route: str) -> None:
     facts = {
         "method": scope["method"],
         "route": route,
-        "path": scope["path"],  # without its query: what callers put there is theirs
+        "path": scope["path"][:MAX_PATH],  # without its query: what callers put there is theirs
         "status": exchange.status,
         "answered_s": round(exchange.answered_s, 4),
         "duration_s": round(time.perf_counter() - exchange.began, 4),
@@ -108,7 +109,7 @@ def _tell(scope: Scope, exchange: _Exchange, route: str) -> None:
         level,
         "%s %s %d",
         scope["method"],
-        scope["path"],
+        facts["path"],
         exchange.status,
         extra={"facts": {name: fact for name, fact in facts.items() if fact is not None}},
     )

@@ -53,6 +53,11 @@ def blotted(text: str) -> str:
     return text
 
 
+def printable(text: str) -> str:
+    """Return `text` with escapes for what would move a terminal's cursor or begin a line of its own."""
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
 class FactsFilter(logging.Filter):
     """Writes down the facts of the moment: a line may be formatted in another thread."""
 
@@ -105,8 +110,10 @@ class TextFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line of a record."""
-        facts = " ".join(f"{name}={value}" for name, value in getattr(record, "facts", {}).items())
-        message = _message(record).replace("\n", "\n  ")
+        facts = " ".join(
+            f"{name}={printable(str(value))}" for name, value in getattr(record, "facts", {}).items()
+        )
+        message = "\n  ".join(printable(line) for line in _message(record).splitlines())
         line = f"{_time(record)} {record.levelname.lower():8}{record.name}: {message}"
         if facts:
             line += f" [{facts}]"
