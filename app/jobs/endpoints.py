@@ -9,8 +9,10 @@ from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 from pydantic import AwareDatetime
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
-from app.http.context import OwnerDep, ServiceDep, demands
+from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
@@ -212,14 +214,16 @@ def get_job_artifact(
     summary="Cancel a job",
     responses=documented(InvalidRequest, JobNotFound),
 )
-def cancel_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Job:
+def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
     """Cancel a job in any state.
 
     A queued job ends at once; a running one within two seconds, and its best so far is a partial result; a
     finished one stays as it is.
     """
     with app.database.write() as session:
-        return Job.of(store.request_cancel(session, owner, job_id))
+        job = store.request_cancel(session, caller.owner, job_id)
+        note(session, caller, Action.JOB_CANCEL, job_id)
+    return Job.of(job)
 
 
 @router.delete(
@@ -230,7 +234,8 @@ def cancel_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Job:
     status_code=204,
     responses=documented(InvalidRequest, JobNotFound, JobNotFinished),
 )
-def delete_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> None:
+def delete_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> None:
     """Delete a finished job with its events, result and files; its identified model stays."""
     with app.database.write() as session:
-        repository.delete_job(session, owner, job_id)
+        repository.delete_job(session, caller.owner, job_id)
+        note(session, caller, Action.JOB_DELETE, job_id)

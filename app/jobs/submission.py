@@ -13,9 +13,11 @@ from typing import Annotated, Any, Generic, TypeVar
 from fastapi import APIRouter, Depends, Response
 from fastapi.concurrency import run_in_threadpool
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.database import Session
 from app.documents import Document, sealed
-from app.errors import IdempotencyConflict
+from app.errors import IdempotencyConflict, QuotaExceeded
 from app.http.context import Caller, CallerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, JsonRoute
 from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
@@ -100,7 +102,7 @@ class OperationRouter(APIRouter):
             operation_id=self.operation,
             summary=summary,
             status_code=202,
-            responses={202: ACCEPTED, **documented(*BODY_ERRORS, IdempotencyConflict)},
+            responses={202: ACCEPTED, **documented(*BODY_ERRORS, IdempotencyConflict, QuotaExceeded)},
         )
 
     def validation(self, summary: str) -> Callable[..., Any]:
@@ -152,7 +154,7 @@ class Submission:
         terms = self._terms(order, request.execution)
         origin = Origin(self.caller.key_id, self.caller.request_id or None, current_traceparent())
         with self.app.database.write() as session:
-            return store.create_job(
+            job = store.create_job(
                 session,
                 owner=self.caller.owner,
                 operation=order.operation,
@@ -163,6 +165,9 @@ class Submission:
                 origin=origin,
                 idempotency_key=self.idempotency_key,
             )
+            if not job.replayed:
+                note(session, self.caller, Action.JOB_POST, job.id, detail={"operation": order.operation})
+        return job
 
     def _terms(self, order: Order[Any], execution: Execution) -> Terms:
         settings = self.app.settings

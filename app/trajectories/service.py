@@ -6,6 +6,8 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.database import Session
 from app.errors import Fault, InvalidRequest
 from app.http.context import Caller
@@ -88,4 +90,6 @@ def store_trajectory(
         raise InvalidRequest.of(faults)
     document = stored_form(upload.model_dump(exclude={"name"}))
     charge_bytes(session, caller.key_id, len(document))
-    return insert_trajectory(session, caller.owner, caller.key_id, upload, document)
+    stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
+    note(session, caller, Action.TRAJECTORY_POST, stored.id)
+    return stored
