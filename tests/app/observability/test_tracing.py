@@ -94,7 +94,7 @@ def test_off_means_off(service: RunningService) -> None:
 
 
 def test_off_imports_nothing(root: Path) -> None:
-    """A service that does not trace does not import what traces; a library that it needs knows the API of it."""
+    """A service that does not trace does not import what traces; a library may know the API of it."""
     program = (
         "import sys, app.main, worker.tasks; from app.observability import tracing; "
         "tracing.start_tracing('x', ''); sys.exit('opentelemetry.sdk' in sys.modules)"
