@@ -129,9 +129,8 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
 
 def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
     command = [
-        *(sys.executable, "-m", "uvicorn", "app.main:create_app", "--factory"),
+        *(sys.executable, "-m", "app.http.server"),
         *("--host", host, "--port", str(port)),
-        *("--no-access-log", "--timeout-graceful-shutdown", "5"),
     ]
     return ChildSpec(name="api", command=command, environment=environment)
 
