@@ -108,8 +108,9 @@ def _add_refusals(document: dict[str, Any]) -> None:
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, told in (callers if "security" in operation else strangers).items():
-                fresh = {"description": "", "content": PROBLEM_CONTENT, "headers": REFUSAL_HEADERS[status]}
-                known = operation["responses"].setdefault(str(status), fresh)
+                known = operation["responses"].setdefault(str(status), {"description": ""})
+                known.setdefault("content", PROBLEM_CONTENT)
+                known.setdefault("headers", REFUSAL_HEADERS[status])
                 texts = (known["description"], told["description"])
                 known["description"] = "; ".join(dict.fromkeys(filter(None, texts)))
 
