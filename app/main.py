@@ -26,6 +26,7 @@ from app.http.security_headers import SecurityHeaders
 from app.identify.endpoints import router as identify
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
+from app.jobs.upkeep import Upkeep
 from app.jobs.watch import JobWatcher
 from app.keys.endpoints import router as keys
 from app.keys.keyring import KeyRing
@@ -115,11 +116,14 @@ def _lifespan(settings: Settings) -> Any:
         policy = AddressPolicy(allow_private=settings.webhook_allow_private)
         sender = WebhookSender(database, SenderSettings(policy))
         sender.start()
+        upkeep = Upkeep(database, publisher, settings)
+        upkeep.start()
         try:
             with _streams_end_with_the_process(watcher):
                 yield
         finally:
             await watcher.stop()
+            await asyncio.to_thread(upkeep.stop)
             await asyncio.to_thread(sender.stop)
             await asyncio.to_thread(publisher.stop)
             await asyncio.to_thread(afterwards.stop)

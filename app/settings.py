@@ -101,6 +101,18 @@ class Settings(BaseSettings):
     job_max_seconds: float = Field(
         default=6 * 3600.0, gt=0.0, description="Deadline of a job without its own."
     )
+    keep_jobs_days: float = Field(
+        default=0.0, ge=0.0, description="Finished jobs are deleted after this; 0: never. Models are kept."
+    )
+    keep_trajectories_days: float = Field(
+        default=0.0, ge=0.0, description="Uploaded flights are deleted after this; 0: never."
+    )
+    keep_deliveries_days: float = Field(
+        default=30.0, ge=0.0, description="Webhook messages are forgotten this long after their end; 0: never."
+    )
+    keep_audit_days: float = Field(
+        default=365.0, ge=0.0, description="Entries of the audit log are forgotten after this; 0: never."
+    )
 
     webhook_allow_private: bool = Field(
         default=False,

@@ -16,6 +16,8 @@ class Action(StrEnum):
     JOB_CANCEL = "job.cancel"
     JOB_DELETE = "job.delete"
     TRAJECTORY_POST = "trajectory.post"
+    TRAJECTORY_DELETE = "trajectory.delete"
+    MODEL_DELETE = "model.delete"
     WEBHOOK_CREATE = "webhook.create"
     WEBHOOK_UPDATE = "webhook.update"
     WEBHOOK_DELETE = "webhook.delete"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import (
     InvalidRequest,
     MalformedBody,
@@ -23,10 +25,16 @@ from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
 from app.http.problems import documented, escaped
 from app.keys.records import Scope
 from app.trajectories import repository, service
-from app.trajectories.schemas import Trajectory, TrajectorySummary, TrajectoryUpload
+from app.trajectories.schemas import (
+    Trajectory,
+    TrajectoryPage,
+    TrajectorySummary,
+    TrajectoryUpload,
+)
 
 router = APIRouter(tags=["trajectories"])
 
+ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 MAX_NAME_BYTES = 1024
 FORM_SCHEMA: dict[str, Any] = {
     "title": "TrajectoryFile",
@@ -136,6 +144,26 @@ def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
 
 
 @router.get(
+    "/trajectories",
+    dependencies=[demands(Scope.DATA_READ)],
+    operation_id="list_trajectories",
+    summary="List uploaded flights",
+    responses=documented(InvalidRequest),
+)
+def list_trajectories(
+    app: ServiceDep,
+    owner: OwnerDep,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> TrajectoryPage:
+    """Your uploaded flights without their rows, newest first."""
+    with app.database.read() as session:
+        found = repository.list_trajectories(session, owner, before=cursor, limit=limit + 1)
+    shown = [_summary(stored) for stored in found[:limit]]
+    return TrajectoryPage(trajectories=shown, next_cursor=shown[-1].id if len(found) > limit else None)
+
+
+@router.get(
     "/trajectories/{trajectory_id}",
     dependencies=[demands(Scope.DATA_READ)],
     operation_id="get_trajectory",
@@ -145,9 +173,26 @@ def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
 def get_trajectory(
     app: ServiceDep,
     owner: OwnerDep,
-    trajectory_id: Annotated[str, Path(pattern=r"^[A-Za-z0-9_]{1,64}$")],
+    trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)],
 ) -> Trajectory:
     """Return an uploaded flight with its rows, in s and rad."""
     with app.database.read() as session:
         stored, columns = repository.get_trajectory(session, owner, trajectory_id)
     return Trajectory(**_summary(stored).model_dump(), **columns)
+
+
+@router.delete(
+    "/trajectories/{trajectory_id}",
+    dependencies=[demands(Scope.DATA_WRITE)],
+    operation_id="delete_trajectory",
+    summary="Delete an uploaded flight",
+    status_code=204,
+    responses=documented(InvalidRequest, TrajectoryNotFound),
+)
+def delete_trajectory(
+    app: ServiceDep, caller: CallerDep, trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)]
+) -> None:
+    """Delete an uploaded flight; jobs that were started with it have copies of their own."""
+    with app.database.write() as session:
+        repository.delete_trajectory(session, caller.owner, trajectory_id)
+        note(session, caller, Action.TRAJECTORY_DELETE, trajectory_id)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import Row, delete, insert, select
 
 from app.database import Session, database_time
 from app.documents import packed, unpacked
@@ -17,6 +18,14 @@ from app.tables import trajectories
 from app.trajectories.schemas import TrajectoryUpload
 
 Columns = dict[str, list[float]]
+
+SUMMARY_COLUMNS = (
+    trajectories.c.id,
+    trajectories.c.name,
+    trajectories.c.rows,
+    trajectories.c.duration_s,
+    trajectories.c.created_at,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +62,41 @@ def insert_trajectory(
             size_bytes=len(document),
             created_at=database_time(),
         )
-        .returning(
-            trajectories.c.id,
-            trajectories.c.name,
-            trajectories.c.rows,
-            trajectories.c.duration_s,
-            trajectories.c.created_at,
-        )
+        .returning(*SUMMARY_COLUMNS)
     ).one()
+    return _summary(row)
+
+
+def _summary(row: Row[*tuple[Any, ...]]) -> StoredTrajectory:
     return StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+
+
+def list_trajectories(
+    session: Session, owner: str, *, before: str | None, limit: int
+) -> list[StoredTrajectory]:
+    """Newest flights of `owner` first, older than `before` when given."""
+    query = select(*SUMMARY_COLUMNS).where(trajectories.c.owner == owner)
+    if before is not None:
+        query = query.where(trajectories.c.id < before)
+    rows = session.execute(query.order_by(trajectories.c.id.desc()).limit(limit))
+    return [_summary(row) for row in rows]
+
+
+def delete_trajectory(session: Session, owner: str, trajectory_id: str) -> None:
+    """Delete one flight; jobs that were started with it have copies of their own.
+
+    Raises
+    ------
+    TrajectoryNotFound
+        When `owner` has no such trajectory.
+    """
+    deleted = session.execute(
+        delete(trajectories)
+        .where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
+        .returning(trajectories.c.id)
+    ).one_or_none()
+    if deleted is None:
+        raise TrajectoryNotFound(trajectory_id)
 
 
 def row_counts(session: Session, owner: str, ids: Iterable[str]) -> dict[str, int]:
@@ -87,5 +122,4 @@ def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[St
     ).one_or_none()
     if row is None:
         raise TrajectoryNotFound(trajectory_id)
-    summary = StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
-    return summary, unpacked(row.document)
+    return _summary(row), unpacked(row.document)
