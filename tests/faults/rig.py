@@ -27,16 +27,16 @@ from app.jobs.store import create_job, get_job
 from app.tables import job_results, jobs
 from cli import serve
 from cli.broker import LOOPBACK, free_port
-from cli.supervisor import Child, Supervisor
+from cli.supervisor import Child, ChildSpec, Supervisor
 from tests.faults.ledger import SEED, SUCCEEDED, Ledger
 from tests.servers.redis import BrokerServer
 
 OWNER = "local"
 LEASE_S, HEARTBEAT_S, REAP_EVERY_S, REPUBLISH_AFTER_S = 2.0, 0.5, 1.0, 2.0
-BEAT = ("--beat", "--scheduler", "celery.beat:Scheduler")
 OURS = {
     "worker.celery_app:app": "tests.faults.walk_worker:app",
     "app.main:create_app": "tests.faults.walk_api:create_app",
+    "app.http.server": "tests.faults.walk_api",
 }
 
 
@@ -82,24 +82,29 @@ class Rig:
         name: str = "worker",
         *,
         slots: int = 1,
-        beat: bool = True,
         environment: Mapping[str, str] | None = None,
     ) -> Child:
-        """Start a worker as `morphid serve` does; its operations are walks."""
+        """Start a worker as `morphid serve` does, its operations walks, and the beat beside the first one."""
         told = {**self._environment, "MORPHID_WORKERS": str(slots), **(environment or {})}
-        spec = serve._worker(told, slots)
-        command = [OURS.get(word, word) for word in spec.command if beat or word not in BEAT]
-        command += ["--hostname", f"{name}@%h"]
-        child = self.supervisor.start(replace(spec, name=name, command=command, stop_within_s=15.0))
-        self.worker = self.worker or child
+        child = self._start(serve._worker(told, slots), name, "--hostname", f"{name}@%h")
+        if self.worker is None:
+            self.worker = child
+            self.start_beat()
         return child
+
+    def start_beat(self, name: str = "beat") -> Child:
+        """Start a beat as `morphid serve` does: it has the reaper come."""
+        return self._start(serve._beat(self._environment), name)
+
+    def _start(self, spec: ChildSpec, name: str, *more: str) -> Child:
+        command = [*(OURS.get(word, word) for word in spec.command), *more]
+        return self.supervisor.start(replace(spec, name=name, command=command))
 
     def start_api(self, environment: Mapping[str, str] | None = None) -> Child:
         """Start the API as `morphid serve` does, and wait until it answers."""
         port = free_port(0)
         told = {**self._environment, "MORPHID_PORT": str(port), **(environment or {})}
-        spec = serve._api(told, LOOPBACK, port)
-        child = self.supervisor.start(replace(spec, command=[OURS.get(word, word) for word in spec.command]))
+        child = self._start(serve._api(told, LOOPBACK, port), "api")
         self.url = f"http://{LOOPBACK}:{port}"
         assert self.supervisor.wait_until(child, self.api_answers, 30.0), child.last_words(40)
         return child
@@ -131,14 +136,10 @@ class Rig:
                 os.kill(pid, signal.SIGKILL)
 
     def pool_children(self, name: str = "worker") -> list[int]:
-        """Process ids of a worker's children that run jobs (its beat is another kind of child)."""
+        """Process ids of the children of a worker, which run its jobs."""
         pid = self.supervisor.children[name].pid
-        if pid is None:
-            return []
         with contextlib.suppress(psutil.NoSuchProcess):
-            # the pool is started before the beat, and a child that is replaced comes later than both
-            found = psutil.Process(pid).children()
-            return [child.pid for child in found if "Beat" not in " ".join(child.cmdline())]
+            return [] if pid is None else [child.pid for child in psutil.Process(pid).children()]
         return []
 
     def runner_of(self, job_id: str) -> int:

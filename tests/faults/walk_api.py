@@ -29,4 +29,9 @@ def publish(self: Publisher, job_id: str) -> None:
 
 Publisher.publish = publish  # type: ignore[method-assign]
 
+if __name__ == "__main__":
+    from app.http.server import main
+
+    main()
+
 __all__ = ["create_app"]

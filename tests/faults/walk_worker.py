@@ -22,7 +22,7 @@ from worker import numerics, operations, tasks
 from worker.celery_app import app
 
 STEPS_PER_S = 10  # of a flight's duration: how a request at the API's door says how long a walk shall be
-PAUSE_S = 0.02
+PAUSE_S = 0.01
 
 
 class FaultyWalk(Walk):
