@@ -1,4 +1,4 @@
-"""``morphid serve``: broker, API and worker as three supervised children of one command."""
+"""``morphid serve``: broker, API, worker and beat as supervised children of one command."""
 
 from __future__ import annotations
 
@@ -108,6 +108,7 @@ def _start_children(
     api = supervisor.start(_api(environment, options.host, port))
     # the worker loads while the API does; a wake-up that comes early waits in the queue
     supervisor.start(_worker(environment, options.workers))
+    supervisor.start(_beat(environment))
     _expect(supervisor, api, lambda: _alive(options.host, port), API_WITHIN_S)
 
 
@@ -140,9 +141,18 @@ def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
         *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "worker"),
         *("--queues", "morphid", "--concurrency", str(workers), "--prefetch-multiplier", "1"),
         *("--loglevel", "INFO", "--without-gossip", "--without-mingle"),
-        *("--beat", "--scheduler", "celery.beat:Scheduler"),  # nothing on disk that a kill could spoil
     ]
     return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
+
+
+def _beat(environment: dict[str, str]) -> ChildSpec:
+    # not inside the worker: nobody would notice its death, and no lost job would be found any more
+    command = [
+        *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "beat"),
+        *("--scheduler", "celery.beat:Scheduler", "--pidfile", ""),  # nothing on disk that a kill could spoil
+        *("--loglevel", "INFO"),
+    ]
+    return ChildSpec(name="beat", command=command, environment=environment)
 
 
 def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, str]:
