@@ -21,11 +21,12 @@ MEDIA_TYPES = {
     ".html": "text/html; charset=utf-8",
     ".txt": "text/plain; charset=utf-8",
 }
+OTHER_FILES = "application/octet-stream"
 
 
 def media_type(name: str) -> str:
     """Media type of a file by its ending."""
-    return MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
+    return MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), OTHER_FILES)
 
 
 def store_artifacts(session: Session, job_id: str, files: Mapping[str, bytes]) -> None:

@@ -16,7 +16,7 @@ from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
-from app.jobs.artifacts import media_type
+from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, media_type
 from app.jobs.event_stream import stream_events, wait_for_end
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
@@ -33,6 +33,13 @@ ARTIFACT_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox",
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "private, max-age=60",
+}
+FILE_KINDS: dict[str, Any] = {
+    # of a JSON file any value; of the others bytes
+    kind.partition(";")[0]: {
+        "schema": {} if kind == "application/json" else {"type": "string", "format": "binary"}
+    }
+    for kind in (OTHER_FILES, *MEDIA_TYPES.values())
 }
 EVENT_STREAM: dict[int | str, dict[str, Any]] = {
     200: {
@@ -190,7 +197,7 @@ def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Artif
     responses={
         200: {
             "description": "The file.",
-            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+            "content": FILE_KINDS,
         },
         **documented(InvalidRequest, ArtifactNotFound),
     },
