@@ -8,6 +8,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from app.database import Database
+from app.jobs.chunks import Flown, flown, hand_out
 from app.jobs.records import Claim, JobStatus
 from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
 from worker.lease import StopReason, Vigil
@@ -16,6 +17,7 @@ from worker.operations import (
     Begin,
     Document,
     Outcome,
+    SpreadWork,
     Step,
     UnknownOperation,
     Work,
@@ -23,8 +25,9 @@ from worker.operations import (
     WorkRefused,
 )
 from worker.patience import Patient, StaleClaim, StorageFull
-from worker.progress import Pace
+from worker.progress import Pace, rated
 from worker.telling import Phases
+from worker.works import Works
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +46,8 @@ class Ending(Enum):
     EXPIRED = "expired"
     RELEASED = "released"  # back in the queue with its checkpoint
     ABANDONED = "abandoned"  # another claim holds the job
+    HANDED_OUT = "handed out"  # its next generation lies in chunks that any worker may fly
+    CHUNK_STORED = "chunk stored"
 
 
 ENDINGS = {
@@ -62,8 +67,13 @@ class Attempt(Patient):
     claim : the right to write to the job.
     vigil : keeps the claim alive and knows when to stop.
     kernels : the compiled kernels of this process.
+    works : the work of the jobs that this process saw last.
     clock : seconds that only rise.
     sleep : waits a number of seconds.
+
+    Attributes
+    ----------
+    handed_out : number of chunks that the job was given up for; publish as many messages.
     """
 
     def __init__(
@@ -72,6 +82,7 @@ class Attempt(Patient):
         claim: Claim,
         vigil: Vigil,
         kernels: Kernels,
+        works: Works | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
@@ -79,11 +90,14 @@ class Attempt(Patient):
         super().__init__(database, vigil, claim.job_id, clock=clock, sleep=sleep)
         self._claim = claim
         self._kernels = kernels
+        self._works = works or Works()
+        self.handed_out = 0
+        self._chunks = 0
         self._pace = Pace(clock)
         self._phases = Phases(clock=clock)
         self._work: Work | None = None
         self._checkpoint: bytes | None = None
-        self._unsaved: Step | None = None
+        self._unsaved: Document | None = None  # progress of the last step
         self._saved_at = float("-inf")
 
     def run(self, find_operation: Callable[[str], Begin]) -> Ending:
@@ -93,50 +107,110 @@ class Attempt(Patient):
         except StaleClaim:
             return Ending.ABANDONED
         except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
-            return self._fail(_told(error, self._claim.job_id))
+            return self._fail(told_error(error, self._claim.job_id))
         finally:
             self._phases.close()
 
+    def give_up(self, find_operation: Callable[[str], Begin], error: Document) -> Ending:
+        """End the job as failed: a chunk of it has shown that it cannot be done."""
+        try:
+            self._checkpoint, _ = self._patiently(self._load)
+            self._begin(find_operation)
+        except StaleClaim:
+            return Ending.ABANDONED
+        except Exception:
+            log.exception("job %s: no result at its last checkpoint", self._job_id)
+        return self._fail(error)
+
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
-        request, self._checkpoint = self._patiently(self._load)
+        self._checkpoint, flown = self._patiently(self._load)
         if not self._prepare_kernels():
             return self._stopped()
-        self._work = find_operation(self._claim.operation)(request, self._kernels.threads)
+        work = self._begin(find_operation)
+        if self._chunks:
+            self._vigil.look()  # it may have been taken over to end
+            if self._vigil.should_stop():
+                return self._stopped()
+            self._hear(flown)
         try:
-            for step in self._work.steps(self._checkpoint, self._vigil.should_stop):
+            if self._hand_out():
+                return Ending.HANDED_OUT
+            for step in work.steps(self._checkpoint, self._vigil.should_stop):
                 self._note(step)
+                if self._hand_out():
+                    return Ending.HANDED_OUT
         except WorkInterrupted:
             self._vigil.heed()
             return self._stopped()
         if self._checkpoint is None:
             raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
         self._save_unsaved()
-        outcome = self._work.outcome(self._checkpoint)
+        outcome = work.outcome(self._checkpoint)
         self._vigil.heed()
         return self._finish(JobStatus.SUCCEEDED, outcome=outcome)
 
-    def _load(self) -> tuple[Document, bytes | None]:
+    def _load(self) -> tuple[bytes | None, Flown | None]:
         with self._database.read() as connection:
-            return load_request(connection, self._claim.job_id), load_checkpoint(connection, self._claim)
+            return load_checkpoint(connection, self._claim), flown(connection, self._claim)
+
+    def _load_request(self) -> Document:
+        with self._database.read() as connection:
+            return load_request(connection, self._job_id)
+
+    def _begin(self, find_operation: Callable[[str], Begin]) -> Work:
+        prepared = self._works.prepared(
+            self._job_id,
+            lambda: find_operation(self._claim.operation),
+            lambda: self._patiently(self._load_request),
+            self._kernels.threads,
+        )
+        self._work, self._chunks = prepared.work, prepared.chunks
+        return prepared.work
 
     def _prepare_kernels(self) -> bool:
         if self._kernels.ready:
             return True
-        message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
-        self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
+        if self._checkpoint is None:  # what has come further shows how far
+            message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
+            self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
         return self._kernels.wait(self._vigil.should_stop)
+
+    # a generation over several workers
+
+    def _hand_out(self) -> bool:
+        """Give the job up for chunks if its next step is made of parts that others can fly."""
+        if not self._chunks or self._checkpoint is None or not isinstance(self._work, SpreadWork):
+            return False
+        tasks = self._work.tasks(self._checkpoint, self._chunks)
+        if tasks is None or len(tasks) < 2:  # one part is flown as well here
+            return False
+        checkpoint, progress = self._checkpoint, self._unsaved
+        self._persist(lambda connection: hand_out(connection, self._claim, tasks, checkpoint, progress))
+        self._unsaved, self.handed_out = None, len(tasks)
+        return True
+
+    def _hear(self, flown: Flown | None) -> None:
+        """Take the step that the outcomes of all chunks make; without them the chunks are handed out anew."""
+        if flown is None or self._checkpoint is None or not isinstance(self._work, SpreadWork):
+            return
+        step = self._work.told(self._checkpoint, flown.outcomes, flown.elapsed_s)
+        before = flown.before
+        self._checkpoint = step.checkpoint
+        self._unsaved = rated(
+            step, flown.elapsed_s, before.get("flights"), float(before.get("fraction") or 0.0)
+        )
 
     # progress
 
     def _note(self, step: Step) -> None:
         self._phases.note(step.progress.get("phase"))
-        self._checkpoint, self._unsaved = step.checkpoint, step
+        self._checkpoint, self._unsaved = step.checkpoint, self._pace.progress(step)
         if self._clock() - self._saved_at >= SAVE_EVERY_S:
             self._save_unsaved()
 
     def _save_unsaved(self) -> None:
         if self._unsaved is not None:
-            self._save(self._pace.progress(self._unsaved), self._unsaved.checkpoint)
+            self._save(self._unsaved, self._checkpoint)
             self._unsaved, self._saved_at = None, self._clock()
 
     def _save(self, progress: Document, checkpoint: bytes | None) -> None:
@@ -203,7 +277,7 @@ class Attempt(Patient):
         return ENDINGS[status]
 
 
-def _told(error: Exception, job_id: str) -> Document:
+def told_error(error: Exception, job_id: str) -> Document:
     """Say to the user what went wrong."""
     if isinstance(error, WorkRefused):
         return _error(error.code, error.detail, hint=error.hint, pointer=error.pointer)

@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from contextvars import copy_context
 from enum import Enum
 from types import TracebackType
@@ -16,6 +17,7 @@ from typing import Self
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
+from app.jobs.chunks import ChunkClaim, look_at_chunk, renew_chunk
 from app.jobs.records import Claim, LeaseState
 from app.jobs.store import look_at_lease, renew_lease
 
@@ -61,7 +63,7 @@ class Vigil:
     def __init__(
         self,
         database: Database,
-        claim: Claim,
+        claim: Claim | ChunkClaim,
         *,
         lease_s: float,
         heartbeat_s: float,
@@ -115,6 +117,11 @@ class Vigil:
         """Note that the work itself has stopped: its end is written as soon as the store lets it."""
         self._heeded = True
 
+    def look(self) -> None:
+        """Look at once, in the caller's thread; what cannot be looked at is looked at later."""
+        with suppress(SQLAlchemyError):
+            self._judge(self._look())
+
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
         asked_at: float | None = None
@@ -145,10 +152,14 @@ class Vigil:
 
     def _look(self) -> LeaseState:
         with self._database.read() as connection:
+            if isinstance(self._claim, ChunkClaim):
+                return look_at_chunk(connection, self._claim)
             return look_at_lease(connection, self._claim)
 
     def _renew(self) -> LeaseState:
         with self._database.write() as connection:
+            if isinstance(self._claim, ChunkClaim):
+                return renew_chunk(connection, self._claim, self._lease_s)
             return renew_lease(connection, self._claim, self._lease_s)
 
     def _judge(self, state: LeaseState) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from kombu.exceptions import OperationalError
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
@@ -21,7 +22,7 @@ from app.settings import load_settings
 from worker import numerics, shutdown
 from worker.attempt import Ending
 from worker.celery_app import QUEUE, REAP, RUN_JOB, app, threads_per_job
-from worker.runner import Runner
+from worker.runner import CHUNK_LEASE_S, Runner
 
 log = logging.getLogger(__name__)
 
@@ -46,11 +47,13 @@ class Process:
             lease_s=self.settings.lease_s,
             heartbeat_s=self.settings.heartbeat_s,
             shutting_down=shutdown.announced,
+            publish=publish_chunks,
+            chunk_lease_s=min(self.settings.lease_s, CHUNK_LEASE_S),
         )
 
     def reap_is_due(self) -> bool:
         """Whether this process has not reaped just now."""
-        return time.monotonic() - self.reaped_at > app.conf.beat_schedule["reap"]["schedule"] / 2.0
+        return bool(time.monotonic() - self.reaped_at > app.conf.beat_schedule["reap"]["schedule"] / 2.0)
 
 
 _processes: dict[int, Process] = {}  # by process id: a forked child never uses its parent's connections
@@ -82,6 +85,15 @@ def _unless_away() -> Iterator[None]:
 def publish(job_id: str) -> None:
     """Send the wake-up hint for a queued job."""
     app.send_task(RUN_JOB, args=[job_id], queue=QUEUE)
+
+
+def publish_chunks(job_id: str, count: int) -> None:
+    """Send a hint for each chunk of a job that was handed out; a broker that is away loses none of them."""
+    try:
+        for _ in range(count):
+            publish(job_id)
+    except OperationalError as error:
+        log.warning("job %s: chunks not announced (%s); the reaper will repeat it", job_id, error)
 
 
 @app.task(name=RUN_JOB)

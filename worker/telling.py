@@ -6,21 +6,21 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from app.jobs.chunks import ChunkClaim
 from app.jobs.records import Claim
 from app.observability.context import bound
 from app.observability.tracing import past_span, span
 
 
 @contextmanager
-def told(claim: Claim) -> Iterator[None]:
+def told(claim: Claim | ChunkClaim) -> Iterator[None]:
     """Let every line within the block carry the job, and trace the attempt as part of the request's trace."""
-    with bound(
-        job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker
-    ):
-        if claim.attempt == 1 and claim.waited_s > 0.0:
+    with bound(job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker):
+        chunk = isinstance(claim, ChunkClaim)
+        if not isinstance(claim, ChunkClaim) and claim.attempt == 1 and claim.waited_s > 0.0:
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
-            f"attempt {claim.operation}",
+            f"chunk {claim.operation}" if chunk else f"attempt {claim.operation}",
             kind="consumer",
             traceparent=claim.traceparent,
             attributes={

@@ -41,7 +41,8 @@ def reap_chunks(session: Session, clock: ColumnElement[float], republish_after_s
     cancelled = tuple(row.id for row in _never_wound_down(session, clock) if _cancel(session, row))
     again = Counter(row.job_id for row in lost if row.job_id not in failed and _reopen(session, row))
     unheard = _unheard(session, clock, republish_after_s)
-    publish = tuple((again + Counter(unheard)).elements())
+    again |= Counter(unheard)
+    publish = tuple(again.elements())
     return ChunkReport(failed, cancelled, publish[:PUBLISH_LIMIT])
 
 
