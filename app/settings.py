@@ -108,7 +108,7 @@ class Settings(BaseSettings):
         default=0.0, ge=0.0, description="Uploaded flights are deleted after this; 0: never."
     )
     keep_deliveries_days: float = Field(
-        default=30.0, ge=0.0, description="Webhook messages are forgotten this long after their end; 0: never."
+        default=30.0, ge=0.0, description="Webhook messages are forgotten after this; 0: never."
     )
     keep_audit_days: float = Field(
         default=365.0, ge=0.0, description="Entries of the audit log are forgotten after this; 0: never."

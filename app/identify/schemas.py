@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution, SpreadExecution
 from app.schemas.fields import Strict
@@ -118,10 +119,9 @@ class CostEstimate(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class IdentifyValidation(BaseModel):
+class IdentifyValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["identify"] = "identify"
     cost: CostEstimate
 

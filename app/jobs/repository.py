@@ -15,6 +15,8 @@ from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
 from app.tables import artifacts, idempotency_keys, job_events, job_results, jobs
 
+ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
+
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
@@ -45,9 +47,9 @@ class JobFilter:
         if self.label is not None:
             yield jobs.c.label == self.label
         if self.created_after is not None:
-            yield jobs.c.created_at >= self.created_after.timestamp()
+            yield jobs.c.created_at >= self.created_after.timestamp() - ROUNDED_S
         if self.created_before is not None:
-            yield jobs.c.created_at < self.created_before.timestamp()
+            yield jobs.c.created_at < self.created_before.timestamp() - ROUNDED_S
 
 
 def list_jobs(

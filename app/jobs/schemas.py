@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.waiting import QueuePlace as Place
+from app.keys.schemas import Quotas
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
 Operation = Literal["identify", "study", "simulate", "optimize"]
@@ -83,6 +84,15 @@ class QueuePlace(BaseModel):
     def of(cls, place: Place) -> QueuePlace:
         """Show a place in the queue."""
         return cls(position=place.position, eta_s=place.eta_s)
+
+
+class Validation(BaseModel):
+    """The request is valid; each operation adds its name and what it would cost."""
+
+    valid: Literal[True] = True
+    cost: Any
+    queue: QueuePlace = Field(description="The place that the job would have if it were posted now.")
+    quotas: Quotas | None = Field(description="Of your key; null where the service demands no keys.")
 
 
 class JobLinks(BaseModel):

@@ -26,8 +26,11 @@ from app.jobs import store
 from app.jobs.creation import Origin, Terms
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob
-from app.jobs.schemas import Job, Operation
+from app.jobs.schemas import Job, Operation, QueuePlace, Validation
+from app.jobs.waiting import place_of_next
+from app.keys import quota
 from app.keys.records import Scope
+from app.keys.schemas import Quotas
 from app.observability.tracing import current_traceparent
 from app.schemas.execution import Executed, Execution
 
@@ -194,8 +197,17 @@ def _submission(
 SubmissionDep = Annotated[Submission, Depends(_submission)]
 
 
-def priced(app: Service, owner: str, prepare: Prepare[Request, Cost], request: Request) -> Cost:
-    """Make the checks of a submission, start nothing, and tell what it would cost.
+Verdict = TypeVar("Verdict", bound=Validation)
+
+
+def validated(
+    app: Service,
+    caller: Caller,
+    prepare: Prepare[Request, Any],
+    request: Request,
+    verdict: type[Verdict],
+) -> Verdict:
+    """Make the checks of a submission, start nothing; tell what it would cost and how long it would wait.
 
     Raises
     ------
@@ -203,4 +215,11 @@ def priced(app: Service, owner: str, prepare: Prepare[Request, Cost], request: R
         Naming every fault.
     """
     with app.database.read() as session:
-        return prepare(session, owner, request).cost
+        order = prepare(session, caller.owner, request)
+        place = place_of_next(session, caller.owner, order.operation, request.execution.priority)
+        used = None if caller.key_id is None else quota.usage(session, caller.key_id)
+    return verdict(
+        cost=order.cost,
+        queue=QueuePlace.of(place),
+        quotas=None if used is None else Quotas.of(used, caller.quota),
+    )

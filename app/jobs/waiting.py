@@ -123,15 +123,16 @@ def _lines(session: Session) -> dict[str, _Line]:
 def _others_ahead(lines: dict[str, _Line], owner: str, mine_ahead: int) -> int:
     """Count the other owners' jobs that have their turn before the owner's job number `mine_ahead`.
 
-    An owner's job number k (from 0) has its turn when running + k jobs of that owner have begun; turns of the
-    same number go to who was served least recently.
+    An owner's job number k (from 0) has its turn when running + k jobs of that owner have begun. In turns of
+    the same number who runs more comes first, since he was not served in the turns before, then who was
+    served least recently.
     """
     mine = lines.get(owner, _Line(0, 0, 0.0))
     turn = mine.running + mine_ahead
     ahead = 0
     for other, line in lines.items():
         if other != owner:
-            first = (line.served_at, other) < (mine.served_at, owner)
+            first = (-line.running, line.served_at, other) < (-mine.running, mine.served_at, owner)
             ahead += min(max(turn - line.running + first, 0), line.queued)
     return ahead
 

@@ -6,7 +6,7 @@ from fastapi import APIRouter
 
 from app.http.context import CallerDep, ServiceDep, demands
 from app.keys import quota, repository
-from app.keys.schemas import KeyAbout, LimitAndUse, Me, Quotas
+from app.keys.schemas import KeyAbout, Me, Quotas
 
 router = APIRouter(tags=["keys"])
 
@@ -24,9 +24,5 @@ def get_me(app: ServiceDep, caller: CallerDep) -> Me:
         owner=caller.owner,
         scopes=scopes,
         key=KeyAbout(id=key.id, name=key.name, prefix=key.prefix, expires_at=key.expires_at),
-        quotas=Quotas(
-            jobs_in_flight=LimitAndUse(used=used.jobs_in_flight, limit=key.quota.max_jobs_in_flight),
-            flights_per_day=LimitAndUse(used=used.flights_today, limit=key.quota.max_flights_per_day),
-            stored_bytes=LimitAndUse(used=used.stored_bytes, limit=key.quota.max_stored_bytes),
-        ),
+        quotas=Quotas.of(used, key.quota),
     )

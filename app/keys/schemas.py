@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import BaseModel, Field
 
-from app.keys.records import Scope
+from app.keys.records import Quota, Scope, Usage
 
 
 class KeyAbout(BaseModel):
@@ -31,6 +31,15 @@ class Quotas(BaseModel):
     jobs_in_flight: LimitAndUse
     flights_per_day: LimitAndUse = Field(description="Since midnight UTC; running jobs by their estimate.")
     stored_bytes: LimitAndUse
+
+    @classmethod
+    def of(cls, used: Usage, quota: Quota) -> Quotas:
+        """Show use beside limits."""
+        return cls(
+            jobs_in_flight=LimitAndUse(used=used.jobs_in_flight, limit=quota.max_jobs_in_flight),
+            flights_per_day=LimitAndUse(used=used.flights_today, limit=quota.max_flights_per_day),
+            stored_bytes=LimitAndUse(used=used.stored_bytes, limit=quota.max_stored_bytes),
+        )
 
 
 class Me(BaseModel):

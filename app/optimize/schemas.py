@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
 from app.schemas.fields import Angle, Strict
@@ -132,10 +133,9 @@ class ScheduleCost(BaseModel):
     core_s: float = Field(description="Computing time on one core, the flexible model's flights included.")
 
 
-class OptimizeValidation(BaseModel):
+class OptimizeValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["optimize"] = "optimize"
     cost: ScheduleCost
 

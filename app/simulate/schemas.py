@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
 from app.schemas.fields import Strict
@@ -114,10 +115,9 @@ class FlightCost(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class SimulateValidation(BaseModel):
+class SimulateValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["simulate"] = "simulate"
     cost: FlightCost
 
