@@ -230,6 +230,8 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
     with app.database.write() as session:
         job = store.request_cancel(session, caller.owner, job_id)
         note(session, caller, Action.JOB_CANCEL, job_id)
+    if job.status is JobStatus.CANCELLING:
+        app.publisher.publish(job_id)  # a spread job is in nobody's hands: whoever is woken winds it down
     return Job.of(job)
 
 
