@@ -153,7 +153,8 @@ def look_at_everything(
     if failures:
         raise ExceptionGroup("operations that do not do what the document says", failures)
     assert everything(theirs) == before
-    print(answered)
+    if examples >= LONG:  # else a suite that is refused at every door would prove nothing
+        assert [label for label, statuses in answered.items() if min(statuses) >= 300] == []
 
 
 def look_at(
