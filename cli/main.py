@@ -12,7 +12,7 @@ import typer
 from cli.commands.audit import audit
 from cli.commands.bench import bench
 from cli.commands.database import database
-from cli.commands.doctor import doctor
+from cli.commands.doctor import doctor, ready
 from cli.commands.identify import identify
 from cli.commands.jobs import jobs
 from cli.commands.keys import keys
@@ -30,7 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-for command in (serve, doctor, identify, study, simulate, optimize, paper, bench):
+for command in (serve, doctor, ready, identify, study, simulate, optimize, paper, bench):
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(jobs, name="jobs")
 app.add_typer(keys, name="keys")

@@ -17,6 +17,8 @@ from app.database_errors import trouble_of
 from app.jobs.reaper import reap
 from app.jobs.records import ReapReport
 from app.jobs.turns import next_unit
+from app.observability.counters import count
+from app.observability.job_counts import REAP_ROUNDS
 from app.observability.tracing import forget_tracing, start_tracing
 from app.settings import load_settings
 from worker import numerics, shutdown
@@ -135,6 +137,7 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
     report = ReapReport()
     with _unless_away(), process.database.write() as connection:
         report = reap(connection, republish_after_s=republish_after_s)
+        count(connection, REAP_ROUNDS)
     process.reaped_at = time.monotonic()
     for kind in ("requeued", "failed", "cancelled", "expired"):
         for job_id in getattr(report, kind):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import and_, case, func, select
+from sqlalchemy import and_, case, func, select, true
 
 from app.database import Session, database_time
 from app.health.presence import REMEMBERED_S
@@ -32,8 +32,8 @@ def snapshot(session: Session, beat_s: float) -> Snapshot:
     )
 
 
-def count_workers(session: Session, beat_s: float) -> WorkerCounts:
-    """Count workers; the time since their last sign of life is the database's."""
+def count_workers(session: Session, beat_s: float, *, host: str | None = None) -> WorkerCounts:
+    """Count workers, of one host or of all; the time since their last sign of life is the database's."""
     age = database_time() - workers.c.seen_at
     here = workers.c.stopped_at.is_(None)
     alive = and_(here, age <= SILENT_BEATS * beat_s, workers.c.slots > 0)
@@ -44,7 +44,10 @@ def count_workers(session: Session, beat_s: float) -> WorkerCounts:
             func.coalesce(func.sum(case((stalled, 1), else_=0)), 0).label("stalled"),
             func.coalesce(func.sum(case((alive, workers.c.slots), else_=0)), 0).label("slots"),
             func.coalesce(func.sum(case((alive, workers.c.busy), else_=0)), 0).label("busy"),
-        ).where(workers.c.seen_at > database_time() - REMEMBERED_S)
+        ).where(
+            workers.c.seen_at > database_time() - REMEMBERED_S,
+            true() if host is None else workers.c.name.startswith(f"{host}:", autoescape=True),
+        )
     ).one()
     return WorkerCounts(int(row.alive), int(row.stalled), int(row.slots), int(row.busy))
 

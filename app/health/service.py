@@ -20,13 +20,15 @@ FRESH_S = 0.5  # as long an answer about readiness is given again
 NO_WORKERS = WorkerCounts(0, 0, 0, 0)
 
 
-def database_state(database: Database, beat_s: float) -> tuple[str, WorkerCounts | None]:
-    """Ask the database: its state, and its workers when it has an answer."""
+def database_state(
+    database: Database, beat_s: float, *, host: str | None = None
+) -> tuple[str, WorkerCounts | None]:
+    """Ask the database: its state, and its workers (those of `host`, of all) when it has an answer."""
     try:
         with database.read() as session:
             if schema_revision(session) != HEAD:
                 return "not migrated", None
-            return "ok", count_workers(session, beat_s)
+            return "ok", count_workers(session, beat_s, host=host)
     except SQLAlchemyError as error:
         return f"unreachable ({type(error).__name__})", None
 

@@ -22,6 +22,7 @@ ATTEMPTS = "job_attempts"
 FINISHED = "jobs_finished"
 FLIGHTS = "flights"
 LEASES_LOST = "leases_lost"
+REAP_ROUNDS = "reap_rounds"  # the reaper counts these itself
 RELEASED = "jobs_released"
 RUN_TIME = "job_run"  # each of these two with BUCKET and MILLISECONDS
 WAIT_TIME = "job_wait"

@@ -45,3 +45,19 @@ def doctor(
         )
     if failed:
         raise typer.Exit(int(Exit.ENVIRONMENT))
+
+
+@reports_errors
+def ready(
+    worker: Annotated[
+        bool, typer.Option("--worker", help="Only: does this machine's worker take messages?")
+    ] = False,
+    wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
+    data_dir: Annotated[
+        Path | None, typer.Option(help="Of the service (`morphid serve --data-dir`).")
+    ] = None,
+) -> None:
+    """Tell by the exit code whether jobs that are posted now will run: 0 yes, 6 no."""
+    from cli.ready import wait_until_ready
+
+    stdout().print(wait_until_ready(data_dir, worker_here=worker, within_s=wait), soft_wrap=True)

@@ -120,7 +120,7 @@ def test_more_workers_than_cores(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_contradicting_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings that the service refuses are told in its own words; unsafe ones that it takes are warned of."""
+    """Settings that the service refuses are told in its own words; unsafe ones it takes are warned of."""
     monkeypatch.setattr(machine, "COMPILE", """print('{"numba": "0", "cache": "/"}')""")
     monkeypatch.setenv("MORPHID_LEASE_S", "1")
     last = list(round_here(tmp_path))[-1]
