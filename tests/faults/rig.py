@@ -195,6 +195,7 @@ class Rig:
         *,
         published: bool = True,
         max_attempts: int = 3,
+        max_seconds: float | None = None,
         deliveries: int = 1,
         ends: frozenset[str] = SUCCEEDED,
         **request: Any,
@@ -206,7 +207,7 @@ class Rig:
                 owner=OWNER,
                 operation="walk",
                 request={"seed": SEED, **request},
-                terms=Terms(max_attempts=max_attempts),
+                terms=Terms(max_attempts=max_attempts, max_seconds=max_seconds),
             )
         self.ledger.accept(job.id, request["steps"], ends)
         for _ in range(deliveries if published else 0):
