@@ -9,7 +9,11 @@ import zlib
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic_core import to_json
+
 Document = dict[str, Any]
+
+CONTAINERS = frozenset({dict, list, tuple})
 
 DEFLATE_LEVEL = (
     1  # trajectories shrink threefold in a few milliseconds; level 6 wins 10 per cent for four times that
@@ -28,12 +32,17 @@ def finite(value: Any) -> Any:
 
 
 def json_bytes(document: Any) -> bytes:
-    """Compact JSON with sorted keys; numbers keep every digit."""
-    try:
-        text = json.dumps(document, separators=(",", ":"), sort_keys=True, allow_nan=False)
-    except ValueError:
-        text = json.dumps(finite(document), separators=(",", ":"), sort_keys=True, allow_nan=False)
-    return text.encode()
+    """Compact JSON in UTF-8 with sorted keys; numbers keep every digit, NaN and infinity become null."""
+    # ten times as fast as json.dumps, which would hold up every other request while it writes a long flight
+    return to_json(_sorted(document), inf_nan_mode="null")
+
+
+def _sorted(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    if isinstance(value, (list, tuple)) and not CONTAINERS.isdisjoint(map(type, value)):
+        return [_sorted(item) for item in value]
+    return value
 
 
 def packed(document: Any) -> bytes:

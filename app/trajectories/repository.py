@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Row, delete, insert, select
 
 from app.database import Session, database_time
-from app.documents import packed, unpacked
+from app.documents import packed, unpacked, unpacked_json
 from app.errors import TrajectoryNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment
@@ -117,9 +117,26 @@ def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[St
     TrajectoryNotFound
         When `owner` has no such trajectory.
     """
+    row = _row(session, owner, trajectory_id)
+    return _summary(row), unpacked(row.document)
+
+
+def get_trajectory_json(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, bytes]:
+    """Read one flight with its rows as the JSON text that is stored.
+
+    Raises
+    ------
+    TrajectoryNotFound
+        When `owner` has no such trajectory.
+    """
+    row = _row(session, owner, trajectory_id)
+    return _summary(row), unpacked_json(row.document)
+
+
+def _row(session: Session, owner: str, trajectory_id: str) -> Row[*tuple[Any, ...]]:
     row = session.execute(
         select(trajectories).where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
     ).one_or_none()
     if row is None:
         raise TrajectoryNotFound(trajectory_id)
-    return _summary(row), unpacked(row.document)
+    return row
