@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import pytest
@@ -36,6 +37,7 @@ def demanded(operation: dict[str, Any]) -> set[str]:
     return {name for entry in operation.get("security", ()) for name in entry["api_key"]}
 
 
+@lru_cache(maxsize=1)
 def operations() -> list[tuple[str, str, dict[str, Any]]]:
     """Every documented operation: method, path, description."""
     paths = openapi_document(routed_app())["paths"]
