@@ -28,6 +28,8 @@ from tests.app.webhooks.hooks import (
 )
 from tests.app.webhooks.receiver import Receiver, receiver, status
 
+# what the database has no part in is proved on one of them
+on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 UNREACHABLE = "http://127.0.0.1:1024/"
 
 
@@ -84,6 +86,7 @@ def test_failures_are_tried_again_on_schedule(database: Database, there: Receive
     assert send_due(database, clock=clock) == 0
 
 
+@on_sqlite
 def test_retry_after_is_honoured(database: Database, there: Receiver) -> None:
     """A receiver that asks for two minutes gets them."""
     there.answer = answer_with(429, Retry_After="120")  # type: ignore[assignment]
@@ -113,6 +116,7 @@ def test_gone_disables_at_once(database: Database, there: Receiver) -> None:
     assert "410" in row.disabled_reason
 
 
+@on_sqlite
 def test_repeated_failure_disables_and_enabling_forgives(database: Database) -> None:
     """After so many given-up deliveries in a row the webhook is disabled; enabled, it starts anew."""
     clock = HandClock()
@@ -132,6 +136,7 @@ def test_repeated_failure_disables_and_enabling_forgives(database: Database) -> 
     assert len(deliveries(database, status="waiting")) == 1
 
 
+@on_sqlite
 def test_a_success_ends_the_row_of_failures(database: Database, there: Receiver) -> None:
     """Given-up deliveries count only while none succeeds between them."""
     clock = HandClock()
@@ -210,6 +215,7 @@ def test_late_news_change_nothing(database: Database) -> None:
         assert sql.settle(session, current, sql.Answer(204), **options) == "delivered"
 
 
+@on_sqlite
 def test_a_delivery_that_kills_its_senders_ends(database: Database) -> None:
     """Claims that never come to an end are not made for ever."""
     clock = HandClock()
@@ -247,6 +253,7 @@ def test_a_slow_receiver_does_not_hold_up_other_owners(database: Database, there
         running.stop()
 
 
+@on_sqlite
 def test_stopping_is_quick_and_gives_back(database: Database) -> None:
     """A sender in the midst of a slow try stops within seconds; the delivery is due at once, under its id."""
     hold = threading.Event()
@@ -304,6 +311,7 @@ def test_jobs_end_while_their_webhooks_are_deleted(database: Database) -> None:
     assert deliveries(database) == []
 
 
+@on_sqlite
 def test_nothing_is_sent_to_an_address_that_turned_inside(database: Database) -> None:
     """A webhook whose name was public when it was made and is loopback now: a failed try, no connection."""
     with receiver() as inside:
@@ -317,6 +325,7 @@ def test_nothing_is_sent_to_an_address_that_turned_inside(database: Database) ->
         assert inside.connections == 0
 
 
+@on_sqlite
 def test_a_database_that_is_away_does_not_end_the_sender(database: Database, there: Receiver) -> None:
     """The sender goes on looking after its database failed it."""
     new_hook(database, there.url())
@@ -338,6 +347,7 @@ def test_a_database_that_is_away_does_not_end_the_sender(database: Database, the
     running.stop()
 
 
+@on_sqlite
 def test_running_and_stopping_without_work(database: Database) -> None:
     """A sender that never had anything to do stops at once, also before it began."""
 
