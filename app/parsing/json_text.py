@@ -30,6 +30,8 @@ def parse_json(body: bytes) -> Any:
         When it is not JSON in UTF-8, is nested too deeply, repeats a key, holds far too many items, or holds
         a text that no database stores (half a surrogate pair, the character zero).
     """
+    if not body:
+        raise MalformedBody("There is no body.", hint="Send a JSON object; /docs shows examples.")
     objects, lists, values = body.count(b"{"), body.count(b"["), body.count(b",")
     if objects > MAX_OBJECTS or lists > MAX_LISTS or values > MAX_VALUES:
         raise MalformedBody(
