@@ -1,4 +1,4 @@
-"""Laws of authentication over HTTP, on both databases."""
+"""Laws of authentication over HTTP; those of the rows are in test_keyring, on both databases."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def asked(service: RunningService, headers: dict[str, str], path: str = "/jobs")
     return service.client.get(path, headers=headers)
 
 
-def test_a_key_opens(keyed_service: RunningService) -> None:
+def test_a_key_opens(keyed_on_sqlite: RunningService) -> None:
     """A valid key is let in, and the answer is not to be kept by any cache."""
-    with holder(keyed_service, make_key(keyed_service.database).text) as client:
+    with holder(keyed_on_sqlite, make_key(keyed_on_sqlite.database).text) as client:
         answer = client.get("/jobs")
     assert answer.status_code == 200
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_service: RunningService) -> None:
+def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_on_sqlite: RunningService) -> None:
     """Unknown, forged, expired, revoked, malformed: one 401 that tells how to authenticate, no more."""
-    database = keyed_service.database
+    database = keyed_on_sqlite.database
     good, late, gone = make_key(database), make_key(database, expires_in_s=-1.0), make_key(database)
     with database.write() as session:
         revoke_key(session, gone.key.prefix)
@@ -52,10 +52,10 @@ def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_service: Runn
         "empty": "",
         "no scheme": good.text,
     }
-    answers = {"none": asked(keyed_service, {"X-Request-ID": "same"})}
+    answers = {"none": asked(keyed_on_sqlite, {"X-Request-ID": "same"})}
     for number, (name, header) in enumerate(wrong.items()):
         told = {"Authorization": header, "X-Request-ID": "same", FROM_PROXY: f"203.0.113.{number}"}
-        answers[name] = asked(keyed_service, told)
+        answers[name] = asked(keyed_on_sqlite, told)
     for name, answer in answers.items():
         assert answer.status_code == 401, name
         assert answer.content == answers["none"].content, name
@@ -64,33 +64,33 @@ def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_service: Runn
         assert answer.json()["code"] == "unauthorized"
 
 
-def test_two_authorizations_are_none(keyed_service: RunningService) -> None:
+def test_two_authorizations_are_none(keyed_on_sqlite: RunningService) -> None:
     """A request that carries two keys, of which a proxy may have checked the other one, is refused."""
-    key = make_key(keyed_service.database).text
+    key = make_key(keyed_on_sqlite.database).text
     headers = [("Authorization", f"Bearer {key}"), ("Authorization", f"Bearer {key}")]
-    assert keyed_service.client.get("/jobs", headers=headers).status_code == 401
+    assert keyed_on_sqlite.client.get("/jobs", headers=headers).status_code == 401
 
 
-def test_keys_are_read_from_the_header_only(keyed_service: RunningService) -> None:
+def test_keys_are_read_from_the_header_only(keyed_on_sqlite: RunningService) -> None:
     """A key in the address or a cookie, where logs and other pages find it, opens nothing."""
-    key = make_key(keyed_service.database).text
+    key = make_key(keyed_on_sqlite.database).text
     for query in ("api_key", "key", "access_token", "token"):
-        assert keyed_service.client.get("/jobs", params={query: key}).status_code == 401
-    assert asked(keyed_service, {"Cookie": f"Authorization={key}; api_key={key}"}).status_code == 401
-    assert asked(keyed_service, {"X-API-Key": key}).status_code == 401
+        assert keyed_on_sqlite.client.get("/jobs", params={query: key}).status_code == 401
+    assert asked(keyed_on_sqlite, {"Cookie": f"Authorization={key}; api_key={key}"}).status_code == 401
+    assert asked(keyed_on_sqlite, {"X-API-Key": key}).status_code == 401
 
 
-def test_the_scheme_has_no_case(keyed_service: RunningService) -> None:
+def test_the_scheme_has_no_case(keyed_on_sqlite: RunningService) -> None:
     """``bearer`` is ``Bearer`` (RFC 9110, section 11.1)."""
-    key = make_key(keyed_service.database).text
-    assert asked(keyed_service, {"Authorization": f"bEARER {key}"}).status_code == 200
+    key = make_key(keyed_on_sqlite.database).text
+    assert asked(keyed_on_sqlite, {"Authorization": f"bEARER {key}"}).status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/livez", "/readyz", "/static/app.js"])
-def test_the_public_list_needs_no_key(keyed_service: RunningService, path: str) -> None:
+def test_the_public_list_needs_no_key(keyed_on_sqlite: RunningService, path: str) -> None:
     """Pages and probes are open, and a wrong key beside the request does not matter there."""
-    assert asked(keyed_service, {}, path).status_code in (200, 503)
-    assert asked(keyed_service, bearer("nonsense"), path).status_code in (200, 503)
+    assert asked(keyed_on_sqlite, {}, path).status_code in (200, 503)
+    assert asked(keyed_on_sqlite, bearer("nonsense"), path).status_code in (200, 503)
 
 
 @pytest.mark.parametrize(
@@ -100,30 +100,30 @@ def test_the_public_list_needs_no_key(keyed_service: RunningService, path: str) 
         *("//jobs", "/jobs/", "/./jobs", "/JOBS", "/livez/", "/openapi.json/", "/static", "/nothing"),
     ],
 )
-def test_no_spelling_of_a_path_goes_round_the_gate(keyed_service: RunningService, path: str) -> None:
+def test_no_spelling_of_a_path_goes_round_the_gate(keyed_on_sqlite: RunningService, path: str) -> None:
     """Whatever is not exactly on the public list is refused, or is nothing."""
-    host, port = keyed_service.url.removeprefix("http://").split(":")
+    host, port = keyed_on_sqlite.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as connection:
         connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
         status = int(connection.makefile("rb").readline().split()[1])
     assert status in (401, 404)
 
 
-def test_no_body_is_read_for_a_stranger(keyed_service: RunningService) -> None:
+def test_no_body_is_read_for_a_stranger(keyed_on_sqlite: RunningService) -> None:
     """The refusal comes while the body is still to be sent."""
-    host, port = keyed_service.url.removeprefix("http://").split(":")
+    host, port = keyed_on_sqlite.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as connection:
         head = f"POST /identify HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n"
         connection.sendall(f"{head}Content-Length: 8000000\r\n\r\n{{".encode())
         assert b" 401 " in connection.makefile("rb").readline()
 
 
-def test_a_revoked_key_is_refused_within_seconds(keyed_service: RunningService) -> None:
+def test_a_revoked_key_is_refused_within_seconds(keyed_on_sqlite: RunningService) -> None:
     """A key in constant use opens nothing `FRESH_S` after it was revoked."""
-    made = make_key(keyed_service.database)
-    with holder(keyed_service, made.text) as client:
+    made = make_key(keyed_on_sqlite.database)
+    with holder(keyed_on_sqlite, made.text) as client:
         assert client.get("/jobs").status_code == 200
-        with keyed_service.database.write() as session:
+        with keyed_on_sqlite.database.write() as session:
             revoke_key(session, made.key.prefix)
         revoked_at = time.monotonic()
         while client.get("/jobs").status_code == 200:
@@ -132,26 +132,26 @@ def test_a_revoked_key_is_refused_within_seconds(keyed_service: RunningService) 
         print(f"refused {time.monotonic() - revoked_at:.2f} s after it was revoked")
 
 
-def test_the_last_use_is_seen(keyed_service: RunningService) -> None:
+def test_the_last_use_is_seen(keyed_on_sqlite: RunningService) -> None:
     """The operator sees when a key was last used, though no request waits for the note."""
-    made = make_key(keyed_service.database)
-    with holder(keyed_service, made.text) as client:
+    made = make_key(keyed_on_sqlite.database)
+    with holder(keyed_on_sqlite, made.text) as client:
         assert client.get("/me").status_code == 200
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
-        with keyed_service.database.read() as session:
+        with keyed_on_sqlite.database.read() as session:
             if repository.key_by_id(session, made.key.id).last_used_at is not None:
                 return
         time.sleep(0.02)
     pytest.fail("the last use was not noted")
 
 
-def test_guessing_is_limited(keyed_service: RunningService) -> None:
+def test_guessing_is_limited(keyed_on_sqlite: RunningService) -> None:
     """An address that sends wrong keys is told to wait; who works there or elsewhere is not held up."""
     place = {FROM_PROXY: "198.51.100.7"}
-    good = make_key(keyed_service.database).text
-    assert asked(keyed_service, {**bearer(good), **place}).status_code == 200
-    answers = [asked(keyed_service, {**bearer(KeyText.new().text()), **place}) for _ in range(BURST + 5)]
+    good = make_key(keyed_on_sqlite.database).text
+    assert asked(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
+    answers = [asked(keyed_on_sqlite, {**bearer(KeyText.new().text()), **place}) for _ in range(BURST + 5)]
     statuses = [answer.status_code for answer in answers]
     assert statuses[:BURST] == [401] * BURST
     # the bucket may refill by one or two on a slow machine
@@ -159,22 +159,22 @@ def test_guessing_is_limited(keyed_service: RunningService) -> None:
     limited = next(answer for answer in answers if answer.status_code == 429)
     assert limited.json()["code"] == "too_many_refusals"
     assert 1 <= int(limited.headers["retry-after"]) <= 6
-    assert asked(keyed_service, {**bearer(good), **place}).status_code == 200
-    fresh = make_key(keyed_service.database).text
-    assert asked(keyed_service, {**bearer(fresh), FROM_PROXY: "198.51.100.8"}).status_code == 200
+    assert asked(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
+    fresh = make_key(keyed_on_sqlite.database).text
+    assert asked(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.8"}).status_code == 200
     for _ in range(BURST):
-        assert asked(keyed_service, {FROM_PROXY: "198.51.100.9"}).status_code == 401  # no key is no guess
-    assert asked(keyed_service, {**bearer(fresh), FROM_PROXY: "198.51.100.9"}).status_code == 200
+        assert asked(keyed_on_sqlite, {FROM_PROXY: "198.51.100.9"}).status_code == 401  # no key is no guess
+    assert asked(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.9"}).status_code == 200
 
 
-def test_me_tells_what_a_key_may_do(keyed_service: RunningService) -> None:
+def test_me_tells_what_a_key_may_do(keyed_on_sqlite: RunningService) -> None:
     """Owner, scopes, quotas and use; never the secret."""
-    made = make_key(keyed_service.database, "laboratory")
-    with keyed_service.database.write() as session:
+    made = make_key(keyed_on_sqlite.database, "laboratory")
+    with keyed_on_sqlite.database.write() as session:
         later = database_time() + 1000.0
         chosen = update(api_keys).where(api_keys.c.id == made.key.id)
         session.execute(chosen.values(max_jobs_in_flight=3, expires_at=later))
-    with holder(keyed_service, made.text) as client:
+    with holder(keyed_on_sqlite, made.text) as client:
         me = client.get("/me").json()
     assert me["owner"] == "laboratory"
     assert me["key"]["prefix"] == made.key.prefix
