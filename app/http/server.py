@@ -31,6 +31,7 @@ LEAST_READ_RATE = 4096.0  # bytes per second that a client must take of an answe
 DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
 KEEP_ALIVE_S = 5
 STOP_S = 5  # for open answers when the process is told to end
+DRAIN_S = 1.0  # then: for requests that are on their way through connections that wait
 SPARE_FILES = 200  # for databases, brokers, uploads, logs
 
 logger = logging.getLogger(__name__)
@@ -111,8 +112,10 @@ class GuardedProtocol(H11Protocol):
         self._header_timer: asyncio.TimerHandle | None = None
         self._write_timer: asyncio.TimerHandle | None = None
         self._linger_timer: asyncio.TimerHandle | None = None
+        self._drain_timer: asyncio.TimerHandle | None = None
         self._unread = 0  # bytes that wait for the client, when last looked at
         self._refused = False
+        self._ending = False
 
     # a connection begins and ends
 
@@ -128,9 +131,20 @@ class GuardedProtocol(H11Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
-        self._cancel("_header_timer", "_write_timer", "_linger_timer")
+        self._cancel("_header_timer", "_write_timer", "_linger_timer", "_drain_timer")
         self._unset_keepalive_if_required()
         super().connection_lost(exc)
+
+    def shutdown(self) -> None:
+        """End when the server does: open answers first, and requests whose first byte is still on its way.
+
+        Closed at once, a connection that waits would lose the request that its client is just sending.
+        """
+        self._ending = True
+        if self.cycle is None or self.cycle.response_complete:
+            self._drain_timer = self.loop.call_later(DRAIN_S, super().shutdown)
+        else:
+            super().shutdown()
 
     # headers
 
@@ -141,6 +155,8 @@ class GuardedProtocol(H11Protocol):
         if self._header_timer is None and self._between_requests():
             self._header_timer = self.loop.call_later(self.limits.header_s, self._headers_late)
         super().data_received(data)
+        if self._ending and self.cycle is not None:
+            self.cycle.keep_alive = False
         self._cancel("_linger_timer" if self._between_requests() else "_header_timer")
 
     def _between_requests(self) -> bool:
