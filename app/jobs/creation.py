@@ -136,11 +136,11 @@ def create_job(
         insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256)
     )
     insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
-    session.execute(_insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
+    session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     return get_job(session, owner, job_id)
 
 
-def _insert_new(session: Session, table: Table) -> Any:
+def insert_new(session: Session, table: Table) -> Any:
     """An INSERT that can leave existing rows alone, in the database's own words."""
     if session.dialect.name == "sqlite":
         from sqlalchemy.dialects import sqlite
@@ -165,7 +165,7 @@ def _take_idempotency_key(
         "at": database_time(),
     }
     taken = session.execute(
-        _insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
+        insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
     ).one_or_none()
     if taken is not None:
         return None

@@ -1,4 +1,4 @@
-"""Laws of `execution`: how a job is run, found again, waits and is given up, over real HTTP on both databases."""
+"""Laws of `execution`: how a job is run, found again, waits and is given up; on both databases."""
 
 from __future__ import annotations
 
