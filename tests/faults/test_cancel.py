@@ -74,19 +74,16 @@ def test_a_hundred_cancels(rig: Rig) -> None:
     wanted = [states[number % len(states)] for number in range(CANCELS)]
     with rig.tended(), ThreadPoolExecutor(CALLERS) as pool:
         took_s = list(pool.map(lambda state: cancel_in(rig, state, rng), wanted))
-    running_s = sorted(
-        s for s, state in zip(took_s, wanted, strict=True) if state not in ("queued", "finished")
-    )
+    pairs = zip(took_s, wanted, strict=True)
+    ran_s = sorted(each_s for each_s, state in pairs if state not in ("queued", "finished"))
     took_s.sort()
-    print(
-        f"{CANCELS} cancels: p50 {percentile(took_s, 0.5):.2f} s, p99 {percentile(took_s, 0.99):.2f} s; of "
-        f"{len(running_s)} that ran p50 {percentile(running_s, 0.5):.2f} s, p99 {percentile(running_s, 0.99):.2f} s"
-    )
+    print(f"{CANCELS} cancels: p50 {percentile(took_s, 0.5):.2f} s, p99 {percentile(took_s, 0.99):.2f} s")
+    print(f"{len(ran_s)} that ran: p50 {percentile(ran_s, 0.5):.2f} s, p99 {percentile(ran_s, 0.99):.2f} s")
     assert percentile(took_s, 0.99) < EFFECTIVE_S + NOISE_S
 
 
-def test_cancel_while_kernels_are_made_ready_and_after_a_release(rig: Rig) -> None:
-    """A claimed job that waits for its kernels ends soon; one that a stopping worker gave back ends at once."""
+def test_cancel_before_and_after_work(rig: Rig) -> None:
+    """A job that waits for its kernels ends soon; one that a stopping worker gave back ends at once."""
     worker = rig.start_worker(environment={"MORPHID_TEST_WARM_UP_S": "8"})
     rig.start_api()
     preparing = rig.add(steps=100, pause_s=0.01, ends=CANCELLED)

@@ -55,7 +55,7 @@ def test_three_reapers_give_a_lost_job_back_once(rig: Rig) -> None:
 
 
 def test_death_between_commit_and_message(rig: Rig, tmp_path: Path) -> None:
-    """The API dies after a job's commit, before its message: the job runs; the client's repetition finds it."""
+    """The API dies after a job's commit, before its message: the job runs; a repetition finds it."""
     crash = tmp_path / "crash"
     rig.start_worker()
     rig.start_api(environment={"MORPHID_TEST_CRASH_FILE": str(crash)})

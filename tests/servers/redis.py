@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import random
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,15 +29,20 @@ class BrokerServer:
     answers: Callable[[], bool]
 
 
+def quiet_port() -> int:
+    """A port that nobody takes while the broker is away: below those that the system gives to connections."""
+    return random.randrange(20_000, 30_000)
+
+
 def embedded(folder: Path) -> BrokerServer:
     """The broker that `morphid serve` runs: a password, a journal on disk."""
-    broker = prepare_broker(folder)
+    broker = prepare_broker(folder, preferred_port=quiet_port())
     return BrokerServer(broker.spec, broker.url, broker.answers)
 
 
 def plain(folder: Path) -> BrokerServer:
     """A server as somebody else runs it: no password, nothing on disk; a restart forgets every message."""
-    port = free_port(0)
+    port = free_port(quiet_port())
     folder.mkdir(parents=True, exist_ok=True)
     command = [
         str(find_server()),
