@@ -180,7 +180,7 @@ function keyView(problem) {
   leave = () => {};
   const refused = session.key !== "";
   session.key = "";
-  who();
+  document.getElementById("who").replaceChildren();
   const field = element("input", { type: "password", id: "key", autocomplete: "off", spellcheck: "false", placeholder: "mid_…" });
   const form = element(
     "form",
@@ -209,9 +209,10 @@ async function who() {
 
 /* ---- frame ---- */
 
-function start() {
-  who();
-  route();
+async function start() {
+  const held = session.key !== "";
+  await who(); // one call tells whether the key is good
+  if (!held || session.key) route();
 }
 
 async function route() {

@@ -12,12 +12,13 @@ const session = {
 };
 
 async function request(path, options = {}) {
+  const key = session.key;
   const headers = { Accept: "application/json", ...options.headers };
-  if (session.key) headers.Authorization = `Bearer ${session.key}`;
+  if (key) headers.Authorization = `Bearer ${key}`;
   const answer = await fetch(path, { ...options, headers, redirect: "error", referrerPolicy: "no-referrer" });
   if (answer.ok) return answer;
   const problem = await answer.json().catch(() => ({ title: `The service answered ${answer.status}` }));
-  if (answer.status === 401) session.onRefused(problem);
+  if (answer.status === 401 && key === session.key) session.onRefused(problem); // else there is another by now
   throw Object.assign(new Error(problem.detail), { status: answer.status, problem });
 }
 
