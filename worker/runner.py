@@ -25,7 +25,7 @@ from worker.works import Works
 log = logging.getLogger(__name__)
 
 CLAIM_TRIES = 5  # each lost race means that another worker took a job
-CHUNK_LEASE_S = 15.0
+CHUNK_LEASE_S = 10.0  # a chunk that is lost holds up its generation for so long and a round of the reaper
 HEARTBEATS_PER_LEASE = 5  # a chunk of a second needs none
 
 
