@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.simulate.file_columns import read_file_columns
 from morphcore.simulate.schedule import Schedule, Tabulated
+from samplefiles.csv_table import write_table
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,6 @@ def write_schedule_csv(schedules: Mapping[str, Schedule], time_s: Array, path: s
     """Write the hinge angles of both sides at times (k,), s; `load_schedule_csv` reads them back."""
     angles = [schedules[side].motion(time_s).angle for side in ("left", "right")]
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(SCHEDULE_COLUMNS)
         # twelve digits: second differences of rows 10 ms apart are right to 1e-7 rad/s^2
-        writer.writerows([f"{value:.12g}" for value in row] for row in zip(time_s, *angles, strict=True))
+        rows = ([f"{value:.12g}" for value in row] for row in zip(time_s, *angles, strict=True))
+        write_table(stream, SCHEDULE_COLUMNS, rows)
