@@ -105,12 +105,8 @@ def new_tenant(service: RunningService, owner: str) -> Tenant:
 def replenish(service: RunningService, tenant: Tenant) -> None:
     """Give the tenant one more thing of every kind."""
     marker = tenant.marker
-    jobs = [
-        _job(service, tenant, operation, status)
-        for operation in RESULTS
-        for status in ("succeeded", "failed")
-    ]
-    jobs += [_job(service, tenant, "simulate", status) for status in ("queued", "running")]
+    jobs = [_job(service, tenant, operation, "succeeded") for operation in RESULTS]
+    jobs += [_job(service, tenant, "simulate", status) for status in ("failed", "queued", "running")]
     sample = short_requests()["identify"]["samples"][0]
     flight = {key: value for key, value in sample.items() if key not in ("role", "weight")}
     tenant.ids = {

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from sqlalchemy import select
 from standardwebhooks import Webhook
 
 from app.settings import Settings, UnsafeSettings, load_settings
+from app.tables import audit_log
 from app.webhooks.schemas import Message
 from app.webhooks.service import MAX_WEBHOOKS
 from tests.app.calls import fault, post
@@ -47,6 +49,18 @@ def test_the_secret_is_shown_once(any_service: RunningService) -> None:
     shown = any_service.client.get(f"/webhooks/{made['id']}").json()
     assert shown == {key: value for key, value in made.items() if key != "secret"}
     assert any_service.client.get("/webhooks").json() == {"webhooks": [shown]}
+
+
+def test_deeds_are_noted(any_service: RunningService) -> None:
+    """Making, enabling and deleting a webhook stand in the audit log, without its secret."""
+    made = new(any_service)
+    any_service.client.post(f"/webhooks/{made['id']}/enable")
+    any_service.client.delete(f"/webhooks/{made['id']}")
+    query = select(audit_log).where(audit_log.c.target == made["id"]).order_by(audit_log.c.at)
+    with any_service.database.read() as session:
+        rows = session.execute(query).all()
+    assert [row.action for row in rows] == ["webhook.create", "webhook.update", "webhook.delete"]
+    assert made["secret"] not in str(rows)
 
 
 def test_events_are_chosen(service: RunningService) -> None:
