@@ -9,12 +9,15 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import time
+from contextlib import suppress
 from functools import partial
 
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.audit import repository as audit
 from app.audit.records import Action
@@ -23,7 +26,7 @@ from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
 from app.http.origins import Doors, refusal
 from app.http.problems import MEDIA_TYPE, problem_document
 from app.http.request_id import current_request_id
-from app.keys.keyring import Refusal
+from app.keys.keyring import FRESH_S, Refusal
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
 from app.keys.refusal_limit import RefusalLimit
 from app.keys.secret import KeyText
@@ -31,6 +34,7 @@ from app.settings import Settings
 
 PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
 PUBLIC_FOLDER = "/static/"
+ADDRESS_LENGTH = 64  # a proxy may pass on anything
 LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
 
 logger = logging.getLogger(__name__)
@@ -57,27 +61,28 @@ class Gate:
             await self.app(scope, receive, send)
             return
         error = refusal(scope, self._doors)
-        if error is None:
-            try:
-                scope[CALLER] = await self._caller(scope)
-            except ServiceError as refused:
-                error = refused
-        if error is None:
-            await self.app(scope, receive, send)
-        else:
+        if error is not None:
             await _answer(error, scope, receive, send)
-
-    async def _caller(self, scope: Scope) -> Caller | None:
+            return
         path: str = scope["path"]
         if path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDER):
-            return None
-        address = scope["client"][0] if scope.get("client") else ""
+            await self.app(scope, receive, send)
+            return
+        address = scope["client"][0][:ADDRESS_LENGTH] if scope.get("client") else ""
         if not self._demands_keys:
-            return Caller(LOCAL_OWNER, None, EVERY_SCOPE, current_request_id(), address, NO_QUOTA)
-        key = await self._key(scope, address)
-        return Caller(key.owner, key.id, key.scopes, current_request_id(), address, key.quota)
+            caller = Caller(LOCAL_OWNER, None, EVERY_SCOPE, current_request_id(), address, NO_QUOTA)
+            scope[CALLER] = caller
+            await self.app(scope, receive, send)
+            return
+        try:
+            key, text = await self._key(scope, address)
+        except ServiceError as refused:
+            await _answer(refused, scope, receive, send)
+            return
+        scope[CALLER] = Caller(key.owner, key.id, key.scopes, current_request_id(), address, key.quota)
+        await _while_the_key_opens(self.app, text, scope, receive, send)
 
-    async def _key(self, scope: Scope, address: str) -> ApiKey:
+    async def _key(self, scope: Scope, address: str) -> tuple[ApiKey, KeyText]:
         """Find the key that the request carries.
 
         Raises
@@ -98,10 +103,12 @@ class Gate:
         wait_s = self._limit.wait_s(address, prefix)
         if wait_s > 0:
             raise TooManyRefusals(wait_s)
-        found = Refusal.MALFORMED if text is None else await _checked(service, text)
-        if isinstance(found, ApiKey):
-            self._limit.note_opened(address, prefix)
-            return found
+        found: ApiKey | Refusal = Refusal.MALFORMED
+        if text is not None:
+            found = await _checked(service, text)
+            if isinstance(found, ApiKey):
+                self._limit.note_opened(address, prefix)
+                return found, text
         if found in (Refusal.EXPIRED, Refusal.REVOKED):
             self._limit.forget(address, prefix)
         if self._limit.note_refused(address):
@@ -132,6 +139,33 @@ async def _checked(service: Service, text: KeyText) -> ApiKey | Refusal:
     except SQLAlchemyError as error:
         logger.warning("API keys cannot be looked up: %s", error)
         raise DatabaseAway from None
+
+
+async def _while_the_key_opens(
+    app: ASGIApp, text: KeyText, scope: Scope, receive: Receive, send: Send
+) -> None:
+    """Serve a request; end a stream, which may last for hours, when its key is revoked or expires."""
+    service: Service = scope["app"].state.service
+    checked_at = time.monotonic()
+    ended = False
+
+    async def send_while_open(message: Message) -> None:
+        nonlocal checked_at, ended
+        now = time.monotonic()
+        if message.get("more_body") and now - checked_at >= FRESH_S:
+            checked_at = now
+            with suppress(DatabaseAway):  # the stream has its own troubles then
+                ended = not isinstance(await _checked(service, text), ApiKey)
+        if ended:
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+            raise ClientDisconnect
+        await send(message)
+
+    try:
+        await app(scope, receive, send_while_open)
+    except Exception:
+        if not ended:
+            raise
 
 
 async def _answer(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:

@@ -175,7 +175,7 @@ async function jobView(id) {
 
 /* ---- key ---- */
 
-function keyView(problem) {
+function keyView() {
   leave();
   leave = () => {};
   const refused = session.key !== "";
@@ -191,7 +191,7 @@ function keyView(problem) {
     "section",
     { class: "card" },
     element("h1", {}, refused ? "This key is not valid" : "This service needs an API key"),
-    refused ? element("p", { class: "soft" }, problem.hint ?? "") : null,
+    refused ? element("p", { class: "soft" }, "It is unknown, was revoked or has expired.") : null,
     form,
     element("p", { class: "soft" }, "It stays in this tab and is forgotten with it. The operator makes keys with "), element("pre", { class: "mono" }, "morphid keys create --owner NAME --name PURPOSE"),
   ));

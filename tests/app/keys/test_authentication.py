@@ -17,6 +17,7 @@ from app.keys.secret import KeyText
 from app.keys.service import revoke_key
 from app.tables import api_keys
 from tests.app.key_holders import bearer, holder, make_key
+from tests.app.request_documents import simulate_document
 from tests.app.running_service import RunningService
 
 FROM_PROXY = "X-Forwarded-For"  # the server believes its own machine: tests come from addresses of their own
@@ -130,6 +131,32 @@ def test_a_revoked_key_is_refused_within_seconds(keyed_on_sqlite: RunningService
             # one request may be on its way when the time is over; a busy machine takes its time for it
             assert time.monotonic() - revoked_at < FRESH_S + PATIENCE_S
         print(f"refused {time.monotonic() - revoked_at:.2f} s after it was revoked")
+
+
+def test_a_stream_ends_with_its_key(keyed_on_sqlite: RunningService) -> None:
+    """Whoever follows a job hears nothing more of it once the key is revoked; the service takes no harm."""
+    made = make_key(keyed_on_sqlite.database)
+    with holder(keyed_on_sqlite, made.text) as client:
+        job = client.post("/simulate", json=simulate_document()).raise_for_status().json()["id"]
+        claim = keyed_on_sqlite.claim(job)
+        with client.stream("GET", f"/jobs/{job}/events") as stream:
+            lines = stream.iter_lines()
+            assert next(lines)
+            with keyed_on_sqlite.database.write() as session:
+                revoke_key(session, made.key.prefix)
+            deadline = time.monotonic() + FRESH_S + PATIENCE_S
+            heard: list[str] = []
+            for number in range(10**6):
+                keyed_on_sqlite.progress(claim, fraction=0.5, message=f"secret {number}")
+                try:
+                    heard.append(next(lines))
+                except StopIteration:
+                    break
+                assert time.monotonic() < deadline
+        # comes after the end of the stream: the row is there, and nobody with this key hears of it
+        assert client.get(f"/jobs/{job}").status_code == 401
+    with holder(keyed_on_sqlite, make_key(keyed_on_sqlite.database).text) as client:
+        assert client.get(f"/jobs/{job}").json()["status"] == "running"
 
 
 def test_the_last_use_is_seen(keyed_on_sqlite: RunningService) -> None:
