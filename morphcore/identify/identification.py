@@ -77,6 +77,11 @@ class Identification:
             aero_coefficients=self.settings.aero_coefficients,
             bounds=self.settings.bounds,
         )
+        warm_start = self.search.warm_start
+        # (k, d) what is known before the search: the model to begin from, and always the physical guess
+        self.known: Array = np.stack(
+            [*([] if warm_start is None else [self.space.encode(warm_start)]), self.space.guess]
+        )
 
     def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
@@ -148,11 +153,13 @@ class Identification:
     # one step each
 
     def _baseline(self, stop: Stop | None) -> SearchState:
-        """Fly the physical guess: from here on there is a best so far."""
-        cost = self._costs(self.space.guess[None, :], stop)
+        """Fly what is known before: from here on there is a best so far."""
+        cost = self._costs(self.known, stop)
         following: Phase = "swarm" if self.search.method == "pso" else "screen"
         phase: Phase = following if self.space.dimension else "done"
-        state = SearchState(phase, self.space.guess, float(cost[0]), flights=len(self.training))
+        best = int(np.argmin(cost))
+        flights = cost.size * len(self.training)
+        state = SearchState(phase, self.known[best], float(cost[best]), flights=flights)
         return _recorded(state, "baseline", 0)
 
     def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
@@ -160,14 +167,15 @@ class Identification:
         return step(state, stop)
 
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
-        """Fly candidates around the physical guess and choose the polish's starts among them."""
+        """Fly candidates around what is known and choose the polish's starts among them."""
         rng = np.random.default_rng(self.search.seed)
         spread = rng.normal(0.0, SCREEN_SPREAD, (self.search.screen, self.space.dimension))
-        points = np.clip(self.space.guess + spread, self.space.lower, self.space.upper)
-        points[0] = self.space.guess
+        points = np.clip(self.known[0] + spread, self.space.lower, self.space.upper)
+        known = self.known[: self.search.screen]
+        points[: len(known)] = known
         cost = self._costs(points, stop)
         order = np.argsort(cost, kind="stable")
-        chosen = np.unique(np.append(order[: self.search.starts - 1], 0))
+        chosen = np.unique(np.append(order[: self.search.starts - len(known)], range(len(known))))
         best = int(order[0])
         found = SearchState(
             "polish",
@@ -215,8 +223,8 @@ class Identification:
 
     def _swarm(self, state: SearchState) -> SwarmState:
         width = self.space.upper - self.space.lower
-        guess = (self.space.guess - self.space.lower) / width
-        return state.swarm or first_swarm(self.search.swarm, guess, self.search.seed)
+        known = (self.known - self.space.lower) / width
+        return state.swarm or first_swarm(self.search.swarm, known, self.search.seed)
 
     def _task(self, state: SearchState) -> GenerationTask:
         swarm, space = self._swarm(state), self.space
