@@ -103,17 +103,20 @@ class Gate:
         wait_s = self._limit.wait_s(address, prefix)
         if wait_s > 0:
             raise TooManyRefusals(wait_s)
-        found: ApiKey | Refusal = Refusal.MALFORMED
-        if text is not None:
-            found = await _checked(service, text)
-            if isinstance(found, ApiKey):
-                self._limit.note_opened(address, prefix)
-                return found, text
-        if found in (Refusal.EXPIRED, Refusal.REVOKED):
+        if text is None:
+            raise self._refused(service, address, "", Refusal.MALFORMED)
+        found = await _checked(service, text)
+        if isinstance(found, Refusal):
+            raise self._refused(service, address, prefix, found)
+        self._limit.note_opened(address, prefix)
+        return found, text
+
+    def _refused(self, service: Service, address: str, prefix: str, reason: Refusal) -> Unauthorized:
+        if reason in (Refusal.EXPIRED, Refusal.REVOKED):
             self._limit.forget(address, prefix)
         if self._limit.note_refused(address):
-            _note_refused(service, address, prefix, found)
-        raise Unauthorized
+            _note_refused(service, address, prefix, reason)
+        return Unauthorized()
 
 
 def _note_refused(service: Service, address: str, prefix: str, refused: Refusal) -> None:
