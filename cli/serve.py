@@ -138,9 +138,9 @@ def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
 
 def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
     command = [
-        *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "worker"),
+        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "worker"),
         *("--queues", "morphid", "--concurrency", str(workers), "--prefetch-multiplier", "1"),
-        *("--loglevel", "INFO", "--without-gossip", "--without-mingle"),
+        *("--without-gossip", "--without-mingle"),
     ]
     return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
 
@@ -148,9 +148,8 @@ def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
 def _beat(environment: dict[str, str]) -> ChildSpec:
     # not inside the worker: nobody would notice its death, and no lost job would be found any more
     command = [
-        *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "beat"),
+        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "beat"),
         *("--scheduler", "celery.beat:Scheduler", "--pidfile", ""),  # nothing on disk that a kill could spoil
-        *("--loglevel", "INFO"),
     ]
     return ChildSpec(name="beat", command=command, environment=environment)
 

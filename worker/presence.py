@@ -22,8 +22,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
 from app.database import Session, normal_url
-from app.health import presence
 from app.health.broker import BROKER_GOOD, broker_state
+from app.health.presence import Sign, note_seen, note_started, note_stopped
 from app.settings import load_settings
 from app.version import VERSION
 
@@ -99,7 +99,7 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         self._timers = []
         if self._known and asked_to_end():
             self._known = False
-            self._write(lambda session: presence.note_stopped(session, self._name))
+            self._write(lambda session: note_stopped(session, self._name))
 
     shutdown = stop
 
@@ -107,10 +107,8 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         if broker_state(self._broker_url) not in BROKER_GOOD:
             return  # the loop runs, but nothing comes in
         children = [child.pid for child in _children(consumer)]
-        sign = presence.Sign(
-            self._name, VERSION, slots=sum(map(can_work, children)), busy=len(state.active_requests)
-        )
-        note = presence.note_seen if self._known else presence.note_started
+        sign = Sign(self._name, VERSION, slots=sum(map(can_work, children)), busy=len(state.active_requests))
+        note = note_seen if self._known else note_started
         if self._write(lambda session: note(session, sign)):
             self._known = True
 
