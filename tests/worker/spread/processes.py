@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import psutil
 from sqlalchemy import select
 
 from app.database import Database
@@ -63,6 +64,11 @@ class Workers:
             stdout = self._processes[name].stdout
             assert stdout is not None
             assert stdout.readline() == "ready\n", f"worker {name} ended"
+
+    def cpu_s(self) -> float:
+        """CPU time that all worker processes have used, s."""
+        times = [psutil.Process(process.pid).cpu_times() for process in self._processes.values()]
+        return float(sum(time.user + time.system for time in times))
 
     def kill(self, name: str) -> None:
         """SIGKILL one."""

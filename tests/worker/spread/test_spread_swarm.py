@@ -47,7 +47,7 @@ def test_a_spread_swarm_is_the_swarm(database: Database) -> None:
 
 @pytest.mark.faults
 def test_a_killed_process_costs_its_chunk(database: Database) -> None:
-    """SIGKILL of one of two processes in mid-generation: its chunk alone is flown twice, to the same result."""
+    """SIGKILL of one of two workers in mid-generation: only its chunk is flown twice, to the same result."""
     request = identification("train_rate_0.8", links=2, search=LARGER)
     with Workers(database, chunk_lease_s=CHUNK_LEASE_S) as workers:
         workers.start("w1", "w2")
