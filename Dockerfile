@@ -9,6 +9,7 @@ COPY app app
 COPY cli cli
 COPY migrations migrations
 COPY morphcore morphcore
+COPY samplefiles samplefiles
 COPY worker worker
 RUN .venv/bin/uv pip install --no-cache --python .venv/bin/python -c constraints.txt -e '.[server]'
 

@@ -12,7 +12,7 @@ UV_INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraint
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-slow faults bench check openapi format clean
+.PHONY: help setup demo serve test test-slow faults conformance bench check openapi format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -51,8 +51,11 @@ test: setup  ## the tests (under 12 minutes on two cores)
 test-slow: setup  ## the long proofs
 	@$(BIN)/pytest -q -m slow --timeout 1800
 
-faults: setup  ## kill processes and watch the service recover
-	@$(BIN)/pytest -q -m faults --timeout 900
+faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
+	@$(BIN)/pytest -q -s tests/faults -m "" --timeout 900
+
+conformance: setup  ## one behaviour on SQLite and Postgres, embedded broker and Redis URL (MORPHID_TEST_*_URL)
+	@$(BIN)/pytest -q tests/conformance tests/app/jobs tests/app/test_database.py
 
 bench: setup  ## the benchmark figures of this machine
 	@$(BIN)/morphid bench

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Double, Engine, create_engine, event, inspect, make_url, text
+from sqlalchemy import URL, Double, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine import Connection
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
@@ -19,6 +19,20 @@ Session = Connection
 
 BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
 BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
+CONNECT_TIMEOUT_S = 5
+POSTGRES_PATIENCE = {
+    # another process may be stopped amid a transaction, or its host be gone: nobody waits for it forever
+    "lock_timeout": "10s",
+    "statement_timeout": "60s",
+    "idle_in_transaction_session_timeout": "30s",
+}
+POSTGRES_LINK = {
+    # a host that vanished without a word is noticed within half a minute
+    "connect_timeout": CONNECT_TIMEOUT_S,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 4,
+}
 
 
 class database_time(FunctionElement[float]):  # noqa: N801 - reads as the SQL function it is
@@ -56,7 +70,9 @@ def make_engine(url: str) -> Engine:
     """Open an engine for `url`; an SQLite file's folder is made when it is missing."""
     parsed = make_url(normal_url(url))
     if parsed.get_backend_name() != "sqlite":
-        return create_engine(parsed, pool_pre_ping=True, pool_size=20, max_overflow=40)
+        return create_engine(
+            parsed, pool_pre_ping=True, pool_size=20, max_overflow=40, connect_args=_postgres_link(parsed)
+        )
     if parsed.database and parsed.database != ":memory:":
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(parsed, pool_size=20, max_overflow=40)
@@ -78,6 +94,14 @@ def make_engine(url: str) -> Engine:
         connection.exec_driver_sql(f"BEGIN {mode}")
 
     return engine
+
+
+def _postgres_link(url: URL) -> dict[str, Any]:
+    """What the driver is told beside the URL; whatever the URL says itself holds."""
+    options = " ".join(f"-c {name}={value}" for name, value in POSTGRES_PATIENCE.items())
+    own = url.query.get("options")
+    told = {**POSTGRES_LINK, "options": f"{options} {own}" if own else options}
+    return {key: value for key, value in told.items() if key == "options" or key not in url.query}
 
 
 class Database:

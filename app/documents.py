@@ -6,9 +6,14 @@ import hashlib
 import json
 import math
 import zlib
+from dataclasses import dataclass
 from typing import Any
 
+from pydantic_core import to_json
+
 Document = dict[str, Any]
+
+CONTAINERS = frozenset({dict, list, tuple})
 
 DEFLATE_LEVEL = (
     1  # trajectories shrink threefold in a few milliseconds; level 6 wins 10 per cent for four times that
@@ -27,12 +32,17 @@ def finite(value: Any) -> Any:
 
 
 def json_bytes(document: Any) -> bytes:
-    """Compact JSON with sorted keys; numbers keep every digit."""
-    try:
-        text = json.dumps(document, separators=(",", ":"), sort_keys=True, allow_nan=False)
-    except ValueError:
-        text = json.dumps(finite(document), separators=(",", ":"), sort_keys=True, allow_nan=False)
-    return text.encode()
+    """Compact JSON in UTF-8 with sorted keys; numbers keep every digit, NaN and infinity become null."""
+    # ten times as fast as json.dumps, which would hold up every other request while it writes a long flight
+    return to_json(_sorted(document), inf_nan_mode="null")
+
+
+def _sorted(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    if isinstance(value, (list, tuple)) and not CONTAINERS.isdisjoint(map(type, value)):
+        return [_sorted(item) for item in value]
+    return value
 
 
 def packed(document: Any) -> bytes:
@@ -50,6 +60,15 @@ def unpacked_json(data: bytes) -> bytes:
     return zlib.decompress(data)
 
 
-def digest(document: Any) -> str:
-    """SHA-256 of the canonical JSON, as hexadecimal text."""
-    return hashlib.sha256(json_bytes(document)).hexdigest()
+@dataclass(frozen=True, slots=True)
+class Sealed:
+    """A document ready to be stored: deflated, with the SHA-256 of its canonical JSON as hexadecimal text."""
+
+    data: bytes
+    sha256: str
+
+
+def sealed(document: Any) -> Sealed:
+    """Deflate and sum a document once; megabytes take a while, so do it before a transaction begins."""
+    text = json_bytes(document)
+    return Sealed(zlib.compress(text, DEFLATE_LEVEL), hashlib.sha256(text).hexdigest())

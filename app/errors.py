@@ -151,6 +151,16 @@ class ArtifactNotFound(NotFound):
         )
 
 
+class WebhookNotFound(NotFound):
+    """No such webhook, or another owner's."""
+
+    code = "webhook_not_found"
+    title = "There is no such webhook"
+
+    def __init__(self, webhook_id: str) -> None:
+        super().__init__(f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours.")
+
+
 class Conflict(ServiceError):
     """The thing is not in a state in which this can be done."""
 
@@ -189,6 +199,28 @@ class JobNotFinished(Conflict):
     def __init__(self, job_id: str, status: str) -> None:
         super().__init__(
             f"Job {job_id} is {status}.", "#path/job_id", f"POST /jobs/{job_id}/cancel first, then delete it."
+        )
+
+
+class TooManyWebhooks(Conflict):
+    """The owner has as many webhooks as one may have."""
+
+    code = "too_many_webhooks"
+    title = "There are too many webhooks"
+
+    def __init__(self, limit: int) -> None:
+        super().__init__(f"You have {limit} webhooks.", hint="Delete one that is not needed any more.")
+
+
+class WebhookDisabled(Conflict):
+    """A disabled webhook is sent nothing."""
+
+    code = "webhook_disabled"
+    title = "The webhook is disabled"
+
+    def __init__(self, webhook_id: str) -> None:
+        super().__init__(
+            f"Webhook {webhook_id} is disabled.", "#path/webhook_id", "POST /webhooks/{id}/enable first."
         )
 
 
@@ -307,3 +339,73 @@ class WrongHost(ServiceError):
     status = 421
     code = "wrong_host"
     title = "The service does not answer for this host"
+
+
+class DatabaseAway(ServiceError):
+    """The database restarts, cannot be reached or is too busy; no promise was made."""
+
+    status = 503
+    code = "database_unavailable"
+    title = "The database does not answer"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The database does not answer at the moment.",
+            hint="Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s."""
+        return {"Retry-After": "2"}
+
+
+class StorageFull(ServiceError):
+    """The database has no room for what the request would store."""
+
+    status = 503
+    code = "storage_full"
+    title = "The service's storage is full"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The database has no room left; nothing was stored.",
+            hint="Delete finished jobs that are not needed, or ask the operator for more disk space.",
+        )
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s: people have to make room."""
+        return {"Retry-After": "60"}
+
+
+class SlowBody(ServiceError):
+    """The body arrives too slowly to be worth a connection."""
+
+    status = 408
+    code = "slow_body"
+    title = "The body did not arrive in time"
+
+    def __init__(self) -> None:
+        super().__init__("The body arrived too slowly, or not at all.", hint="Send it again, in one go.")
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """The connection is of no more use."""
+        return {"Connection": "close"}
+
+
+class ServiceBusy(ServiceError):
+    """As many bodies or files are being read as this process can bear."""
+
+    status = 503
+    code = "service_busy"
+    title = "The service is busy"
+
+    def __init__(self, detail: str = "") -> None:
+        super().__init__(detail, hint="Send the request again in a few seconds.")
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """When to ask again, s."""
+        return {"Retry-After": "5"}

@@ -10,7 +10,8 @@ TIME_CHARACTERS = 10  # 50 bits of milliseconds: until the year 37000
 RANDOM_CHARACTERS = 16  # 80 bits
 
 
-def _base32(number: int, characters: int) -> str:
+def base32(number: int, characters: int) -> str:
+    """Write a number in so many characters of Crockford's alphabet, leading zeros included."""
     digits = []
     for _ in range(characters):
         number, digit = divmod(number, 32)
@@ -24,6 +25,4 @@ def new_identifier(kind: str) -> str:
     The order is for listing only; nothing depends on two clocks agreeing.
     """
     milliseconds = time.time_ns() // 1_000_000
-    return (
-        f"{kind}_{_base32(milliseconds, TIME_CHARACTERS)}{_base32(secrets.randbits(80), RANDOM_CHARACTERS)}"
-    )
+    return f"{kind}_{base32(milliseconds, TIME_CHARACTERS)}{base32(secrets.randbits(80), RANDOM_CHARACTERS)}"

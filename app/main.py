@@ -12,19 +12,31 @@ from typing import Any
 
 from fastapi import FastAPI
 
+from app.afterwards import Afterwards
 from app.database import Database, upgrade
 from app.health.endpoints import router as health
-from app.http.body_limit import BodyLimit
+from app.health.service import Health
+from app.http.body_limit import BodyLimit, BodyLimits
 from app.http.context import Service
+from app.http.gate import Gate
+from app.http.observed import Observed
 from app.http.problems import install_problem_handlers
 from app.http.request_id import RequestId
+from app.http.security_headers import SecurityHeaders
 from app.identify.endpoints import router as identify
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
+from app.jobs.upkeep import Upkeep
 from app.jobs.watch import JobWatcher
+from app.keys.endpoints import router as keys
+from app.keys.keyring import KeyRing
 from app.models.endpoints import router as models
+from app.observability.logs import configure_logging
+from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
 from app.optimize.endpoints import router as optimize
+from app.parsing.confinement import Limits
+from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
 from app.simulate.endpoints import router as simulate
 from app.study.endpoints import router as study
@@ -32,12 +44,16 @@ from app.trajectories.endpoints import router as trajectories
 from app.version import VERSION
 from app.web.endpoints import mount_static
 from app.web.endpoints import router as web
+from app.webhooks.addresses import AddressPolicy
+from app.webhooks.endpoints import router as webhooks
+from app.webhooks.sender import SenderSettings, WebhookSender
 
 
 def routed_app() -> FastAPI:
     """Return the application with its routes, without settings, database or broker."""
     app = FastAPI(title="MorphID", version=VERSION, docs_url=None, redoc_url=None)
-    for router in (identify, study, simulate, optimize, jobs, trajectories, models, health, web):
+    data = (trajectories, models, webhooks, keys)
+    for router in (identify, study, simulate, optimize, jobs, *data, health, web):
         app.include_router(router)
     mount_static(app)
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]  # FastAPI's documented way
@@ -53,10 +69,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         Those of the environment when left out.
     """
     chosen = settings or load_settings()
+    if settings is None:  # a process of its own, not a guest in another's
+        configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
     app.router.lifespan_context = _lifespan(chosen)
     install_problem_handlers(app, known_fields=lambda: _request_fields(app))
-    app.add_middleware(BodyLimit, max_bytes=chosen.max_body_bytes)
+    limits = BodyLimits(
+        chosen.max_body_bytes, chosen.body_grace_s, max_total_bytes=16 * chosen.max_body_bytes
+    )
+    app.add_middleware(BodyLimit, limits=limits)
+    app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
     _wrap(app)
     return app
 
@@ -64,7 +86,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 def _wrap(app: FastAPI) -> None:
     """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
     inner = app.build_middleware_stack
-    app.build_middleware_stack = lambda: RequestId(inner())  # type: ignore[method-assign]
+    app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
 
 
 def _request_fields(app: FastAPI) -> list[str]:
@@ -78,20 +100,35 @@ def _request_fields(app: FastAPI) -> list[str]:
 def _lifespan(settings: Settings) -> Any:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        start_tracing("morphid-api", settings.traces)
         await asyncio.to_thread(upgrade, settings.database_url)
         database = Database(settings.database_url)
         publisher = Publisher(settings.broker_url)
         watcher = JobWatcher(database, settings.event_poll_s)
-        app.state.service = Service(settings, database, publisher, watcher)
+        afterwards = Afterwards(database)
+        keys = KeyRing(database, afterwards)
+        parsers = ParserPool(settings.parsers, Limits(settings.parser_memory_bytes))
+        app.state.service = Service(settings, database, publisher, watcher, keys, afterwards, parsers)
+        app.state.health = Health(database, settings)
+        afterwards.start()
         publisher.start()
         watcher.start()
+        policy = AddressPolicy(allow_private=settings.webhook_allow_private)
+        sender = WebhookSender(database, SenderSettings(policy))
+        sender.start()
+        upkeep = Upkeep(database, publisher, settings)
+        upkeep.start()
         try:
             with _streams_end_with_the_process(watcher):
                 yield
         finally:
             await watcher.stop()
+            await asyncio.to_thread(upkeep.stop)
+            await asyncio.to_thread(sender.stop)
             await asyncio.to_thread(publisher.stop)
+            await asyncio.to_thread(afterwards.stop)
             database.dispose()
+            await asyncio.to_thread(stop_tracing)
 
     return lifespan
 

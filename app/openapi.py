@@ -10,19 +10,42 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from app.http.problems import MEDIA_TYPE
+from app.errors import (
+    CrossSiteRequest,
+    DatabaseAway,
+    MissingScope,
+    StorageFull,
+    TooManyRefusals,
+    Unauthorized,
+    WrongHost,
+)
+from app.http.problems import MEDIA_TYPE, documented
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
 from app.version import VERSION
+from app.webhooks.endpoints import messages
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"
+PROBLEM_CONTENT = {MEDIA_TYPE: {"schema": {"$ref": PROBLEM}}}
+_AUTHENTICATE = {"WWW-Authenticate": {"description": "How, and for what.", "schema": {"type": "string"}}}
+_RETRY_AFTER = {"Retry-After": {"description": "When to ask again, s.", "schema": {"type": "string"}}}
+REFUSAL_HEADERS: dict[int | str, dict[str, Any]] = {
+    401: _AUTHENTICATE,
+    403: _AUTHENTICATE,
+    421: {},
+    429: _RETRY_AFTER,
+}
+WITHOUT_DATABASE = frozenset({"/livez"})
 DESCRIPTION = """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
 
 Long work is a job: the POST answers `202` with a job at once; follow it by `GET /jobs/{id}`
 (`Prefer: wait=30`), by its events, or on the page at `/`. Units are SI and radians, and stand in the names of
 the fields. Every error is a problem document (RFC 9457) with a stable `code`, a `pointer` to the field and a
 `hint`.
+
+A service beyond its own machine demands an API key: `Authorization: Bearer mid_...`. Each operation names the
+scope that the key must have; `GET /me` tells what yours has.
 """
 TAGS = [
     {"name": "identify", "description": "From sample flights to an equivalent model."},
@@ -32,6 +55,8 @@ TAGS = [
     {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
     {"name": "trajectories", "description": "Sample flights as files."},
     {"name": "models", "description": "Identified models."},
+    {"name": "webhooks", "description": "Messages to an address of yours when jobs end."},
+    {"name": "keys", "description": "Who the caller is, and what it may do and use."},
     {"name": "health", "description": "For machines."},
 ]
 
@@ -45,13 +70,49 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             summary="Equivalent models of sweep-morphing aircraft from sample flights",
             description=DESCRIPTION,
             routes=app.routes,
+            webhooks=messages.routes,
             tags=TAGS,
             license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         )
+        _add_outages(document)
+        _add_refusals(document)
         _name_problem_media_type(document)
         _add_upload_schemas(document)
         app.openapi_schema = document
     return app.openapi_schema
+
+
+def _add_outages(document: dict[str, Any]) -> None:
+    """Whatever asks the database can meet one that is away or full."""
+    entry = documented(DatabaseAway, StorageFull)[DatabaseAway.status]
+    response = {
+        "description": entry["description"],
+        "headers": {
+            "Retry-After": {"description": "When to repeat the request, s.", "schema": {"type": "string"}}
+        },
+        "content": {"application/json": {"schema": {"$ref": PROBLEM}}},
+    }
+    for path, operations in document["paths"].items():
+        if path not in WITHOUT_DATABASE:
+            for operation in operations.values():
+                known = operation["responses"].setdefault(str(DatabaseAway.status), dict(response))
+                if known["description"] != response["description"]:  # the route has a reason of its own
+                    known["description"] += f"; {response['description']}"
+                    known["headers"] = response["headers"]
+
+
+def _add_refusals(document: dict[str, Any]) -> None:
+    """Document what the gate answers before a route is reached: the same for all of them."""
+    strangers = documented(CrossSiteRequest, WrongHost)
+    callers = documented(Unauthorized, MissingScope, CrossSiteRequest, WrongHost, TooManyRefusals)
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, told in (callers if "security" in operation else strangers).items():
+                known = operation["responses"].setdefault(str(status), {"description": ""})
+                known.setdefault("content", PROBLEM_CONTENT)
+                known.setdefault("headers", REFUSAL_HEADERS[status])
+                texts = (known["description"], told["description"])
+                known["description"] = "; ".join(dict.fromkeys(filter(None, texts)))
 
 
 def _name_problem_media_type(document: dict[str, Any]) -> None:

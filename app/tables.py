@@ -197,6 +197,7 @@ trajectories = Table(
     Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Index("ix_trajectories_owner_id", "owner", "id"),
     Index("ix_trajectories_key_id", "key_id"),
+    Index("ix_trajectories_created_at", "created_at"),
 )
 
 models = Table(

@@ -77,16 +77,17 @@ def find_server() -> Path:
     )
 
 
-def prepare_broker(data_dir: Path) -> Broker:
+def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> Broker:
     """Choose a port and a password, and write down how to run the broker.
 
     Parameters
     ----------
     data_dir : the service's data directory; the queue's journal lives in its folder ``broker``.
+    preferred_port : taken when it is free.
     """
     home = data_dir / "broker"
     home.mkdir(parents=True, exist_ok=True)
-    port = free_port(PREFERRED_PORT)
+    port = free_port(preferred_port)
     password = secrets.token_urlsafe(24)
     settings = {
         "bind": LOOPBACK,

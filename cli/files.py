@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,9 @@ from typing import Any
 from cli.exits import CommandError, Exit
 
 STANDARD_OUTPUT = Path("-")
+PLAIN_NAME = re.compile(
+    r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}"
+)  # no folder, no hidden file, no control character
 
 
 def read_json(path: Path) -> Any:
@@ -67,12 +71,24 @@ def write_bytes(content: bytes, path: Path) -> None:
 
 
 def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
-    """Write plots and curves into a folder and give their paths."""
+    """Write plots and curves into a folder and give their paths.
+
+    Raises
+    ------
+    CommandError : a name is not a plain file name, or something cannot be written. Names may come from a
+        service, which is not trusted to stay in the folder.
+    """
+    for name in files:
+        if not PLAIN_NAME.fullmatch(name):
+            raise CommandError(
+                f"the service sent a file with the name {name[:80]!r}, which is not a plain file name",
+                hint="nothing was written; do not trust this service",
+            )
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     saved = []
     for name, content in files.items():
-        target = folder / Path(name).name  # a name from a service must not climb out
+        target = folder / name
         write_bytes(content, target)
         saved.append(target)
     return saved

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import typer
 
+from cli.commands.audit import audit
 from cli.commands.bench import bench
 from cli.commands.database import database
+from cli.commands.doctor import doctor, ready
 from cli.commands.identify import identify
 from cli.commands.jobs import jobs
+from cli.commands.keys import keys
 from cli.commands.optimize import optimize
 from cli.commands.options import EXIT_CODES
 from cli.commands.paper import paper
@@ -27,9 +30,11 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-for command in (serve, identify, study, simulate, optimize, paper, bench):
+for command in (serve, doctor, ready, identify, study, simulate, optimize, paper, bench):
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(jobs, name="jobs")
+app.add_typer(keys, name="keys")
+app.add_typer(audit, name="audit")
 app.add_typer(database, name="db")
 
 

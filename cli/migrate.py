@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from cli.exits import CommandError, Exit
 
@@ -34,8 +35,8 @@ def downgrade_to(url: str, revision: str) -> None:
         downgrade(url, revision)
 
 
-def configured_url() -> str:
-    """Give the database that the environment names.
+def configured_url(data_dir: Path | None = None) -> str:
+    """Give the database that the environment names, or the file in `data_dir`.
 
     Raises
     ------
@@ -44,7 +45,7 @@ def configured_url() -> str:
     from app.settings import UnsafeSettings, load_settings
 
     try:
-        return load_settings().database_url
+        return load_settings(**({} if data_dir is None else {"data_dir": data_dir})).database_url
     except UnsafeSettings as error:
         raise CommandError(str(error), code=Exit.USAGE) from None
 

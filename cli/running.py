@@ -42,7 +42,7 @@ class Answer:
     error: Document | None = None
 
 
-def run(request: Request, url: str | None) -> Answer:
+def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
     """Run the operation, at the service of this address or in this process; print what went wrong on the way.
 
     Raises
@@ -54,7 +54,7 @@ def run(request: Request, url: str | None) -> Answer:
             if url is None:
                 answer = run_here(request, bar)
             else:
-                with Service(url) as service:
+                with Service(url, api_key) as service:
                     answer = run_there(request, service, bar)
     except CommandError as error:
         error.given_by = error.given_by or request.option_at(error.pointer)

@@ -1,4 +1,4 @@
-"""``morphid serve``: broker, API and worker as three supervised children of one command."""
+"""``morphid serve``: broker, API, worker and beat as supervised children of one command."""
 
 from __future__ import annotations
 
@@ -108,6 +108,7 @@ def _start_children(
     api = supervisor.start(_api(environment, options.host, port))
     # the worker loads while the API does; a wake-up that comes early waits in the queue
     supervisor.start(_worker(environment, options.workers))
+    supervisor.start(_beat(environment))
     _expect(supervisor, api, lambda: _alive(options.host, port), API_WITHIN_S)
 
 
@@ -129,21 +130,28 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
 
 def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
     command = [
-        *(sys.executable, "-m", "uvicorn", "app.main:create_app", "--factory"),
+        *(sys.executable, "-m", "app.http.server"),
         *("--host", host, "--port", str(port)),
-        *("--no-access-log", "--timeout-graceful-shutdown", "5"),
     ]
     return ChildSpec(name="api", command=command, environment=environment)
 
 
 def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
     command = [
-        *(sys.executable, "-m", "celery", "--app", "worker.celery_app:app", "worker"),
+        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "worker"),
         *("--queues", "morphid", "--concurrency", str(workers), "--prefetch-multiplier", "1"),
-        *("--loglevel", "INFO", "--without-gossip", "--without-mingle"),
-        *("--beat", "--scheduler", "celery.beat:Scheduler"),  # nothing on disk that a kill could spoil
+        *("--without-gossip", "--without-mingle"),
     ]
     return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
+
+
+def _beat(environment: dict[str, str]) -> ChildSpec:
+    # not inside the worker: nobody would notice its death, and no lost job would be found any more
+    command = [
+        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "beat"),
+        *("--scheduler", "celery.beat:Scheduler", "--pidfile", ""),  # nothing on disk that a kill could spoil
+    ]
+    return ChildSpec(name="beat", command=command, environment=environment)
 
 
 def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, str]:

@@ -24,12 +24,20 @@ class Service:
     Parameters
     ----------
     url : base address, such as ``http://127.0.0.1:8000``.
+    api_key : for services that demand one.
     transport : handed in by tests.
+
+    Raises
+    ------
+    CommandError : the key cannot stand in a header.
     """
 
-    def __init__(self, url: str, *, transport: httpx.BaseTransport | None = None) -> None:
+    def __init__(
+        self, url: str, api_key: str | None = None, *, transport: httpx.BaseTransport | None = None
+    ) -> None:
         self.url = url.rstrip("/")
-        self._http = httpx.Client(base_url=self.url, timeout=30.0, transport=transport)
+        headers = {"Authorization": f"Bearer {_sendable(api_key)}"} if api_key else {}
+        self._http = httpx.Client(base_url=self.url, timeout=30.0, headers=headers, transport=transport)
 
     def __enter__(self) -> Self:
         return self
@@ -107,6 +115,16 @@ class Service:
         if answer.is_error:
             raise _refusal(answer)
         return answer
+
+
+def _sendable(api_key: str) -> str:
+    """Give the key without the space around it that copying brings."""
+    key = api_key.strip()
+    if not key.isascii() or not key.isprintable() or " " in key:
+        raise CommandError(
+            "the API key is no key", code=Exit.USAGE, hint="keys look like mid_4k7m2x9q_...: copy it whole"
+        )
+    return key
 
 
 def _refusal(answer: httpx.Response) -> CommandError:

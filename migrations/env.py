@@ -27,6 +27,9 @@ def run() -> None:
     try:
         with engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"}).begin() as connection:
             if connection.dialect.name == "postgresql":
+                # who waits for another's migration, or rewrites a large table, may take longer than a request
+                connection.execute(text("SET LOCAL statement_timeout = 0"))
+                connection.execute(text("SET LOCAL lock_timeout = 0"))
                 connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": MIGRATION_LOCK})
             context.configure(
                 connection=connection,

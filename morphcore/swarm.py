@@ -57,10 +57,11 @@ class SwarmState:
 
 
 def first_swarm(settings: SwarmSettings, guess: Array, seed: int) -> SwarmState:
-    """A swarm spread evenly over the unit cube, the physical guess (d,) its first particle."""
+    """A swarm spread evenly over the unit cube, its first particles the guess (d,) or guesses (k, d)."""
     generator = np.random.RandomState(seed % 2**32)  # the kind of generator that pyswarms draws from
-    position = generator.uniform(size=(settings.particles, guess.size))
-    position[0] = guess
+    guesses = np.atleast_2d(guess)[: settings.particles]
+    position = generator.uniform(size=(settings.particles, guesses.shape[1]))
+    position[: guesses.shape[0]] = guesses
     velocity = generator.uniform(-0.1, 0.1, size=position.shape)
     unknown = np.full(settings.particles, np.inf)
     return SwarmState(

@@ -7,10 +7,8 @@ import time
 from collections.abc import Callable
 from enum import Enum
 
-from sqlalchemy import Connection
-from sqlalchemy.exc import OperationalError
-
 from app.database import Database
+from app.jobs.chunks import Flown, flown, hand_out
 from app.jobs.records import Claim, JobStatus
 from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
 from worker.lease import StopReason, Vigil
@@ -19,20 +17,23 @@ from worker.operations import (
     Begin,
     Document,
     Outcome,
+    SpreadWork,
     Step,
     UnknownOperation,
     Work,
     WorkInterrupted,
     WorkRefused,
 )
-from worker.progress import Pace
+from worker.patience import Patient, StaleClaim, StorageFull
+from worker.progress import Pace, rated
+from worker.telling import Phases
+from worker.works import Works
 
 log = logging.getLogger(__name__)
 
 SAVE_EVERY_S = (
     0.5  # a generation may take milliseconds; two writes a second serve the user's eye and the disk
 )
-PERSIST_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # a database that restarts is back within these
 
 
 class Ending(Enum):
@@ -45,6 +46,8 @@ class Ending(Enum):
     EXPIRED = "expired"
     RELEASED = "released"  # back in the queue with its checkpoint
     ABANDONED = "abandoned"  # another claim holds the job
+    HANDED_OUT = "handed out"  # its next generation lies in chunks that any worker may fly
+    CHUNK_STORED = "chunk stored"
 
 
 ENDINGS = {
@@ -55,11 +58,7 @@ ENDINGS = {
 }
 
 
-class StaleClaim(Exception):
-    """The store refused a write: the job is someone else's now."""
-
-
-class Attempt:
+class Attempt(Patient):
     """The work on one claimed job.
 
     Parameters
@@ -68,8 +67,13 @@ class Attempt:
     claim : the right to write to the job.
     vigil : keeps the claim alive and knows when to stop.
     kernels : the compiled kernels of this process.
+    works : the work of the jobs that this process saw last.
     clock : seconds that only rise.
     sleep : waits a number of seconds.
+
+    Attributes
+    ----------
+    handed_out : number of chunks that the job was given up for; publish as many messages.
     """
 
     def __init__(
@@ -78,20 +82,22 @@ class Attempt:
         claim: Claim,
         vigil: Vigil,
         kernels: Kernels,
+        works: Works | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._database = database
+        super().__init__(database, vigil, claim.job_id, clock=clock, sleep=sleep)
         self._claim = claim
-        self._vigil = vigil
         self._kernels = kernels
-        self._clock = clock
-        self._sleep = sleep
+        self._works = works or Works()
+        self.handed_out = 0
+        self._chunks = 0
         self._pace = Pace(clock)
+        self._phases = Phases(clock=clock)
         self._work: Work | None = None
         self._checkpoint: bytes | None = None
-        self._unsaved: Step | None = None
+        self._unsaved: Document | None = None  # progress of the last step
         self._saved_at = float("-inf")
 
     def run(self, find_operation: Callable[[str], Begin]) -> Ending:
@@ -100,52 +106,111 @@ class Attempt:
             return self._run(find_operation)
         except StaleClaim:
             return Ending.ABANDONED
-        except WorkRefused as error:
-            return self._fail(_error(error.code, error.detail, hint=error.hint, pointer=error.pointer))
-        except MemoryError:
-            hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
-            return self._fail(_error("out_of_memory", "the job needs more memory than there is", hint=hint))
-        except UnknownOperation as error:
-            return self._fail(_error("unknown_operation", str(error), hint="update the workers"))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
+            return self._fail(told_error(error, self._claim.job_id))
+        finally:
+            self._phases.close()
+
+    def give_up(self, find_operation: Callable[[str], Begin], error: Document) -> Ending:
+        """End the job as failed: a chunk of it has shown that it cannot be done."""
+        try:
+            self._checkpoint, _ = self._patiently(self._load)
+            self._begin(find_operation)
+        except StaleClaim:
+            return Ending.ABANDONED
         except Exception:
-            log.exception("job %s: unforeseen", self._claim.job_id)
-            hint = f"the worker's log tells more about {self._claim.job_id}; please report it"
-            return self._fail(_error("internal_error", "the worker met an unforeseen error", hint=hint))
+            log.exception("job %s: no result at its last checkpoint", self._job_id)
+        return self._fail(error)
 
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
-        with self._database.read() as connection:
-            request = load_request(connection, self._claim.job_id)
-            self._checkpoint = load_checkpoint(connection, self._claim)
+        self._checkpoint, flown = self._patiently(self._load)
         if not self._prepare_kernels():
             return self._stopped()
-        self._work = find_operation(self._claim.operation)(request, self._kernels.threads)
+        work = self._begin(find_operation)
+        if self._chunks:
+            self._vigil.look()  # it may have been taken over to end
+            if self._vigil.should_stop():
+                return self._stopped()
+            self._hear(flown)
         try:
-            for step in self._work.steps(self._checkpoint, self._vigil.should_stop):
+            if self._hand_out():
+                return Ending.HANDED_OUT
+            for step in work.steps(self._checkpoint, self._vigil.should_stop):
                 self._note(step)
+                if self._hand_out():
+                    return Ending.HANDED_OUT
         except WorkInterrupted:
+            self._vigil.heed()
             return self._stopped()
         if self._checkpoint is None:
             raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
         self._save_unsaved()
-        return self._finish(JobStatus.SUCCEEDED, outcome=self._work.outcome(self._checkpoint))
+        outcome = work.outcome(self._checkpoint)
+        self._vigil.heed()
+        return self._finish(JobStatus.SUCCEEDED, outcome=outcome)
+
+    def _load(self) -> tuple[bytes | None, Flown | None]:
+        with self._database.read() as connection:
+            return load_checkpoint(connection, self._claim), flown(connection, self._claim)
+
+    def _load_request(self) -> Document:
+        with self._database.read() as connection:
+            return load_request(connection, self._job_id)
+
+    def _begin(self, find_operation: Callable[[str], Begin]) -> Work:
+        prepared = self._works.prepared(
+            self._job_id,
+            lambda: find_operation(self._claim.operation),
+            lambda: self._patiently(self._load_request),
+            self._kernels.threads,
+        )
+        self._work, self._chunks = prepared.work, prepared.chunks
+        return prepared.work
 
     def _prepare_kernels(self) -> bool:
         if self._kernels.ready:
             return True
-        message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
-        self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
+        if self._checkpoint is None:  # what has come further shows how far
+            message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
+            self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
         return self._kernels.wait(self._vigil.should_stop)
+
+    # a generation over several workers
+
+    def _hand_out(self) -> bool:
+        """Give the job up for chunks if its next step is made of parts that others can fly."""
+        if not self._chunks or self._checkpoint is None or not isinstance(self._work, SpreadWork):
+            return False
+        tasks = self._work.tasks(self._checkpoint, self._chunks)
+        if tasks is None or len(tasks) < 2:  # one part is flown as well here
+            return False
+        checkpoint, progress = self._checkpoint, self._unsaved
+        self._persist(lambda connection: hand_out(connection, self._claim, tasks, checkpoint, progress))
+        self._unsaved, self.handed_out = None, len(tasks)
+        return True
+
+    def _hear(self, flown: Flown | None) -> None:
+        """Take the step that the outcomes of all chunks make; without them the chunks are handed out anew."""
+        if flown is None or self._checkpoint is None or not isinstance(self._work, SpreadWork):
+            return
+        step = self._work.told(self._checkpoint, flown.outcomes, flown.elapsed_s)
+        before = flown.before
+        self._checkpoint = step.checkpoint
+        self._unsaved = rated(
+            step, flown.elapsed_s, before.get("flights"), float(before.get("fraction") or 0.0)
+        )
 
     # progress
 
     def _note(self, step: Step) -> None:
-        self._checkpoint, self._unsaved = step.checkpoint, step
+        self._phases.note(step.progress.get("phase"))
+        self._checkpoint, self._unsaved = step.checkpoint, self._pace.progress(step)
         if self._clock() - self._saved_at >= SAVE_EVERY_S:
             self._save_unsaved()
 
     def _save_unsaved(self) -> None:
         if self._unsaved is not None:
-            self._save(self._pace.progress(self._unsaved), self._unsaved.checkpoint)
+            self._save(self._unsaved, self._checkpoint)
             self._unsaved, self._saved_at = None, self._clock()
 
     def _save(self, progress: Document, checkpoint: bytes | None) -> None:
@@ -172,10 +237,19 @@ class Attempt:
 
     def _fail(self, error: Document) -> Ending:
         log.warning("job %s failed: %s", self._claim.job_id, error)
+        self._vigil.heed()
+        best = self._best_so_far()
+        # as much of the best as there is room for: with its files, without, only why the job failed
+        choices = [] if best is None else [best, Outcome(best.document)]
         try:
-            return self._finish(JobStatus.FAILED, outcome=self._best_so_far(), error=error)
-        except StaleClaim:
-            return Ending.ABANDONED
+            for outcome in choices:
+                try:
+                    return self._finish(JobStatus.FAILED, outcome=outcome, error=error)
+                except StorageFull:
+                    log.warning("job %s: no room for what it leaves", self._claim.job_id)
+            return self._finish(JobStatus.FAILED, error=error)
+        except (StaleClaim, StorageFull):
+            return Ending.ABANDONED  # without room for a sentence the reaper tries it later
 
     def _best_so_far(self) -> Outcome | None:
         if self._work is None or self._checkpoint is None:
@@ -202,26 +276,22 @@ class Attempt:
         )
         return ENDINGS[status]
 
-    def _persist(self, write: Callable[[Connection], bool]) -> None:
-        """Write in a transaction of its own; wait out a database that restarts.
 
-        Raises
-        ------
-        StaleClaim : the store refused the write.
-        """
-        for pause_s in (*PERSIST_PAUSES_S, None):
-            try:
-                with self._database.write() as connection:
-                    accepted = write(connection)
-            except OperationalError:
-                if pause_s is None:
-                    raise
-                log.warning("job %s: the job store does not answer, trying again", self._claim.job_id)
-                self._sleep(pause_s)
-            else:
-                if not accepted:
-                    raise StaleClaim
-                return
+def told_error(error: Exception, job_id: str) -> Document:
+    """Say to the user what went wrong."""
+    if isinstance(error, WorkRefused):
+        return _error(error.code, error.detail, hint=error.hint, pointer=error.pointer)
+    if isinstance(error, MemoryError):
+        hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
+        return _error("out_of_memory", "the job needs more memory than there is", hint=hint)
+    if isinstance(error, StorageFull):
+        hint = "make room (delete finished jobs, or grow the disk) and submit the job again"
+        return _error("storage_full", "the job store has no room for what the job wrote", hint=hint)
+    if isinstance(error, UnknownOperation):
+        return _error("unknown_operation", str(error), hint="update the workers")
+    log.error("job %s: unforeseen", job_id, exc_info=error)
+    hint = f"the worker's log tells more about {job_id}; please report it"
+    return _error("internal_error", "the worker met an unforeseen error", hint=hint)
 
 
 def _error(code: str, detail: str, *, hint: str = "", pointer: str = "") -> Document:

@@ -11,19 +11,27 @@ from typing import Any
 
 from celery import Celery
 from celery.signals import (
+    setup_logging,
     worker_init,
     worker_process_init,
+    worker_process_shutdown,
     worker_ready,
     worker_shutdown,
     worker_shutting_down,
 )
 
+from app.observability.logs import configure_logging
+from app.observability.tracing import stop_tracing
 from app.settings import Settings, load_settings
 from worker import numerics, shutdown
+from worker.presence import Presence
 
 QUEUE = "morphid"
 RUN_JOB = "morphid.run_job"
 REAP = "morphid.reap"
+REAP_EXPIRES_S = (
+    24 * 3600.0
+)  # by the worker's clock, which may be hours off: short lives would never reach it
 REAP_EVERY_S = 10.0  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
 
 
@@ -39,7 +47,7 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
         worker_concurrency=int(os.environ.get("MORPHID_WORKERS", "1")),
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
-        worker_enable_remote_control=True,  # `celery inspect ping` is the container's health check
+        worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
         task_serializer="json",
@@ -48,10 +56,11 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
             "reap": {
                 "task": REAP,
                 "schedule": reap_every_s,
-                "options": {"expires": reap_every_s, "queue": QUEUE},
+                "options": {"expires": REAP_EXPIRES_S, "queue": QUEUE},
             }
         },
     )
+    celery.steps["consumer"].add(Presence)
     return celery
 
 
@@ -60,7 +69,13 @@ def threads_per_job() -> int:
     return numerics.share_cores(int(os.environ.get("MORPHID_WORKERS", "1")))
 
 
-app = make_app(load_settings(), reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+settings = load_settings()
+app = make_app(settings, reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+
+
+@setup_logging.connect
+def _log_in_our_way(**_: Any) -> None:
+    configure_logging(settings.log_format, settings.log_level)
 
 
 @worker_init.connect
@@ -76,10 +91,15 @@ def _in_each_child(**_: Any) -> None:
     tasks.enter_process()
 
 
+@worker_process_shutdown.connect
+def _at_the_end_of_each_child(**_: Any) -> None:
+    stop_tracing()
+
+
 @worker_ready.connect
 def _look_at_the_table(**_: Any) -> None:
     # hints sent while no worker was there may be lost: publish every queued row again
-    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=60)
+    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=REAP_EXPIRES_S)
 
 
 @worker_shutting_down.connect

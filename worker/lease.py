@@ -8,6 +8,8 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from contextvars import copy_context
 from enum import Enum
 from types import TracebackType
 from typing import Self
@@ -15,9 +17,9 @@ from typing import Self
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
-from app.errors import JobNotFound
-from app.jobs.records import Claim, JobStatus, LeaseState
-from app.jobs.store import get_job, renew_lease
+from app.jobs.chunks import ChunkClaim, look_at_chunk, renew_chunk
+from app.jobs.records import Claim, LeaseState
+from app.jobs.store import look_at_lease, renew_lease
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +63,7 @@ class Vigil:
     def __init__(
         self,
         database: Database,
-        claim: Claim,
+        claim: Claim | ChunkClaim,
         *,
         lease_s: float,
         heartbeat_s: float,
@@ -78,9 +80,15 @@ class Vigil:
         self._look_every_s = min(look_every_s, heartbeat_s)
         self._on_stuck = on_stuck
         self._stuck_after_s = stuck_after_s
+        self._heeded = False
         self._over = threading.Event()
         self._reason: StopReason | None = None
-        self._thread = threading.Thread(target=self._watch, name=f"vigil-{claim.job_id}", daemon=True)
+        self._thread = threading.Thread(
+            target=copy_context().run,  # its lines say whose job it watches
+            args=(self._watch,),
+            name=f"vigil-{claim.job_id}",
+            daemon=True,
+        )
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -105,27 +113,35 @@ class Vigil:
         """Note that a write was refused: the claim is stale."""
         self._reason = StopReason.LOST
 
+    def heed(self) -> None:
+        """Note that the work itself has stopped: its end is written as soon as the store lets it."""
+        self._heeded = True
+
+    def look(self) -> None:
+        """Look at once, in the caller's thread; what cannot be looked at is looked at later."""
+        with suppress(SQLAlchemyError):
+            self._judge(self._look())
+
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
         asked_at: float | None = None
         while not self._over.wait(self._look_every_s):
             now = time.monotonic()
             try:
-                if now - renewed_at >= self._heartbeat_s or self._changed():
-                    state = self._renew()
+                if now - renewed_at >= self._heartbeat_s:
+                    self._judge(self._renew())
                     renewed_at = now
-                    self._judge(state)
-            except JobNotFound:
-                self.lose()
-            except SQLAlchemyError:
-                log.warning("the job store does not answer; lease of %s not renewed", self._claim.job_id)
-                if now - renewed_at > self._lease_s:
-                    self.lose()
+                else:
+                    self._judge(self._look())
+            except SQLAlchemyError as error:
+                # The claim is not lost by that: nobody can take the job while the job store is away for all,
+                # and if it is away only for us, the fence keeps our writes out.
+                log.warning("job %s: lease not looked after: %s", self._claim.job_id, type(error).__name__)
             if self._reason is None and self._shutting_down():
                 self._reason = StopReason.SHUTDOWN
             if self._reason is StopReason.LOST:
                 break
-            if self._reason is not None:
+            if self._reason is not None and not self._heeded:
                 asked_at = now if asked_at is None else asked_at
                 if now - asked_at > self._stuck_after_s:
                     break
@@ -134,15 +150,16 @@ class Vigil:
             log.critical("job %s does not heed its stop signal; ending this process", self._claim.job_id)
             self._on_stuck()
 
-    def _changed(self) -> bool:
-        """Whether the row says anything but "running" (a read; the heartbeat then finds out what)."""
+    def _look(self) -> LeaseState:
         with self._database.read() as connection:
-            job = get_job(connection, self._claim.owner, self._claim.job_id)
-        overdue = job.deadline_at is not None and job.deadline_at.timestamp() < time.time()
-        return self._reason is None and (job.status is not JobStatus.RUNNING or overdue)
+            if isinstance(self._claim, ChunkClaim):
+                return look_at_chunk(connection, self._claim)
+            return look_at_lease(connection, self._claim)
 
     def _renew(self) -> LeaseState:
         with self._database.write() as connection:
+            if isinstance(self._claim, ChunkClaim):
+                return renew_chunk(connection, self._claim, self._lease_s)
             return renew_lease(connection, self._claim, self._lease_s)
 
     def _judge(self, state: LeaseState) -> None:

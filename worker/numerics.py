@@ -52,8 +52,6 @@ def prepare_environment(threads: int) -> None:
     if "numba" in sys.modules:
         return  # its threads may run already; numba refuses to change their number
     os.environ["NUMBA_NUM_THREADS"] = str(threads)
-    # plain threads: OpenMP dies in forked children, TBB may be missing
-    os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
     # the kernels spread blocks over threads themselves; a second pool under them would fight for the cores
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")

@@ -33,9 +33,22 @@ class Pace:
         if self._first is None:
             self._first = (now, flights, fraction)
         begun_at, flights_before, fraction_before = self._first
-        elapsed_s, done = now - begun_at, fraction - fraction_before
-        return {
-            **step.progress,
-            "flights_per_s": (flights - flights_before) / elapsed_s if counted and elapsed_s > 0.0 else None,
-            "eta_s": elapsed_s * (1.0 - fraction) / done if done > 0.0 else None,
-        }
+        return rated(step, now - begun_at, flights_before if counted else None, fraction_before)
+
+
+def rated(step: Step, elapsed_s: float, flights_before: float | None, fraction_before: float) -> Document:
+    """Give a step's progress with its rates since an earlier moment.
+
+    Parameters
+    ----------
+    elapsed_s : since then.
+    flights_before : flown by then, None for work that counts no flights.
+    fraction_before : done by then, 0..1.
+    """
+    flights, fraction = float(step.progress.get("flights", 0)), float(step.progress.get("fraction", 0.0))
+    timed, done = elapsed_s > 0.0 and flights_before is not None, fraction - fraction_before
+    return {
+        **step.progress,
+        "flights_per_s": (flights - (flights_before or 0.0)) / elapsed_s if timed else None,
+        "eta_s": elapsed_s * (1.0 - fraction) / done if done > 0.0 else None,
+    }

@@ -5,14 +5,26 @@ from __future__ import annotations
 import logging
 import os
 import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from kombu.exceptions import OperationalError
+from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
+from app.database_errors import trouble_of
 from app.jobs.reaper import reap
+from app.jobs.records import ReapReport
+from app.jobs.turns import next_unit
+from app.observability.counters import count
+from app.observability.job_counts import REAP_ROUNDS
+from app.observability.tracing import forget_tracing, start_tracing
 from app.settings import load_settings
 from worker import numerics, shutdown
 from worker.attempt import Ending
 from worker.celery_app import QUEUE, REAP, RUN_JOB, app, threads_per_job
-from worker.runner import Runner
+from worker.runner import CHUNK_LEASE_S, Runner
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +39,7 @@ class Process:
 
     def __init__(self, threads: int) -> None:
         self.settings = load_settings()
+        self.reaped_at = float("-inf")
         self.database = Database(self.settings.database_url)
         self.kernels = numerics.Kernels(numerics.warm_up_library, threads)
         self.runner = Runner(
@@ -36,7 +49,13 @@ class Process:
             lease_s=self.settings.lease_s,
             heartbeat_s=self.settings.heartbeat_s,
             shutting_down=shutdown.announced,
+            publish=publish_chunks,
+            chunk_lease_s=min(self.settings.lease_s, CHUNK_LEASE_S),
         )
+
+    def reap_is_due(self) -> bool:
+        """Whether this process has not reaped just now."""
+        return bool(time.monotonic() - self.reaped_at > app.conf.beat_schedule["reap"]["schedule"] / 2.0)
 
 
 _processes: dict[int, Process] = {}  # by process id: a forked child never uses its parent's connections
@@ -46,9 +65,23 @@ def enter_process() -> Process:
     """Give this process its database and kernels, made on first use."""
     if os.getpid() not in _processes:
         _processes.clear()
+        forget_tracing()
         process = _processes[os.getpid()] = Process(threads_per_job())
+        start_tracing("morphid-worker", process.settings.traces)
         process.kernels.start()
     return _processes[os.getpid()]
+
+
+@contextmanager
+def _unless_away() -> Iterator[None]:
+    """Let a hint go when the job store is away: the reaper repeats it when the store is back."""
+    try:
+        yield
+    except SQLAlchemyError as error:
+        trouble = trouble_of(error)
+        if trouble is None:
+            raise
+        log.warning("the job store is %s; the reaper will come back to it", trouble.value)
 
 
 def publish(job_id: str) -> None:
@@ -56,13 +89,41 @@ def publish(job_id: str) -> None:
     app.send_task(RUN_JOB, args=[job_id], queue=QUEUE)
 
 
+def publish_chunks(job_id: str, count: int) -> None:
+    """Send a hint for each chunk of a job that was handed out; a broker that is away loses none of them."""
+    try:
+        for _ in range(count):
+            publish(job_id)
+    except OperationalError as error:
+        log.warning("job %s: chunks not announced (%s); the reaper will repeat it", job_id, error)
+
+
 @app.task(name=RUN_JOB)
 def run_job(job_id: str) -> None:
     """Run the job that should run next (a hint names the job that caused it)."""
     log.debug("woken for job %s", job_id)
-    ending, released_id = enter_process().runner.run_next()
+    ending, released_id = Ending.NOTHING_QUEUED, None
+    with _unless_away():
+        ending, released_id = enter_process().runner.run_next()
     if ending is Ending.RELEASED and released_id is not None:
         publish(released_id)
+    elif ending is not Ending.NOTHING_QUEUED:
+        with _unless_away():
+            pass_on()
+
+
+def pass_on() -> None:
+    """Wake somebody for the next queued job unless a message is on its way: a lost one costs nothing."""
+    with enter_process().database.read() as connection:
+        unit = next_unit(connection)
+    if unit is not None and messages_waiting() == 0:
+        publish(unit.job_id)
+
+
+def messages_waiting() -> int:
+    """Wake-up messages that no worker has taken yet."""
+    with app.connection_for_read() as connection:
+        return int(connection.default_channel.queue_declare(queue=QUEUE).message_count)
 
 
 @app.task(name=REAP)
@@ -70,9 +131,14 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
     """Give back what dead workers held, end what ran out of time, repeat lost hints."""
     process = enter_process()
     if republish_after_s is None:
+        if not process.reap_is_due():
+            return  # messages pile up while every worker is busy: the first of them did the work
         republish_after_s = process.settings.republish_after_s
-    with process.database.write() as connection:
+    report = ReapReport()
+    with _unless_away(), process.database.write() as connection:
         report = reap(connection, republish_after_s=republish_after_s)
+        count(connection, REAP_ROUNDS)
+    process.reaped_at = time.monotonic()
     for kind in ("requeued", "failed", "cancelled", "expired"):
         for job_id in getattr(report, kind):
             log.warning("reaper: job %s %s", job_id, kind)

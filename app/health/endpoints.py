@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
-from app.health import repository, service
+from app.errors import InvalidRequest
+from app.health.metrics import MEDIA_TYPE
 from app.health.schemas import Liveness, Readiness
-from app.http.context import ServiceDep
+from app.health.service import Health
+from app.http.context import demands
+from app.http.problems import documented
+from app.keys.records import Scope
 from app.version import VERSION
 
 router = APIRouter(tags=["health"])
+
+
+async def current_health(request: Request) -> Health:
+    """Return what the process that serves `request` tells of itself."""
+    health: Health = request.app.state.health
+    return health
+
+
+HealthDep = Annotated[Health, Depends(current_health)]
+Strict = Annotated[bool, Query(description="Answer 503 also when the service is `degraded`.")]
 
 
 @router.get("/livez", operation_id="get_liveness", summary="Is the process alive?")
@@ -23,12 +39,16 @@ async def livez() -> Liveness:
     "/readyz",
     operation_id="get_readiness",
     summary="Can requests be served?",
-    responses={503: {"model": Readiness, "description": "Not ready."}},
+    responses={**documented(InvalidRequest), 503: {"model": Readiness, "description": "Not ready."}},
 )
-async def readyz(app: ServiceDep, response: Response) -> Readiness:
-    """Tell whether the database answers; the broker's state is told beside it."""
-    state = await service.readiness(app.database, app.settings.broker_url)
-    if state.status != "ready":
+async def readyz(health: HealthDep, response: Response, *, strict: Strict = False) -> Readiness:
+    """Tell whether database, broker and workers do their part.
+
+    A load balancer asks without `strict`: while broker or workers are away this process still takes jobs and
+    keeps them. Who watches over the whole service asks with it.
+    """
+    state = await health.readiness()
+    if state.status == "not_ready" or (strict and state.status == "degraded"):
         response.status_code = 503
     return state
 
@@ -38,9 +58,8 @@ async def readyz(app: ServiceDep, response: Response) -> Readiness:
     operation_id="get_metrics",
     summary="Metrics for Prometheus",
     response_class=PlainTextResponse,
+    dependencies=[demands(Scope.METRICS)],
 )
-def metrics(app: ServiceDep) -> PlainTextResponse:
-    """Jobs by state and the age of the queue."""
-    with app.database.read() as session:
-        counts = repository.job_counts(session)
-    return PlainTextResponse(service.metrics_text(counts), media_type="text/plain; version=0.0.4")
+def metrics(health: HealthDep) -> Response:
+    """Jobs, queue, workers and counters as the rows tell them; requests as this process has served them."""
+    return Response(health.metrics.text(), media_type=MEDIA_TYPE)

@@ -14,12 +14,27 @@ class Liveness(BaseModel):
     version: str
 
 
-class Readiness(BaseModel):
-    """Whether the service can take requests, part by part."""
+class WorkerState(BaseModel):
+    """The workers, by their signs of life: each comes from the loop that takes messages from the broker."""
 
-    status: Literal["ready", "not_ready"]
-    database: str = Field(examples=["ok"])
+    status: Literal["ok", "none", "stalled", "unknown"] = Field(
+        description="`stalled`: there are workers, and none of them takes messages; `unknown`: no database."
+    )
+    alive: int = Field(description="Workers that take messages.")
+    stalled: int = Field(description="Workers that have ceased to, without saying goodbye.")
+    slots: int = Field(description="Jobs that can run at once.")
+    busy: int = Field(description="Slots in use.")
+
+
+class Readiness(BaseModel):
+    """Whether the service can do its work, part by part."""
+
+    status: Literal["ready", "degraded", "not_ready"] = Field(
+        description="`degraded`: jobs are taken and kept, but none starts before broker and workers are ok."
+    )
+    database: str = Field(examples=["ok"], description="`ok`, `not migrated` or `unreachable (...)`.")
     broker: str = Field(
         examples=["ok"],
-        description="Without a broker jobs are still accepted; they start when the broker is back.",
+        description="Answer to a PING with our password. Without a broker jobs wait until it is back.",
     )
+    workers: WorkerState

@@ -3,58 +3,97 @@
 from __future__ import annotations
 
 import asyncio
-from urllib.parse import urlsplit
+import time
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database, schema_revision
-from app.health.repository import JobCounts
-from app.health.schemas import Readiness
+from app.health.broker import BROKER_GOOD, broker_state
+from app.health.metrics import Metrics
+from app.health.records import Snapshot, WorkerCounts
+from app.health.repository import count_workers, snapshot
+from app.health.schemas import Readiness, WorkerState
+from app.settings import Settings
 from migrations import HEAD
 
-BROKER_TIMEOUT_S = 0.5
-REDIS_PORT = 6379
+FRESH_S = 0.5  # as long an answer about readiness is given again
+NO_WORKERS = WorkerCounts(0, 0, 0, 0)
 
 
-def _database_state(database: Database) -> str:
+def database_state(
+    database: Database, beat_s: float, *, host: str | None = None
+) -> tuple[str, WorkerCounts | None]:
+    """Ask the database: its state, and its workers (those of `host`, of all) when it has an answer."""
     try:
         with database.read() as session:
-            return "ok" if schema_revision(session) == HEAD else "not migrated"
+            if schema_revision(session) != HEAD:
+                return "not migrated", None
+            return "ok", count_workers(session, beat_s, host=host)
     except SQLAlchemyError as error:
-        return f"unreachable ({type(error).__name__})"
+        return f"unreachable ({type(error).__name__})", None
 
 
-async def _broker_state(url: str) -> str:
-    parts = urlsplit(url)
-    if not parts.hostname:
-        return "not a network broker"
-    try:
-        async with asyncio.timeout(BROKER_TIMEOUT_S):
-            _, writer = await asyncio.open_connection(parts.hostname, parts.port or REDIS_PORT)
-    except (OSError, TimeoutError):
-        return "unreachable"
-    writer.close()
-    return "ok"
-
-
-async def readiness(database: Database, broker_url: str) -> Readiness:
-    """Look at the database and the broker."""
-    state, broker = await asyncio.gather(
-        asyncio.to_thread(_database_state, database), _broker_state(broker_url)
+def worker_state(counts: WorkerCounts | None) -> WorkerState:
+    """Judge the workers."""
+    if counts is None:
+        status = "unknown"
+    elif counts.alive:
+        status = "ok"
+    else:
+        status = "stalled" if counts.stalled else "none"
+    found = counts or NO_WORKERS
+    return WorkerState.model_validate(
+        {
+            "status": status,
+            "alive": found.alive,
+            "stalled": found.stalled,
+            "slots": found.slots,
+            "busy": found.busy,
+        }
     )
-    return Readiness(status="ready" if state == "ok" else "not_ready", database=state, broker=broker)
 
 
-def metrics_text(counts: JobCounts) -> str:
-    """Metrics in the text format of Prometheus (version 0.0.4)."""
-    lines = ["# HELP morphid_jobs Jobs by state.", "# TYPE morphid_jobs gauge"]
-    lines += [f'morphid_jobs{{status="{status}"}} {number}' for status, number in counts.by_status.items()]
-    lines += [
-        "# HELP morphid_queue_depth Jobs that wait for a worker.",
-        "# TYPE morphid_queue_depth gauge",
-        f"morphid_queue_depth {counts.by_status['queued']}",
-        "# HELP morphid_oldest_queued_seconds Age of the oldest job that waits.",
-        "# TYPE morphid_oldest_queued_seconds gauge",
-        f"morphid_oldest_queued_seconds {counts.oldest_queued_s:.3f}",
-    ]
-    return "\n".join(lines) + "\n"
+class Health:
+    """What this process tells of itself and of what it depends on.
+
+    Parameters
+    ----------
+    database : Database
+    settings : Settings
+    """
+
+    def __init__(self, database: Database, settings: Settings) -> None:
+        self._database = database
+        self._broker_url = settings.broker_url
+        self._beat_s = settings.worker_seen_every_s
+        self._asking = asyncio.Lock()
+        self._told: Readiness | None = None
+        self._told_at = float("-inf")
+        self.metrics = Metrics(self._look)
+
+    async def readiness(self) -> Readiness:
+        """Look at database, broker and workers; strangers may ask, so many questions are one look.
+
+        Only the database makes the service unable to serve: jobs are rows, kept while the rest is away.
+        """
+        async with self._asking:
+            if self._told is None or time.monotonic() - self._told_at > FRESH_S:
+                self._told = await self._ask()
+                self._told_at = time.monotonic()
+            return self._told
+
+    async def _ask(self) -> Readiness:
+        (database, counts), broker = await asyncio.gather(
+            asyncio.to_thread(database_state, self._database, self._beat_s),
+            asyncio.to_thread(broker_state, self._broker_url),
+        )
+        workers = worker_state(counts)
+        good = broker in BROKER_GOOD and workers.status == "ok"
+        status = "not_ready" if database != "ok" else "ready" if good else "degraded"
+        return Readiness.model_validate(
+            {"status": status, "database": database, "broker": broker, "workers": workers.model_dump()}
+        )
+
+    def _look(self) -> Snapshot:
+        with self._database.read() as session:
+            return snapshot(session, self._beat_s)

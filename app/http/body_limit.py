@@ -1,98 +1,169 @@
-"""A limit on request bodies that counts bytes as they arrive, whatever Content-Length says."""
+"""Limits on request bodies: bytes are counted as they arrive, whatever was announced, and so is time."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import time
+from dataclasses import dataclass
 
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import BodyTooLarge
-from app.http.problems import problem_document
+from app.errors import BodyTooLarge, ServiceBusy, ServiceError, SlowBody
+from app.http.problems import MEDIA_TYPE, problem_document
 
 LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
 
 
+@dataclass(frozen=True, slots=True)
+class BodyLimits:
+    """What a body may take.
+
+    Attributes
+    ----------
+    max_bytes : int
+        Largest body that is let through.
+    grace_s : float
+        Time to send a body of any size.
+    least_rate : float
+        Bytes per second that a larger one must arrive with on top.
+    max_total_bytes : int
+        All bodies together that are being received or read; beyond it requests are told to come again.
+    """
+
+    max_bytes: int
+    grace_s: float = 20.0
+    least_rate: float = 16_384.0
+    max_total_bytes: int = 2**30
+
+
 class BodyLimit:
-    """ASGI middleware: 413 with a problem document as soon as a body is too large.
+    """ASGI middleware: a problem document as soon as a body is too large, too slow, or one too many.
 
     Parameters
     ----------
     app : ASGI application
-    max_bytes : int
-        Largest body that is let through.
+    limits : BodyLimits
     """
 
-    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+    def __init__(self, app: ASGIApp, limits: BodyLimits) -> None:
         self.app = app
-        self.max_bytes = max_bytes
+        self.limits = limits
+        self.total = 0  # bytes of all bodies whose requests are not yet answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        if self._announced(scope) > self.max_bytes:
-            await self._refuse(scope, receive, send)
+        if _announced(scope) > self.limits.max_bytes:
+            await _refuse(_too_large(self.limits), scope, receive, send)
             return
-        counted = 0
-        refused = False
-        answering = False
-
-        async def counted_receive() -> Message:
-            nonlocal counted, refused
-            message = await receive()
-            if message["type"] != "http.request" or refused:
-                return message
-            counted += len(message.get("body", b""))
-            if counted <= self.max_bytes:
-                return message
-            refused = True
-            if not answering:
-                await self._refuse(scope, receive, send)
-            return {"type": "http.disconnect"}  # the application gives up; nobody hears its answer
-
-        async def guarded_send(message: Message) -> None:
-            nonlocal answering
-            if not refused or answering:
-                answering = True
-                await send(message)
-
+        body = _Body(self, scope, receive, send)
         try:
-            await self.app(scope, counted_receive, guarded_send)
+            await self.app(scope, body.receive, body.send)
+        except ClientDisconnect:
+            return  # nobody to tell
         except Exception:
-            if not refused:
+            if not body.refused:
                 raise
+        finally:
+            self.total -= body.counted
 
-    @staticmethod
-    def _announced(scope: Scope) -> int:
-        for name, value in scope["headers"]:
-            if name == b"content-length":
-                return int(value) if value.isdigit() else 0
-        return 0
 
-    async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
-        error = BodyTooLarge(
-            f"The body has more than {self.max_bytes} bytes.",
-            hint="Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories.",
-        )
-        body = json.dumps(problem_document(error, scope["path"])).encode()
-        await send(
-            {
-                "type": "http.response.start",
-                "status": error.status,
-                "headers": [
-                    (b"content-type", b"application/problem+json"),
-                    (b"content-length", str(len(body)).encode()),
-                    (b"connection", b"close"),
-                ],
-            }
-        )
-        await send({"type": "http.response.body", "body": body, "more_body": True})
+class _Body:
+    """One body on its way: the application receives it and answers through this."""
+
+    def __init__(self, limit: BodyLimit, scope: Scope, receive: Receive, send: Send) -> None:
+        self.limit = limit
+        self.scope = scope
+        self.from_client = receive
+        self.to_client = send
+        self.counted = 0
+        self.waited_s = 0.0  # for the client; the application's own pauses are not the client's fault
+        self.complete = False
+        self.refused = False
+        self.answering = False
+
+    async def receive(self) -> Message:
+        """The next piece, or the end of the request when the body is refused."""
+        if self.complete or self.refused:
+            return await self.from_client()
         try:
-            async with asyncio.timeout(LINGER_S):
-                while (message := await receive())["type"] == "http.request" and message.get("more_body"):
-                    pass
+            message = await self._in_time()
+            if message["type"] == "http.request":
+                self._count(message)
+        except ServiceError as error:
+            self.refused = True
+            if not self.answering:
+                await _refuse(error, self.scope, self.from_client, self.to_client)
+            return {"type": "http.disconnect"}  # the application gives up; nobody hears its answer
+        return message
+
+    async def send(self, message: Message) -> None:
+        """Pass the application's answer on, unless the body has been refused before."""
+        if not self.refused or self.answering:
+            self.answering = True
+            await self.to_client(message)
+
+    async def _in_time(self) -> Message:
+        """Wait for the next piece as long as the pieces until now have earned."""
+        limits = self.limit.limits
+        start = time.monotonic()
+        try:
+            async with asyncio.timeout(limits.grace_s + self.counted / limits.least_rate - self.waited_s):
+                message = await self.from_client()
         except TimeoutError:
-            pass
-        await send({"type": "http.response.body", "body": b"", "more_body": False})
+            raise SlowBody from None
+        self.waited_s += time.monotonic() - start
+        return message
+
+    def _count(self, message: Message) -> None:
+        size = len(message.get("body", b""))
+        self.counted += size
+        self.limit.total += size
+        self.complete = not message.get("more_body", False)
+        if self.counted > self.limit.limits.max_bytes:
+            raise _too_large(self.limit.limits)
+        if self.limit.total > self.limit.limits.max_total_bytes:
+            raise ServiceBusy("Too many large bodies are being received at the moment.")
+
+
+def _announced(scope: Scope) -> int:
+    for name, value in scope["headers"]:
+        if name == b"content-length":
+            return int(value) if value.isdigit() else 0
+    return 0
+
+
+def _too_large(limits: BodyLimits) -> BodyTooLarge:
+    return BodyTooLarge(
+        f"The body has more than {limits.max_bytes} bytes.",
+        hint="Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories.",
+    )
+
+
+async def _refuse(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    content = json.dumps(problem_document(error, scope["path"])).encode()
+    headers = {
+        "Content-Type": MEDIA_TYPE,
+        "Content-Length": str(len(content)),
+        **error.headers,
+        "Connection": "close",
+    }
+    await send(
+        {
+            "type": "http.response.start",
+            "status": error.status,
+            "headers": [(name.lower().encode(), value.encode()) for name, value in headers.items()],
+        }
+    )
+    await send({"type": "http.response.body", "body": content, "more_body": True})
+    try:
+        async with asyncio.timeout(LINGER_S):
+            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
+                pass
+    except TimeoutError:
+        pass
+    await send({"type": "http.response.body", "body": b"", "more_body": False})

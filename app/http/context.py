@@ -1,19 +1,31 @@
-"""What endpoints are handed: database, settings, the caller, the messages to workers."""
+"""What endpoints are handed: database, settings, the caller and what the caller may do."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Security
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
+from starlette.types import Scope as AsgiScope
 
+from app.afterwards import Afterwards
 from app.database import Database
+from app.errors import MissingScope, Unauthorized
 from app.jobs.queue import Publisher
 from app.jobs.watch import JobWatcher
-from app.keys.records import EVERY_SCOPE, NO_QUOTA, Quota, Scope
+from app.keys.keyring import KeyRing
+from app.keys.records import Quota, Scope
+from app.parsing.pool import ParserPool
 from app.settings import Settings
 
 LOCAL_OWNER = "local"  # everyone, where no keys are demanded
+CALLER = "morphid.caller"  # where the gate leaves the caller in a request's scope
+BEARER = HTTPBearer(
+    scheme_name="api_key",
+    description="`Authorization: Bearer mid_...`; the operator makes keys with `morphid keys create`.",
+    auto_error=False,  # the gate has checked the key; this is how the OpenAPI document knows of it
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +36,9 @@ class Service:
     database: Database
     publisher: Publisher
     watcher: JobWatcher
+    keys: KeyRing
+    afterwards: Afterwards
+    parsers: ParserPool
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,22 +69,54 @@ class Caller:
     quota: Quota
 
 
-def current_service(request: Request) -> Service:
+async def current_service(request: Request) -> Service:
     """Return the parts of the process that serves `request`."""
     service: Service = request.app.state.service
     return service
 
 
-def current_caller(request: Request) -> Caller:
-    """Tell who makes the request."""
-    address = request.client.host if request.client else ""
-    return Caller(LOCAL_OWNER, None, EVERY_SCOPE, "", address, NO_QUOTA)
+def caller_of(scope: AsgiScope) -> Caller | None:
+    """Return who makes a request; None on public paths and for whom the gate has refused."""
+    caller: Caller | None = scope.get(CALLER)
+    return caller
+
+
+async def current_caller(request: Request) -> Caller:
+    """Tell who makes the request.
+
+    Raises
+    ------
+    Unauthorized
+        Nobody known: the path is a public one, or there is no gate.
+    """
+    caller = caller_of(request.scope)
+    if caller is None:
+        raise Unauthorized
+    return caller
 
 
 CallerDep = Annotated[Caller, Depends(current_caller)]
 
 
-def current_owner(caller: CallerDep) -> str:
+async def _allowed(
+    caller: CallerDep,
+    needed: SecurityScopes,
+    _bearer: Annotated[HTTPAuthorizationCredentials | None, Security(BEARER)],
+) -> None:
+    missing = [name for name in needed.scopes if name not in caller.scopes]
+    if missing:
+        raise MissingScope(missing)
+
+
+def demands(*scopes: Scope) -> Any:
+    """Make a route demand these scopes of its caller: ``dependencies=[demands(Scope.JOBS_READ)]``.
+
+    Without a scope any valid key will do.
+    """
+    return Security(_allowed, scopes=[scope.value for scope in scopes])
+
+
+async def current_owner(caller: CallerDep) -> str:
     """Name the owner that the request acts for."""
     return caller.owner
 

@@ -1,77 +1,103 @@
-"""Reading JSON bodies: bounded work, no duplicate keys, and a sentence for whatever is wrong."""
+"""JSON bodies of requests: small ones are parsed here, large ones in a process with limits."""
 
 from __future__ import annotations
 
-import json
+import tempfile
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
+from starlette.datastructures import UploadFile
 
-from app.errors import MalformedBody, UnsupportedMediaType
+from app.errors import (
+    BodyTooLarge,
+    InvalidRequest,
+    MalformedBody,
+    ServiceBusy,
+    SlowBody,
+    UnsupportedMediaType,
+)
+from app.parsing.json_text import parse_json
 
-MAX_LISTS = 100_000  # a byte of "[" costs sixty of memory
-MAX_OBJECTS = 10_000
-MAX_VALUES = 3_000_000  # 500,000 rows of samples; parsing more takes longer than a second
-MAX_KEYS = 100  # of one object; none of ours has more than twenty
+if TYPE_CHECKING:
+    from app.http.context import Service
+
+# a process costs 50 ms; parsing this much holds up the other requests for 10
+LARGEST_HERE = 2**19
+# what any route with a body may answer
+BODY_ERRORS = (MalformedBody, SlowBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, ServiceBusy)
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    if len(pairs) > MAX_KEYS:
-        raise MalformedBody(f"An object has more than {MAX_KEYS} fields.", hint="See /docs for the fields.")
-    document = dict(pairs)
-    if len(document) != len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for number, key in enumerate(keys) if key in keys[:number])
-        raise MalformedBody(f"The key {twice[:60]!r} appears twice in one object.", hint="Keep one.")
-    return document
+def media_type(request: Request) -> str:
+    """The media type that the request announces, without parameters.
+
+    Raises
+    ------
+    UnsupportedMediaType
+        When the body is compressed, or its text is in another encoding than UTF-8.
+    """
+    coding = request.headers.get("content-encoding", "identity").strip().lower()
+    if coding not in ("identity", ""):
+        raise UnsupportedMediaType(
+            f"The body is announced as compressed ({coding[:40]!r}).",
+            "#header/Content-Encoding",
+            "Send it as it is, without Content-Encoding.",
+        )
+    kind, *parameters = request.headers.get("content-type", "").lower().split(";")
+    for parameter in parameters:
+        name, _, value = parameter.strip().partition("=")
+        if name == "charset" and value.strip('"') not in ("utf-8", "utf8", "us-ascii"):
+            raise UnsupportedMediaType(
+                f"The text is announced as {value[:40]!r}.", "#header/Content-Type", "Send UTF-8."
+            )
+    return kind.strip()
 
 
-def parse_json(body: bytes) -> Any:
-    """Parse a JSON text.
+def is_json(kind: str) -> bool:
+    """Whether a media type is JSON."""
+    return kind == "application/json" or (kind.startswith("application/") and kind.endswith("+json"))
 
-    NaN and Infinity are read here, so that the schema can refuse them by the name of their field.
+
+async def json_document(request: Request) -> Any:
+    """Read and parse the JSON body of a request; what is large waits on disk for its parser.
 
     Raises
     ------
     MalformedBody
-        When it is not JSON, is nested too deeply, repeats a key or holds far too many items.
+        When it is not a sensible JSON text.
+    ServiceBusy
+        Too many large ones are being read.
     """
-    objects, lists, values = body.count(b"{"), body.count(b"["), body.count(b",")
-    if objects > MAX_OBJECTS or lists > MAX_LISTS or values > MAX_VALUES:
-        raise MalformedBody(
-            f"The body holds {objects} objects, {lists} lists and {values} further values.",
-            "/samples" if b'"samples"' in body else "",  # nothing else can be that large but schedules
-            f"At most {MAX_VALUES} numbers a body: leave out rows (10 ms steps suffice) or upload flights.",
-        )
+    service: Service = request.app.state.service
+    spool = tempfile.SpooledTemporaryFile(max_size=LARGEST_HERE)  # noqa: SIM115 - closed with its upload
+    file = UploadFile(spool, size=0)  # type: ignore[arg-type]  # what it makes of uploads itself
     try:
-        return json.loads(body, object_pairs_hook=_object)
-    except json.JSONDecodeError as error:
-        raise MalformedBody(
-            f"Not JSON: {error.msg} at line {error.lineno}, column {error.colno}.",
-            hint="Check the text with a JSON validator.",
-        ) from None
-    except UnicodeDecodeError:
-        raise MalformedBody("The text is not UTF-8.", hint="Encode the body as UTF-8.") from None
-    except RecursionError:
-        raise MalformedBody("The text is nested too deeply.", hint="Six levels are enough.") from None
-    except ValueError as error:
-        # an integer of thousands of digits
-        raise MalformedBody(f"Not JSON: {str(error)[:80]}.", hint="Shorten the number.") from None
+        async for piece in request.stream():
+            await file.write(piece)
+        if (file.size or 0) > LARGEST_HERE:
+            return await service.parsers.json_document(file.file)
+        await file.seek(0)
+        return parse_json(await file.read())
+    finally:
+        await file.close()
 
 
 class _ParsedRequest(Request):
-    """A request whose JSON was parsed by `parse_json`."""
+    """A request whose JSON body was parsed already."""
 
     document: Any = None
+    empty = True
+
+    async def body(self) -> bytes:
+        return b"" if self.empty else b"parsed"  # FastAPI asks only whether there is one
 
     async def json(self) -> Any:
         return self.document
 
 
 class JsonRoute(APIRoute):
-    """A route that parses its JSON body with `parse_json` before FastAPI looks at it."""
+    """A route whose JSON body is parsed by `json_document` before FastAPI looks at it."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Wrap FastAPI's handler."""
@@ -80,17 +106,24 @@ class JsonRoute(APIRoute):
             return handler
 
         async def parsed(request: Request) -> Response:
+            kind = media_type(request)
             replay = _ParsedRequest(request.scope, request.receive)
-            body = await replay.body()
-            kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
-            if body and kind != "application/json" and not kind.endswith("+json"):
+            if is_json(kind):
+                replay.document = await json_document(request)
+                replay.empty = False
+            elif kind or await _has_body(request):
                 raise UnsupportedMediaType(
                     f"The body is announced as {kind or 'nothing'!r}.",
                     "#header/Content-Type",
                     "Send JSON with Content-Type: application/json.",
                 )
-            if body:
-                replay.document = parse_json(body)
             return await handler(replay)
 
         return parsed
+
+
+async def _has_body(request: Request) -> bool:
+    async for piece in request.stream():
+        if piece:
+            return True
+    return False

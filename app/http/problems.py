@@ -12,11 +12,13 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 
+from app.database_errors import DatabaseTrouble, trouble_of
 from app.documents import finite
-from app.errors import Fault, InvalidRequest, ServiceError
+from app.errors import DatabaseAway, Fault, InvalidRequest, ServiceError, StorageFull
 from app.http.request_id import current_request_id
 from app.schemas.problem import Problem
 
@@ -211,6 +213,15 @@ def install_problem_handlers(app: FastAPI, known_fields: Callable[[], Sequence[s
             headers["allow"] = allowed_methods(app.openapi(), request.url.path) or headers.get("Allow", "GET")
             headers.pop("Allow", None)
         return problem_response(HttpProblem(error), request, headers)
+
+    @app.exception_handler(SQLAlchemyError)
+    async def _database(request: Request, error: SQLAlchemyError) -> Response:
+        trouble = trouble_of(error)
+        if trouble is None:
+            return await _unforeseen(request, error)
+        logger.warning("%s %s: the database is %s", request.method, request.url.path, trouble.value)
+        problem = StorageFull() if trouble is DatabaseTrouble.FULL else DatabaseAway()
+        return problem_response(problem, request, problem.headers)
 
     @app.exception_handler(Exception)
     async def _unforeseen(request: Request, error: Exception) -> Response:

@@ -7,23 +7,21 @@ request posts, and so in the lines of the worker that runs it.
 from __future__ import annotations
 
 import re
-from contextvars import ContextVar
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.identifiers import new_identifier
+from app.observability.context import bound, current_facts
 
 HEADER = b"x-request-id"
 MAX_CHARACTERS = 64  # the width of its columns
 # what no log, header or shell reads as anything but a word
 SANE = re.compile(rb"[A-Za-z0-9][A-Za-z0-9._:-]{0,%d}" % (MAX_CHARACTERS - 1))
 
-_request_id: ContextVar[str] = ContextVar("morphid_request_id", default="")
-
 
 def current_request_id() -> str:
     """Id of the request that is being served here; empty outside of requests."""
-    return _request_id.get()
+    return str(current_facts().get("request_id", ""))
 
 
 class RequestId:
@@ -50,11 +48,8 @@ class RequestId:
                 message = {**message, "headers": [*message.get("headers", ()), header]}
             await send(message)
 
-        token = _request_id.set(request_id)
-        try:
+        with bound(request_id=request_id):
             await self.app(scope, receive, send_with_id)
-        finally:
-            _request_id.reset(token)
 
 
 def _of_caller(scope: Scope) -> str | None:

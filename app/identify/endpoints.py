@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, ServiceDep
 from app.identify import service
 from app.identify.schemas import IdentifyRequest, IdentifyValidation
 from app.jobs.schemas import Job
-from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.jobs.submission import OperationRouter, SubmissionDep, validated
 
 router = OperationRouter("identify")
 
@@ -21,6 +21,6 @@ async def identify(body: IdentifyRequest, submission: SubmissionDep) -> Job:
 
 
 @router.validation("Check a request for identification")
-def validate_identify(body: IdentifyRequest, app: ServiceDep, owner: OwnerDep) -> IdentifyValidation:
-    """Make the same checks as `POST /identify` without starting anything, and tell what it would cost."""
-    return IdentifyValidation(cost=priced(app, owner, service.prepare, body))
+def validate_identify(body: IdentifyRequest, app: ServiceDep, caller: CallerDep) -> IdentifyValidation:
+    """Make the checks of `POST /identify` and start nothing; tell what it would cost and how long it would wait."""
+    return validated(app, caller, service.prepare, body, IdentifyValidation)

@@ -6,7 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution, SpreadExecution
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, Start, StepS
@@ -94,6 +96,7 @@ class SamplesRequest(Strict):
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SoughtModel
     search: Search = Search()
+    execution: Execution = Execution()
 
 
 class IdentifyRequest(SamplesRequest):
@@ -102,6 +105,7 @@ class IdentifyRequest(SamplesRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
 
     model: EquivalentModel = EquivalentModel()
+    execution: SpreadExecution = SpreadExecution()
 
 
 class CostEstimate(BaseModel):
@@ -115,10 +119,9 @@ class CostEstimate(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class IdentifyValidation(BaseModel):
+class IdentifyValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["identify"] = "identify"
     cost: CostEstimate
 

@@ -21,11 +21,29 @@ MEDIA_TYPES = {
     ".html": "text/html; charset=utf-8",
     ".txt": "text/plain; charset=utf-8",
 }
+OTHER_FILES = "application/octet-stream"
+# scripts in a plot or report never run with the service's rights, and nothing is guessed to be a page
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "private, max-age=60",
+}
 
 
 def media_type(name: str) -> str:
     """Media type of a file by its ending."""
-    return MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), "application/octet-stream")
+    return MEDIA_TYPES.get(PurePosixPath(name).suffix.lower(), OTHER_FILES)
+
+
+def artifact_headers(name: str) -> dict[str, str]:
+    """Headers of the answer that carries a file; its name is a plain one, which needs no quoting."""
+    shown = "attachment" if media_type(name) == OTHER_FILES else "inline"
+    return {**HEADERS, "Content-Disposition": f'{shown}; filename="{name}"'}
+
+
+def is_plain(name: str) -> bool:
+    """Whether a name is a plain file name; no file of a job has another."""
+    return ARTIFACT_NAME.fullmatch(name) is not None
 
 
 def store_artifacts(session: Session, job_id: str, files: Mapping[str, bytes]) -> None:
@@ -37,7 +55,7 @@ def store_artifacts(session: Session, job_id: str, files: Mapping[str, bytes]) -
         When a name is not a plain file name.
     """
     for name, data in files.items():
-        if not ARTIFACT_NAME.fullmatch(name):
+        if not is_plain(name):
             raise ValueError(f"artifact name {name!r} is not a plain file name")
         session.execute(delete(artifacts).where(artifacts.c.job_id == job_id, artifacts.c.name == name))
         session.execute(

@@ -5,28 +5,35 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
+from pydantic import AwareDatetime, BaseModel
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
-from app.jobs.artifacts import media_type
+from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type
 from app.jobs.event_stream import stream_events, wait_for_end
 from app.jobs.records import JobStatus
+from app.jobs.repository import JobFilter
 from app.jobs.results import JobResult
 from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
+from app.keys.records import Scope
+from app.schemas.execution import Label
 
 router = APIRouter(tags=["jobs"])
 
 JobId = Annotated[str, Path(pattern=r"^[A-Za-z0-9_]{1,64}$", examples=[EXAMPLE_ID])]
-# scripts in a plot or report never run with the service's rights
-ARTIFACT_HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "private, max-age=60",
+FILE_KINDS: dict[str, Any] = {
+    # of a JSON file any value; of the others bytes
+    kind.partition(";")[0]: {
+        "schema": {} if kind == "application/json" else {"type": "string", "format": "binary"}
+    }
+    for kind in (OTHER_FILES, *MEDIA_TYPES.values())
 }
 EVENT_STREAM: dict[int | str, dict[str, Any]] = {
     200: {
@@ -43,43 +50,64 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("/jobs", operation_id="list_jobs", summary="List jobs", responses=documented(InvalidRequest))
+def as_json(answer: BaseModel) -> Response:
+    """Answer with a checked value as it is: the framework would check and copy it once more."""
+    return Response(answer.model_dump_json(), media_type="application/json")
+
+
+def _wanted(
+    status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
+    operation: Annotated[Operation | None, Query()] = None,
+    label: Annotated[Label | None, Query(description="The `execution.label` of the request.")] = None,
+    created_after: Annotated[AwareDatetime | None, Query(description="From this moment on.")] = None,
+    created_before: Annotated[AwareDatetime | None, Query(description="Before this moment.")] = None,
+) -> JobFilter:
+    return JobFilter(tuple(status or ()), operation, label, created_after, created_before)
+
+
+JobFilterDep = Annotated[JobFilter, Depends(_wanted)]
+
+
+@router.get(
+    "/jobs",
+    dependencies=[demands(Scope.JOBS_READ)],
+    operation_id="list_jobs",
+    summary="List jobs",
+    response_model=JobPage,
+    responses=documented(InvalidRequest),
+)
 def list_jobs(
     app: ServiceDep,
     owner: OwnerDep,
+    wanted: JobFilterDep,
     cursor: Annotated[
         str | None, Query(pattern=r"^[A-Za-z0-9_]{1,64}$", description="From `next_cursor`.")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
-    operation: Annotated[Operation | None, Query()] = None,
-) -> JobPage:
+) -> Response:
     """Your jobs, newest first, a page at a time."""
     with app.database.read() as session:
-        return service.page(
-            session,
-            owner,
-            cursor=cursor,
-            limit=limit,
-            statuses=[item.value for item in status or []],
-            operation=operation,
-        )
+        page = service.page(session, owner, wanted, cursor=cursor, limit=limit)
+    return as_json(page)
 
 
 @router.get(
     "/jobs/{job_id}",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job",
     summary="Look at a job",
+    response_model=Job,
     responses=documented(InvalidRequest, JobNotFound),
 )
-async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: PreferHeader = None) -> Job:
+async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: PreferHeader = None) -> Response:
     """Status, progress, times and error of a job; with `Prefer: wait=n` it answers when the job has ended."""
     wait_s = wait_seconds(prefer, app.settings.max_wait_s)
-    return Job.of(await wait_for_end(app, owner, job_id, wait_s))
+    return as_json(await wait_for_end(app, owner, job_id, wait_s))
 
 
 @router.get(
     "/jobs/{job_id}/events",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_events",
     summary="Follow a job",
     response_class=JSONResponse,
@@ -122,6 +150,7 @@ async def get_job_events(
 
 @router.get(
     "/jobs/{job_id}/result",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_result",
     summary="Get the result of a job",
     response_model=JobResult,
@@ -139,6 +168,7 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
 
 @router.get(
     "/jobs/{job_id}/artifacts",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="list_job_artifacts",
     summary="List the files of a job",
     responses=documented(InvalidRequest, JobNotFound),
@@ -162,13 +192,14 @@ def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Artif
 
 @router.get(
     "/jobs/{job_id}/artifacts/{name}",
+    dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job_artifact",
     summary="Get a file of a job",
     response_class=Response,
     responses={
         200: {
             "description": "The file.",
-            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+            "content": FILE_KINDS,
         },
         **documented(InvalidRequest, ArtifactNotFound),
     },
@@ -180,35 +211,44 @@ def get_job_artifact(
     name: Annotated[str, Path(min_length=1, max_length=200, examples=["convergence.svg"])],
 ) -> Response:
     """Return one file, with its own media type."""
+    if not is_plain(name):  # and no database is asked for the character zero
+        raise ArtifactNotFound(job_id, name)
     with app.database.read() as session:
         _, data = repository.artifact_data(session, owner, job_id, name)
-    return Response(data, media_type=media_type(name), headers=ARTIFACT_HEADERS)
+    return Response(data, media_type=media_type(name), headers=artifact_headers(name))
 
 
 @router.post(
     "/jobs/{job_id}/cancel",
+    dependencies=[demands(Scope.JOBS_WRITE)],
     operation_id="cancel_job",
     summary="Cancel a job",
     responses=documented(InvalidRequest, JobNotFound),
 )
-def cancel_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Job:
+def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
     """Cancel a job in any state.
 
     A queued job ends at once; a running one within two seconds, and its best so far is a partial result; a
     finished one stays as it is.
     """
     with app.database.write() as session:
-        return Job.of(store.request_cancel(session, owner, job_id))
+        job = store.request_cancel(session, caller.owner, job_id)
+        note(session, caller, Action.JOB_CANCEL, job_id)
+    if job.status is JobStatus.CANCELLING:
+        app.publisher.publish(job_id)  # a spread job is in nobody's hands: whoever is woken winds it down
+    return Job.of(job)
 
 
 @router.delete(
     "/jobs/{job_id}",
+    dependencies=[demands(Scope.JOBS_WRITE)],
     operation_id="delete_job",
     summary="Delete a finished job",
     status_code=204,
     responses=documented(InvalidRequest, JobNotFound, JobNotFinished),
 )
-def delete_job(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> None:
+def delete_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> None:
     """Delete a finished job with its events, result and files; its identified model stays."""
     with app.database.write() as session:
-        repository.delete_job(session, owner, job_id)
+        repository.delete_job(session, caller.owner, job_id)
+        note(session, caller, Action.JOB_DELETE, job_id)

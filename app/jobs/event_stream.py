@@ -9,9 +9,9 @@ from app.documents import json_bytes
 from app.errors import JobNotFound
 from app.http.context import Service
 from app.jobs import service as jobs
-from app.jobs.records import Job
+from app.jobs.records import Job as StoredJob
 from app.jobs.rows import get_job
-from app.jobs.schemas import JobEvent, JobEventPage
+from app.jobs.schemas import Job, JobEvent, JobEventPage
 
 KEEP_ALIVE = b": keep-alive\n\n"
 RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection asks again
@@ -41,17 +41,25 @@ async def stream_events(service: Service, owner: str, job_id: str, after: int) -
             after = page.last_seq
             if page.finished or service.watcher.closed:
                 return
-            if not page.events and not await subscription.wait(after, service.settings.keep_alive_s):
-                yield KEEP_ALIVE
+            if not page.events:
+                # the watcher has looked at the row for everyone: a silent job costs no query of its own
+                while not await subscription.wait(after, service.settings.keep_alive_s):
+                    yield KEEP_ALIVE
 
 
 async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: float) -> Job:
-    """Wait until a job has ended, at most `timeout_s`, and return it as it is then."""
+    """Wait until a job has ended, at most `timeout_s`, and show it as it is then."""
 
-    def read() -> Job:
+    def read() -> StoredJob:
         with service.database.read() as session:
             return get_job(session, owner, job_id)
 
+    def show() -> Job:
+        with service.database.read() as session:
+            return jobs.shown(session, get_job(session, owner, job_id))
+
+    if timeout_s <= 0.0:
+        return await asyncio.to_thread(show)
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
     with service.watcher.watch(job_id) as subscription:
@@ -59,5 +67,5 @@ async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: flo
             job = await asyncio.to_thread(read)
             left = deadline - loop.time()
             if job.finished or left <= 0.0 or service.watcher.closed:
-                return job
+                return await asyncio.to_thread(show)
             await subscription.wait(job.event_seq, left)

@@ -11,15 +11,17 @@ from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
+from app.jobs.chunk_reaper import reap_chunks
 from app.jobs.records import HELD, JobStatus, ReapReport
 from app.jobs.rows import transition
+from app.jobs.waiting import idle_slots
 from app.tables import jobs
 
 DEADLINE_GRACE_S = (
     30.0  # a worker that heeds the deadline itself keeps its best so far; then the reaper ends the job
 )
 ROUND_LIMIT = 500  # rows per round: a round stays a short transaction whatever the backlog
-PUBLISH_LIMIT = 100  # messages per round: more would only queue up in the broker
+PUBLISH_LIMIT = 100  # messages per round
 
 
 def reap(
@@ -63,12 +65,14 @@ def reap(
         )
         if changed is not None:
             done[kind].append(row.id)
+    spread = reap_chunks(session, clock, republish_after_s)
+    unheard = _unheard(session, clock, republish_after_s, set(done["requeued"]))
     return ReapReport(
         requeued=tuple(done["requeued"]),
-        failed=tuple(done["failed"]),
-        cancelled=tuple(done["cancelled"]),
+        failed=(*done["failed"], *spread.failed),
+        cancelled=(*done["cancelled"], *spread.cancelled),
         expired=tuple(done["expired"]),
-        publish=(*done["requeued"], *_unheard(session, clock, republish_after_s, set(done["requeued"]))),
+        publish=(*done["requeued"], *spread.publish, *unheard),
     )
 
 
@@ -87,6 +91,7 @@ def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> l
             jobs.c.max_attempts,
             case((lease_lost, "lease_lost"), else_="deadline").label("reason"),
             (jobs.c.deadline_at < clock).label("deadline_passed"),
+            jobs.c.started_at,
         )
         .where(or_(lease_lost, overrun, waited_too_long))
         .order_by(jobs.c.id)
@@ -100,6 +105,13 @@ def _verdict(row: Row[Any]) -> tuple[str, str, Document]:
     end: Document = {"finished_at": database_time()}
     if row.status == JobStatus.CANCELLING.value:
         return "cancelled", "cancelled", {**end, "status": JobStatus.CANCELLED.value}
+    if row.deadline_passed and row.started_at is None:
+        error = {
+            "code": "not_started_in_time",
+            "detail": "No worker was free before the time that execution.expires_in_s set.",
+            "hint": "Submit it again with a longer execution.expires_in_s, or without one.",
+        }
+        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
     if row.deadline_passed:
         error = {
             "code": "deadline_exceeded",
@@ -120,12 +132,17 @@ def _verdict(row: Row[Any]) -> tuple[str, str, Document]:
 def _unheard(
     session: Session, clock: ColumnElement[float], after_s: float, fresh: set[str]
 ) -> tuple[str, ...]:
-    """Queued jobs whose message must have been lost; they are marked as published now."""
+    """Queued jobs whose message may have been lost; they are marked as published now.
+
+    As many as there are idle workers: a message is a wake-up for whatever job is next, and whoever ends a job
+    passes on the next one. So the longest queue sends no more messages than somebody has a use for.
+    """
+    wanted = min(max(idle_slots(session), 1), PUBLISH_LIMIT)
     ids = session.scalars(
         select(jobs.c.id)
-        .where(jobs.c.status == JobStatus.QUEUED.value, jobs.c.published_at + after_s < clock)
-        .order_by(jobs.c.priority.desc(), jobs.c.id)
-        .limit(PUBLISH_LIMIT)
+        .where(jobs.c.status == JobStatus.QUEUED.value, jobs.c.published_at < clock - after_s)
+        .order_by(jobs.c.published_at)
+        .limit(wanted)
     ).all()
     lost = [job_id for job_id in ids if job_id not in fresh]
     if lost:

@@ -61,7 +61,8 @@ class Job:
     started_at: datetime | None
     updated_at: datetime
     finished_at: datetime | None
-    deadline_at: datetime | None
+    deadline_at: datetime | None  # of a job that never began: until when it must
+    label: str | None = None
     replayed: bool = False  # this answer repeats an earlier one with the same idempotency key
 
     @property
@@ -82,6 +83,9 @@ class Claim:
     max_attempts: int
     worker: str
     max_seconds: float | None
+    request_id: str | None = None  # of the call that posted the job: leads from its logs to the worker's
+    traceparent: str | None = None
+    waited_s: float = 0.0  # since the job was made
 
 
 @dataclass(frozen=True, slots=True)

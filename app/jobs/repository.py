@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
 
-from sqlalchemy import delete, select
+from sqlalchemy import ColumnElement, delete, select
 
 from app.database import Session
 from app.documents import unpacked_json
@@ -13,25 +15,52 @@ from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
 from app.tables import artifacts, idempotency_keys, job_events, job_results, jobs
 
+ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
+
+
+@dataclass(frozen=True, slots=True)
+class JobFilter:
+    """Which jobs a list shows; what is empty or None does not narrow it.
+
+    Attributes
+    ----------
+    statuses : tuple of str
+        Any of these.
+    operation, label : str or None
+        Exactly this.
+    created_after, created_before : datetime or None
+        The first moment that counts, and the first that counts no more.
+    """
+
+    statuses: tuple[str, ...] = ()
+    operation: str | None = None
+    label: str | None = None
+    created_after: datetime | None = None
+    created_before: datetime | None = None
+
+    def conditions(self) -> Iterator[ColumnElement[bool]]:
+        """The same in SQL."""
+        if self.statuses:
+            yield jobs.c.status.in_(self.statuses)
+        if self.operation is not None:
+            yield jobs.c.operation == self.operation
+        if self.label is not None:
+            yield jobs.c.label == self.label
+        if self.created_after is not None:
+            yield jobs.c.created_at >= self.created_after.timestamp() - ROUNDED_S
+        if self.created_before is not None:
+            yield jobs.c.created_at < self.created_before.timestamp() - ROUNDED_S
+
 
 def list_jobs(
-    session: Session,
-    owner: str,
-    *,
-    before: str | None,
-    limit: int,
-    statuses: Sequence[str] = (),
-    operation: str | None = None,
+    session: Session, owner: str, wanted: JobFilter, *, before: str | None, limit: int
 ) -> list[Job]:
     """Newest jobs first, older than the id `before` when given."""
-    query = select(*JOB_COLUMNS).where(jobs.c.owner == owner).order_by(jobs.c.id.desc()).limit(limit)
+    query = select(*JOB_COLUMNS).where(jobs.c.owner == owner, *wanted.conditions())
     if before is not None:
         query = query.where(jobs.c.id < before)
-    if statuses:
-        query = query.where(jobs.c.status.in_(statuses))
-    if operation is not None:
-        query = query.where(jobs.c.operation == operation)
-    return [job_from_row(row) for row in session.execute(query)]
+    rows = session.execute(query.order_by(jobs.c.id.desc()).limit(limit))
+    return [job_from_row(row) for row in rows]
 
 
 def events_after(session: Session, owner: str, job_id: str, seq: int, limit: int) -> list[Event]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, insert, select, update
+from sqlalchemy import ColumnElement, Row, delete, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import finite
 from app.errors import JobNotFound
-from app.jobs.records import Job, JobStatus, moment, optional_moment
-from app.tables import job_events, jobs
+from app.jobs.records import FINISHED, Job, JobStatus, moment, optional_moment
+from app.keys import quota
+from app.observability.job_counts import note_transition
+from app.tables import job_chunks, job_events, jobs
+from app.webhooks.outbox import note_end
 
 JOB_COLUMNS = (
     jobs.c.id,
@@ -32,8 +35,13 @@ JOB_COLUMNS = (
     jobs.c.updated_at,
     jobs.c.finished_at,
     jobs.c.deadline_at,
+    jobs.c.label,
 )
-CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds)
+CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds, jobs.c.request_id, jobs.c.traceparent)
+QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
+
+FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second
+SPARSE_STEP = 120  # of what is older, one event a minute stays
 
 
 def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
@@ -57,6 +65,7 @@ def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
         updated_at=moment(row.updated_at),
         finished_at=optional_moment(row.finished_at),
         deadline_at=optional_moment(row.deadline_at),
+        label=row.label,
         replayed=replayed,
     )
 
@@ -84,7 +93,7 @@ def transition(
     payload: Mapping[str, Any] | None = None,
     **values: Any,
 ) -> Row[*tuple[Any, ...]] | None:
-    """Compare-and-set on one job row, with its event.
+    """Compare-and-set on one job row, with its event; an end also settles its share of the key's quota.
 
     Parameters
     ----------
@@ -107,10 +116,22 @@ def transition(
         update(jobs)
         .where(*conditions)
         .values(**values, updated_at=database_time())
-        .returning(*JOB_COLUMNS, *CLAIM_COLUMNS)
+        .returning(*JOB_COLUMNS, *CLAIM_COLUMNS, *QUOTA_COLUMNS)
     ).one_or_none()
     if row is not None and event is not None:
         insert_event(session, row.id, row.event_seq, event, row.status, row.attempt, payload)
+        note_transition(session, row, event, payload)
+    if row is not None and row.status in FINISHED:
+        quota.settle(
+            session,
+            row.key_id,
+            estimated=row.flights_estimated,
+            flown=row.flights,
+            day=quota.usage_day(row.created_at),
+        )
+        note_end(session, row)
+        # nobody flies for it any more
+        session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
     return row
 
 
@@ -130,3 +151,17 @@ def insert_event(
             job_id=job_id, seq=seq, type=event, payload=finite(content), at=database_time()
         )
     )
+
+
+def thin_events(session: Session, job_id: str, newest: int) -> None:
+    """Drop the progress event that is `FULL_HISTORY` older than the newest, but for one in `SPARSE_STEP`.
+
+    Called with every new one: the history of the longest job stays short, and nobody ever looks through it.
+    """
+    old = newest - FULL_HISTORY
+    if old > 0 and old % SPARSE_STEP:
+        session.execute(
+            delete(job_events).where(
+                job_events.c.job_id == job_id, job_events.c.seq == old, job_events.c.type == "progress"
+            )
+        )

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
+from app.jobs.waiting import QueuePlace as Place
+from app.keys.schemas import Quotas
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
 Operation = Literal["identify", "study", "simulate", "optimize"]
@@ -69,6 +71,30 @@ class RequestSummary(BaseModel):
     final_rad: float | None = Field(default=None, description="Sweep at the end of the morph.")
 
 
+class QueuePlace(BaseModel):
+    """Where a queued job stands; owners take turns, so another's long queue is not in the way."""
+
+    position: int = Field(description="1 for the job whose turn is next, if nobody posts anything.")
+    eta_s: float | None = Field(
+        description="Until it begins, from what jobs took lately and the workers there are; null while "
+        "nothing is known."
+    )
+
+    @classmethod
+    def of(cls, place: Place) -> QueuePlace:
+        """Show a place in the queue."""
+        return cls(position=place.position, eta_s=place.eta_s)
+
+
+class Validation(BaseModel):
+    """The request is valid; each operation adds its name and what it would cost."""
+
+    valid: Literal[True] = True
+    cost: Any
+    queue: QueuePlace = Field(description="The place that the job would have if it were posted now.")
+    quotas: Quotas | None = Field(description="Of your key; null where the service demands no keys.")
+
+
 class JobLinks(BaseModel):
     """Where the parts of a job are."""
 
@@ -95,6 +121,8 @@ class Job(BaseModel):
     )
     max_attempts: int
     priority: int
+    label: str | None
+    queue: QueuePlace | None = Field(description="While it is queued; null in lists.")
     request: RequestSummary
     model_id: str | None = Field(
         description="The identified (of a study: the recommended) model, once there is one: "
@@ -105,12 +133,15 @@ class Job(BaseModel):
     started_at: datetime | None
     updated_at: datetime
     finished_at: datetime | None
-    deadline_at: datetime | None
+    deadline_at: datetime | None = Field(
+        description="When it must end; of a job that has not begun and has `execution.expires_in_s`: when it "
+        "must have begun."
+    )
     links: JobLinks
 
     @classmethod
-    def of(cls, job: StoredJob) -> Job:
-        """Show a stored job."""
+    def of(cls, job: StoredJob, place: Place | None = None) -> Job:
+        """Show a stored job, and where it stands in the queue."""
         at = f"/jobs/{job.id}"
         return cls(
             id=job.id,
@@ -122,6 +153,8 @@ class Job(BaseModel):
             attempt=job.attempt,
             max_attempts=job.max_attempts,
             priority=job.priority,
+            label=job.label,
+            queue=None if place is None else QueuePlace.of(place),
             request=RequestSummary.model_validate(job.summary),
             model_id=job.model_id,
             last_event=job.event_seq,
@@ -150,14 +183,14 @@ class JobPage(BaseModel):
 class JobEvent(BaseModel):
     """One event of a job's history."""
 
-    seq: int = Field(description="Counts up by one from 1.")
+    seq: int = Field(description="Rises from 1.")
     type: str = Field(description="`queued`, `started`, `progress`, `requeued`, ... or the final status.")
     payload: dict[str, Any]
     at: datetime
 
 
 class JobEventPage(BaseModel):
-    """Events, oldest first."""
+    """Events, oldest first; of what is older than some thousand events one progress in 120 is kept."""
 
     events: list[JobEvent]
     last_seq: int = Field(description="Pass as `after` to go on from here.")

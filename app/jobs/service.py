@@ -5,27 +5,26 @@ from __future__ import annotations
 from app.database import Session
 from app.errors import ResultNotReady
 from app.jobs import repository, store
+from app.jobs.records import Job as StoredJob
+from app.jobs.repository import JobFilter
 from app.jobs.schemas import Job, JobEvent, JobEventPage, JobPage
+from app.jobs.waiting import queue_place
 
 EVENT_PAGE = 500
 
 
-def page(
-    session: Session,
-    owner: str,
-    *,
-    cursor: str | None,
-    limit: int,
-    statuses: list[str],
-    operation: str | None,
-) -> JobPage:
+def shown(session: Session, job: StoredJob) -> Job:
+    """Show a job, while it is queued with its place in the queue."""
+    return Job.of(job, queue_place(session, job))
+
+
+def page(session: Session, owner: str, wanted: JobFilter, *, cursor: str | None, limit: int) -> JobPage:
     """One page of the owner's jobs, newest first."""
-    found = repository.list_jobs(
-        session, owner, before=cursor, limit=limit + 1, statuses=statuses, operation=operation
-    )
-    shown = found[:limit]
+    found = repository.list_jobs(session, owner, wanted, before=cursor, limit=limit + 1)
+    shown_jobs = found[:limit]
     return JobPage(
-        jobs=[Job.of(job) for job in shown], next_cursor=shown[-1].id if len(found) > limit else None
+        jobs=[Job.of(job) for job in shown_jobs],
+        next_cursor=shown_jobs[-1].id if len(found) > limit else None,
     )
 
 

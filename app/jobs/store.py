@@ -11,19 +11,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Table, case, delete, insert, literal, select, update
+from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, or_, select, update
 
 from app.database import Session, database_time
-from app.documents import Document, digest, finite, packed, unpacked
-from app.errors import IdempotencyConflict, JobNotFound
+from app.documents import Document, finite, packed, unpacked
+from app.errors import JobNotFound
 from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
+from app.jobs.chunk_rows import at_rest
+from app.jobs.creation import create_job
 from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
-from app.jobs.rows import JOB_COLUMNS, get_job, insert_event, job_from_row, transition
+from app.jobs.rows import get_job, job_from_row, thin_events, transition
 from app.jobs.turns import may_start, note_served
 from app.models.left_models import left_model
 from app.models.repository import insert_model
-from app.tables import idempotency_keys, job_checkpoints, job_requests, job_results, jobs, owners
+from app.tables import job_checkpoints, job_requests, job_results, jobs
 
 __all__ = [
     "claim_job",
@@ -32,110 +34,15 @@ __all__ = [
     "get_job",
     "load_checkpoint",
     "load_request",
+    "look_at_lease",
     "release_job",
     "renew_lease",
     "request_cancel",
     "save_progress",
 ]
 
-
-def create_job(
-    session: Session,
-    *,
-    owner: str,
-    operation: str,
-    request: Document,
-    idempotency_key: str | None = None,
-    priority: int = 0,
-    max_attempts: int = 3,
-    max_seconds: float | None = None,
-    summary: Document | None = None,
-) -> Job:
-    """Write a queued job; publish its id after the commit.
-
-    Parameters
-    ----------
-    request : dict
-        The whole request, every sample inline: what `load_request` gives the worker.
-    idempotency_key : str, optional
-        With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
-    max_seconds : float, optional
-        Deadline counted from the first claim, s.
-    summary : dict, optional
-        The few small facts of the request that listings show.
-
-    Raises
-    ------
-    IdempotencyConflict
-        The key was used for another request.
-    """
-    job_id = new_identifier("job")
-    fingerprint = digest(request)
-    if idempotency_key is not None:
-        earlier = _take_idempotency_key(session, owner, idempotency_key, operation, fingerprint, job_id)
-        if earlier is not None:
-            return earlier
-    session.execute(
-        insert(jobs).values(
-            id=job_id,
-            owner=owner,
-            operation=operation,
-            status=JobStatus.QUEUED.value,
-            priority=priority,
-            summary=finite(summary or {}),
-            attempt=0,
-            max_attempts=max_attempts,
-            fence=0,
-            event_seq=1,
-            partial=False,
-            max_seconds=max_seconds,
-            published_at=database_time(),
-            created_at=database_time(),
-            updated_at=database_time(),
-        )
-    )
-    session.execute(insert(job_requests).values(job_id=job_id, document=packed(request), sha256=fingerprint))
-    insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
-    session.execute(_insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
-    return get_job(session, owner, job_id)
-
-
-def _insert_new(session: Session, table: Table) -> Any:
-    """An INSERT that can leave existing rows alone, in the database's own words."""
-    if session.dialect.name == "sqlite":
-        from sqlalchemy.dialects import sqlite
-
-        return sqlite.insert(table)
-    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
-
-    return postgresql.insert(table)
-
-
-def _take_idempotency_key(
-    session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
-) -> Job | None:
-    """Write the key, or return the job that holds it. The unique key decides between two racing requests."""
-    keys = idempotency_keys
-    values = {
-        "owner": owner,
-        "key": key,
-        "operation": operation,
-        "sha256": fingerprint,
-        "job_id": job_id,
-        "at": database_time(),
-    }
-    taken = session.execute(
-        _insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
-    ).one_or_none()
-    if taken is not None:
-        return None
-    earlier = session.execute(select(keys).where(keys.c.owner == owner, keys.c.key == key)).one()
-    if (earlier.operation, earlier.sha256) != (operation, fingerprint):
-        raise IdempotencyConflict(key)
-    row = session.execute(
-        select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
-    ).one()
-    return job_from_row(row, replayed=True)
+# the database's clock judges deadlines: a worker's may be an hour wrong
+LEASE_COLUMNS = (jobs.c.status, (jobs.c.deadline_at < database_time()).label("deadline_passed"))
 
 
 def load_request(session: Session, job_id: str) -> Document:
@@ -174,6 +81,11 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
     if row is None:
         return None
     note_served(session, row.owner)
+    return claim_from_row(row, worker_name)
+
+
+def claim_from_row(row: Row[Any], worker_name: str) -> Claim:
+    """Turn the row of a job that was just claimed into the claim."""
     return Claim(
         job_id=row.id,
         owner=row.owner,
@@ -183,21 +95,35 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
         max_attempts=row.max_attempts,
         worker=worker_name,
         max_seconds=row.max_seconds,
+        request_id=row.request_id,
+        traceparent=row.traceparent,
+        waited_s=row.updated_at - row.created_at,
     )
 
 
-def _held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
+def held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
+    """Tell the row of a claim as long as the claim holds."""
     return (jobs.c.id == claim.job_id, jobs.c.fence == claim.fence, jobs.c.status.in_(HELD))
 
 
 def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseState:
     """The heartbeat: push the lease out and learn whether to stop."""
-    row = session.execute(
-        update(jobs)
-        .where(*_held_by(claim))
-        .values(lease_until=database_time() + lease_s)
-        .returning(jobs.c.status, (jobs.c.deadline_at < database_time()).label("deadline_passed"))
-    ).one_or_none()
+    return _lease_state(
+        session.execute(
+            update(jobs)
+            .where(*held_by(claim))
+            .values(lease_until=database_time() + lease_s)
+            .returning(*LEASE_COLUMNS)
+        ).one_or_none()
+    )
+
+
+def look_at_lease(session: Session, claim: Claim) -> LeaseState:
+    """Learn whether to stop, writing nothing: cheap enough to ask several times a second."""
+    return _lease_state(session.execute(select(*LEASE_COLUMNS).where(*held_by(claim))).one_or_none())
+
+
+def _lease_state(row: Row[Any] | None) -> LeaseState:
     if row is None:
         return LeaseState(held=False)
     return LeaseState(
@@ -222,17 +148,26 @@ def save_progress(session: Session, claim: Claim, progress: Document, checkpoint
         False when the claim is stale; nothing was written then.
     """
     clean = finite(progress)
-    row = transition(session, *_held_by(claim), event="progress", payload=clean, progress=clean)
+    values: Document = {"progress": clean}
+    if clean.get("flights") is not None:
+        values["flights"] = int(clean["flights"])
+    row = transition(session, *held_by(claim), event="progress", payload=clean, **values)
     if row is None:
         return False
+    thin_events(session, row.id, row.event_seq)
     if checkpoint is not None:
-        session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
-        session.execute(
-            insert(job_checkpoints).values(
-                job_id=claim.job_id, data=checkpoint, fence=claim.fence, at=database_time()
-            )
-        )
+        replace_checkpoint(session, claim, checkpoint)
     return True
+
+
+def replace_checkpoint(session: Session, claim: Claim, checkpoint: bytes) -> None:
+    """Write the checkpoint of a claimed job; only in a transaction that has proved the claim."""
+    session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
+    session.execute(
+        insert(job_checkpoints).values(
+            job_id=claim.job_id, data=checkpoint, fence=claim.fence, at=database_time()
+        )
+    )
 
 
 def load_checkpoint(session: Session, claim: Claim) -> bytes | None:
@@ -285,19 +220,22 @@ def finish_job(
     if identified is not None:
         values["model_id"] = new_identifier("model")
     payload = {"error": values["error"]} if error is not None else None
-    row = transition(session, *_held_by(claim), event=ending, payload=payload, **values)
+    if succeeded:
+        # work that counts no flights has flown once
+        values["flights"] = case((jobs.c.flights > 0, jobs.c.flights), else_=1)
+    document = None if result is None else packed({**result, "partial": True} if partial else result)
+    files = artifacts or {}
+    values["size_bytes"] = jobs.c.size_bytes + len(document or b"") + sum(map(len, files.values()))
+    row = transition(session, *held_by(claim), event=ending, payload=payload, **values)
     if row is None:
         return False
-    if result is not None:
+    if document is not None:
         session.execute(
             insert(job_results).values(
-                job_id=claim.job_id,
-                document=packed({**result, "partial": True} if partial else result),
-                partial=partial,
-                at=database_time(),
+                job_id=claim.job_id, document=document, partial=partial, at=database_time()
             )
         )
-    store_artifacts(session, claim.job_id, artifacts or {})
+    store_artifacts(session, claim.job_id, files)
     if identified is not None:
         insert_model(
             session,
@@ -320,7 +258,7 @@ def release_job(session: Session, claim: Claim) -> bool:
     cancelling = jobs.c.status == JobStatus.CANCELLING.value
     row = transition(
         session,
-        *_held_by(claim),
+        *held_by(claim),
         event="released",
         payload={"worker": claim.worker},
         status=case((cancelling, literal(JobStatus.CANCELLED.value)), else_=literal(JobStatus.QUEUED.value)),
@@ -336,6 +274,9 @@ def release_job(session: Session, claim: Claim) -> bool:
 def request_cancel(session: Session, owner: str, job_id: str) -> Job:
     """Ask a job to end: a queued one does at once, a running one winds down, a finished one stays as it is.
 
+    A spread job at which nobody works just now ends at once as well: there is nobody to wind it down.
+    Otherwise publish the id after the commit, so that some worker does.
+
     Raises
     ------
     JobNotFound
@@ -345,9 +286,10 @@ def request_cancel(session: Session, owner: str, job_id: str) -> Job:
         session,
         jobs.c.id == job_id,
         jobs.c.owner == owner,
-        jobs.c.status == JobStatus.QUEUED.value,
+        or_(jobs.c.status == JobStatus.QUEUED.value, at_rest()),
         event="cancelled",
         status=JobStatus.CANCELLED.value,
+        fence=jobs.c.fence + 1,
         finished_at=database_time(),
     )
     if row is None:

@@ -13,28 +13,30 @@ from typing import Annotated, Any, Generic, TypeVar
 from fastapi import APIRouter, Depends, Response
 from fastapi.concurrency import run_in_threadpool
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.database import Session
-from app.documents import Document
-from app.errors import (
-    BodyTooLarge,
-    IdempotencyConflict,
-    InvalidRequest,
-    MalformedBody,
-    UnsupportedMediaType,
-)
-from app.http.context import OwnerDep, Service, ServiceDep
-from app.http.json_body import JsonRoute
+from app.documents import Document, sealed
+from app.errors import IdempotencyConflict, QuotaExceeded
+from app.http.context import Caller, CallerDep, Service, ServiceDep, demands
+from app.http.json_body import BODY_ERRORS, JsonRoute
 from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import store
+from app.jobs.creation import Origin, Terms
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob
-from app.jobs.schemas import Job, Operation
+from app.jobs.schemas import Job, Operation, QueuePlace, Validation
+from app.jobs.waiting import place_of_next
+from app.keys import quota
+from app.keys.records import Scope
+from app.keys.schemas import Quotas
+from app.observability.tracing import current_traceparent
+from app.schemas.execution import Executed, Execution
 
 Cost = TypeVar("Cost")
-Request = TypeVar("Request")
+Request = TypeVar("Request", bound=Executed)
 
-BODY_ERRORS = (MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest)
 ACCEPTED: dict[str, Any] = {
     "description": "The job, queued (or ended, with `Prefer: wait`).",
     "headers": {
@@ -93,7 +95,7 @@ class OperationRouter(APIRouter):
     """
 
     def __init__(self, operation: Operation) -> None:
-        super().__init__(tags=[operation], route_class=JsonRoute)
+        super().__init__(tags=[operation], route_class=JsonRoute, dependencies=[demands(Scope.JOBS_WRITE)])
         self.operation = operation
 
     def submission(self, summary: str) -> Callable[..., Any]:
@@ -103,7 +105,7 @@ class OperationRouter(APIRouter):
             operation_id=self.operation,
             summary=summary,
             status_code=202,
-            responses={202: ACCEPTED, **documented(*BODY_ERRORS, IdempotencyConflict)},
+            responses={202: ACCEPTED, **documented(*BODY_ERRORS, IdempotencyConflict, QuotaExceeded)},
         )
 
     def validation(self, summary: str) -> Callable[..., Any]:
@@ -121,7 +123,7 @@ class Submission:
     """One call that starts a job: who calls, with which preferences, and the answer's headers."""
 
     app: Service
-    owner: str
+    caller: Caller
     response: Response
     idempotency_key: str | None
     wait_s: float
@@ -145,41 +147,67 @@ class Submission:
         headers["Location"] = f"/jobs/{job.id}"
         if self.wait_s > 0.0:
             headers["Preference-Applied"] = f"wait={self.wait_s:g}"
-            job = await wait_for_end(self.app, self.owner, job.id, self.wait_s)
-        return Job.of(job)
+        return await wait_for_end(self.app, self.caller.owner, job.id, self.wait_s)
 
     def _write(self, prepare: Prepare[Request, Any], request: Request) -> StoredJob:
-        settings = self.app.settings
+        with self.app.database.read() as session:
+            order = prepare(session, self.caller.owner, request)
+        # nothing is computed while the write transaction lasts: on SQLite everybody else waits for it
+        document = sealed({**order.document, "execution": request.execution.model_dump(exclude_none=True)})
+        terms = self._terms(order, request.execution)
+        origin = Origin(self.caller.key_id, self.caller.request_id or None, current_traceparent())
         with self.app.database.write() as session:
-            order = prepare(session, self.owner, request)
-            return store.create_job(
+            job = store.create_job(
                 session,
-                owner=self.owner,
+                owner=self.caller.owner,
                 operation=order.operation,
-                request=order.document,
+                request=document,
                 summary=order.summary,
+                flights_estimated=getattr(order.cost, "flights", 1),
+                terms=terms,
+                origin=origin,
                 idempotency_key=self.idempotency_key,
-                max_attempts=settings.job_max_attempts,
-                max_seconds=settings.job_max_seconds if order.max_seconds is None else order.max_seconds,
             )
+            if not job.replayed:
+                note(session, self.caller, Action.JOB_POST, job.id, detail={"operation": order.operation})
+        return job
+
+    def _terms(self, order: Order[Any], execution: Execution) -> Terms:
+        settings = self.app.settings
+        return Terms(
+            priority=execution.priority,
+            label=execution.label,
+            max_attempts=execution.max_attempts or settings.job_max_attempts,
+            max_seconds=settings.job_max_seconds if order.max_seconds is None else order.max_seconds,
+            expires_in_s=execution.expires_in_s,
+        )
 
 
 def _submission(
     response: Response,
     app: ServiceDep,
-    owner: OwnerDep,
+    caller: CallerDep,
     idempotency_key: IdempotencyKeyHeader = None,
     prefer: PreferHeader = None,
 ) -> Submission:
     wait_s = wait_seconds(prefer, app.settings.max_wait_s)
-    return Submission(app, owner, response, idempotency_key, wait_s)
+    return Submission(app, caller, response, idempotency_key, wait_s)
 
 
 SubmissionDep = Annotated[Submission, Depends(_submission)]
 
 
-def priced(app: Service, owner: str, prepare: Prepare[Request, Cost], request: Request) -> Cost:
-    """Make the checks of a submission, start nothing, and tell what it would cost.
+Verdict = TypeVar("Verdict", bound=Validation)
+
+
+def validated(
+    app: Service,
+    caller: Caller,
+    prepare: Prepare[Request, Any],
+    request: Request,
+    verdict: type[Verdict],
+) -> Verdict:
+    """Make the checks of a submission, start nothing; tell what it would cost and how long it would wait.
 
     Raises
     ------
@@ -187,4 +215,11 @@ def priced(app: Service, owner: str, prepare: Prepare[Request, Cost], request: R
         Naming every fault.
     """
     with app.database.read() as session:
-        return prepare(session, owner, request).cost
+        order = prepare(session, caller.owner, request)
+        place = place_of_next(session, caller.owner, order.operation, request.execution.priority)
+        used = None if caller.key_id is None else quota.usage(session, caller.key_id)
+    return verdict(
+        cost=order.cost,
+        queue=QueuePlace.of(place),
+        quotas=None if used is None else Quotas.of(used, caller.quota),
+    )

@@ -1,17 +1,27 @@
 """Whose turn it is: owners take turns, and inside an owner the most urgent job goes first, then the oldest.
 
-Among the owners with queued work the one with the fewest running jobs is next, then the one that was served
+Among the owners with waiting work the one with the fewest workers is next, then the one that was served
 least recently: however many jobs one owner has queued, another waits for one turn and not for all of them.
-Each question is a few steps down an index, whatever the length of the queue.
+Work is a queued job or an open chunk of a running one; an owner's chunks go before queued jobs that are not
+more urgent. Each question is a few steps down an index, whatever the length of the queue.
 """
 
 from __future__ import annotations
 
-from sqlalchemy import CTE, ColumnElement, ScalarSelect, func, or_, select, update
+from sqlalchemy import CTE, Column, ColumnElement, func, or_, select, union, update
 
 from app.database import Session, database_time
+from app.jobs.chunk_rows import (
+    HANDED_OUT,
+    OPEN,
+    RUNNING,
+    Unit,
+    UnitKind,
+    next_chunk_of,
+    next_spread_job,
+)
 from app.jobs.records import HELD, JobStatus
-from app.tables import jobs, owners
+from app.tables import job_chunks, jobs, owners
 
 QUEUED = jobs.c.status == JobStatus.QUEUED.value
 OWNERS_LOOKED_AT = 64  # in one turn; the others' jobs would all have to be locked by other workers
@@ -19,16 +29,22 @@ OWNERS_LOOKED_AT = 64  # in one turn; the others' jobs would all have to be lock
 
 def waiting_owners() -> CTE:
     """Owners with queued jobs, each found by one step down the index: no look at all that is queued."""
-    first = select(func.min(jobs.c.owner).label("owner")).where(QUEUED)
-    waiting = first.cte("waiting", recursive=True)
-    following = select(func.min(jobs.c.owner)).where(QUEUED, jobs.c.owner > waiting.c.owner)
-    return waiting.union_all(select(following.scalar_subquery()).where(waiting.c.owner.is_not(None)))
+    return _owners(jobs.c.owner, QUEUED, "waiting")
 
 
-def running_of(owner: ColumnElement[str]) -> ScalarSelect[int]:
-    """How many jobs of an owner are in workers' hands."""
+def _owners(column: Column[str], condition: ColumnElement[bool], name: str) -> CTE:
+    first = select(func.min(column).label("owner")).where(condition)
+    found = first.cte(name, recursive=True)
+    following = select(func.min(column)).where(condition, column > found.c.owner)
+    return found.union_all(select(following.scalar_subquery()).where(found.c.owner.is_not(None)))
+
+
+def running_of(owner: ColumnElement[str]) -> ColumnElement[int]:
+    """How many workers an owner's jobs and chunks have."""
     held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), jobs.c.owner == owner)
-    return held.scalar_subquery()
+    flown = select(func.count()).select_from(job_chunks)
+    flown = flown.where(job_chunks.c.status == RUNNING, job_chunks.c.owner == owner)
+    return held.where(~HANDED_OUT).scalar_subquery() + flown.scalar_subquery()
 
 
 def may_start() -> ColumnElement[bool]:
@@ -37,8 +53,9 @@ def may_start() -> ColumnElement[bool]:
 
 
 def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]:
-    """Owners with queued jobs in the order of their turns."""
-    waiting = waiting_owners()
+    """Owners with waiting work in the order of their turns."""
+    queued, flying = waiting_owners(), _owners(job_chunks.c.owner, job_chunks.c.status == OPEN, "flying")
+    waiting = union(select(queued.c.owner), select(flying.c.owner)).subquery()
     return list(
         session.scalars(
             select(waiting.c.owner)
@@ -50,23 +67,36 @@ def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]
     )
 
 
-def next_job_of(session: Session, owner: str) -> str | None:
-    """Id of the owner's job that should run next; one that another worker is taking is passed over."""
+def next_job_of(session: Session, owner: str, *, above: int | None = None) -> str | None:
+    """Id of the owner's job that should run next; one that another worker is taking is passed over.
+
+    ``above``: only one of a higher priority than this.
+    """
+    urgent = () if above is None else (jobs.c.priority > above,)
     return session.execute(
         select(jobs.c.id)
-        .where(QUEUED, jobs.c.owner == owner, may_start())
+        .where(QUEUED, jobs.c.owner == owner, may_start(), *urgent)
         .order_by(jobs.c.priority.desc(), jobs.c.id)
         .limit(1)
         .with_for_update(skip_locked=True)  # SQLite has one writer at a time and knows no such words
     ).scalar_one_or_none()
 
 
-def next_unit(session: Session) -> str | None:
-    """Id of the queued job that should run next, None when there is none to be had."""
+def next_unit(session: Session) -> Unit | None:
+    """The work that should be done next, None when there is none to be had.
+
+    A spread job that must go on comes before all turns: many workers wait for that moment's work.
+    """
+    spread = next_spread_job(session)
+    if spread is not None:
+        return Unit(UnitKind.SPREAD, spread)
     for owner in owners_in_turn(session):
-        job_id = next_job_of(session, owner)
+        chunk = next_chunk_of(session, owner)
+        job_id = next_job_of(session, owner, above=None if chunk is None else chunk.priority)
         if job_id is not None:
-            return job_id
+            return Unit(UnitKind.JOB, job_id)
+        if chunk is not None:
+            return Unit(UnitKind.CHUNK, chunk.job_id, chunk.generation, chunk.number)
     return None
 
 

@@ -25,7 +25,7 @@ SCOPE_MEANINGS = {
     Scope.JOBS_READ: "look at jobs, their events, results and files",
     Scope.JOBS_WRITE: "start, cancel and delete jobs; validate requests",
     Scope.DATA_READ: "read uploaded flights and identified models",
-    Scope.DATA_WRITE: "upload flights",
+    Scope.DATA_WRITE: "upload flights; delete flights and identified models",
     Scope.WEBHOOKS: "make, look at and remove webhooks",
     Scope.METRICS: "read the metrics of the whole service",
 }

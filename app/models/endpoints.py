@@ -6,10 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import InvalidRequest, ModelNotFound
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.problems import documented
-from app.models import service
+from app.keys.records import Scope
+from app.models import repository, service
 from app.models.schemas import IdentifiedModel, ModelPage
 
 router = APIRouter(tags=["models"])
@@ -19,6 +22,7 @@ ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 
 @router.get(
     "/models",
+    dependencies=[demands(Scope.DATA_READ)],
     operation_id="list_models",
     summary="List identified models",
     responses=documented(InvalidRequest),
@@ -36,6 +40,7 @@ def list_models(
 
 @router.get(
     "/models/{model_id}",
+    dependencies=[demands(Scope.DATA_READ)],
     operation_id="get_model",
     summary="Get an identified model",
     responses=documented(InvalidRequest, ModelNotFound),
@@ -46,3 +51,20 @@ def get_model(
     """Return parameters, fit, aircraft and flight of one model."""
     with app.database.read() as session:
         return service.get(session, owner, model_id)
+
+
+@router.delete(
+    "/models/{model_id}",
+    dependencies=[demands(Scope.DATA_WRITE)],
+    operation_id="delete_model",
+    summary="Delete an identified model",
+    status_code=204,
+    responses=documented(InvalidRequest, ModelNotFound),
+)
+def delete_model(
+    app: ServiceDep, caller: CallerDep, model_id: Annotated[str, Path(pattern=ID_PATTERN)]
+) -> None:
+    """Delete a model; its job keeps the result, and jobs that were started with it have copies."""
+    with app.database.write() as session:
+        repository.delete_model(session, caller.owner, model_id)
+        note(session, caller, Action.MODEL_DELETE, model_id)

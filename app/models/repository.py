@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Row, insert, select
+from sqlalchemy import Row, delete, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import Document, packed, unpacked
 from app.errors import ModelNotFound
 from app.jobs.records import moment
-from app.tables import models
+from app.tables import jobs, models
 
 NAME_LENGTH = 200
 
@@ -77,6 +77,22 @@ def list_models(session: Session, owner: str, *, before: str | None, limit: int)
     if before is not None:
         query = query.where(models.c.id < before)
     return [_summary(row) for row in session.execute(query)]
+
+
+def delete_model(session: Session, owner: str, model_id: str) -> None:
+    """Delete one model; its job stays, and so do jobs that were started with it.
+
+    Raises
+    ------
+    ModelNotFound
+        When `owner` has no such model.
+    """
+    deleted = session.execute(
+        delete(models).where(models.c.id == model_id, models.c.owner == owner).returning(models.c.job_id)
+    ).one_or_none()
+    if deleted is None:
+        raise ModelNotFound(model_id)
+    session.execute(update(jobs).where(jobs.c.id == deleted.job_id).values(model_id=None))
 
 
 def get_model(session: Session, owner: str, model_id: str) -> tuple[ModelSummary, Document]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, ServiceDep
 from app.jobs.schemas import Job
-from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.optimize import service
 from app.optimize.schemas import OptimizeRequest, OptimizeValidation
 
@@ -22,6 +22,6 @@ async def optimize(body: OptimizeRequest, submission: SubmissionDep) -> Job:
 
 
 @router.validation("Check a request for an optimisation")
-def validate_optimize(body: OptimizeRequest, app: ServiceDep, owner: OwnerDep) -> OptimizeValidation:
-    """Make the same checks as `POST /optimize` without starting anything, and tell what it would cost."""
-    return OptimizeValidation(cost=priced(app, owner, service.prepare, body))
+def validate_optimize(body: OptimizeRequest, app: ServiceDep, caller: CallerDep) -> OptimizeValidation:
+    """Make the checks of `POST /optimize` and start nothing; tell what it would cost and how long it would wait."""
+    return validated(app, caller, service.prepare, body, OptimizeValidation)

@@ -6,7 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution
 from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, StepS
@@ -119,6 +121,7 @@ class OptimizeRequest(Strict):
         default="flexible", description="Fly the schedules again in the flexible model: minutes."
     )
     flexible: VerifyingModel = VerifyingModel()
+    execution: Execution = Execution()
 
 
 class ScheduleCost(BaseModel):
@@ -130,10 +133,9 @@ class ScheduleCost(BaseModel):
     core_s: float = Field(description="Computing time on one core, the flexible model's flights included.")
 
 
-class OptimizeValidation(BaseModel):
+class OptimizeValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["optimize"] = "optimize"
     cost: ScheduleCost
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, ServiceDep
 from app.jobs.schemas import Job
-from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.simulate import service
 from app.simulate.schemas import SimulateRequest, SimulateValidation
 
@@ -22,6 +22,6 @@ async def simulate(body: SimulateRequest, submission: SubmissionDep) -> Job:
 
 
 @router.validation("Check a request for a simulation")
-def validate_simulate(body: SimulateRequest, app: ServiceDep, owner: OwnerDep) -> SimulateValidation:
-    """Make the same checks as `POST /simulate` without starting anything, and tell what it would cost."""
-    return SimulateValidation(cost=priced(app, owner, service.prepare, body))
+def validate_simulate(body: SimulateRequest, app: ServiceDep, caller: CallerDep) -> SimulateValidation:
+    """Make the checks of `POST /simulate` and start nothing; tell what it would cost and how long it would wait."""
+    return validated(app, caller, service.prepare, body, SimulateValidation)

@@ -6,7 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from app.schemas.execution import Execution
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import FlightStepS, Lattice, Start
@@ -101,6 +103,7 @@ class SimulateRequest(Strict):
         default=0.01, description="Between the rows of the trajectory."
     )
     environment: Environment | None = None
+    execution: Execution = Execution()
 
 
 class FlightCost(BaseModel):
@@ -112,10 +115,9 @@ class FlightCost(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class SimulateValidation(BaseModel):
+class SimulateValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["simulate"] = "simulate"
     cost: FlightCost
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.http.context import OwnerDep, ServiceDep
+from app.http.context import CallerDep, ServiceDep
 from app.jobs.schemas import Job
-from app.jobs.submission import OperationRouter, SubmissionDep, priced
+from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.study import service
 from app.study.schemas import StudyRequest, StudyValidation
 
@@ -22,6 +22,6 @@ async def study(body: StudyRequest, submission: SubmissionDep) -> Job:
 
 
 @router.validation("Check a request for a study")
-def validate_study(body: StudyRequest, app: ServiceDep, owner: OwnerDep) -> StudyValidation:
-    """Make the same checks as `POST /study` without starting anything, and tell what it would cost."""
-    return StudyValidation(cost=priced(app, owner, service.prepare, body))
+def validate_study(body: StudyRequest, app: ServiceDep, caller: CallerDep) -> StudyValidation:
+    """Make the checks of `POST /study` and start nothing; tell what it would cost and how long it would wait."""
+    return validated(app, caller, service.prepare, body, StudyValidation)

@@ -15,6 +15,7 @@ from app.identify.schemas import (
     SamplesRequest,
     SoughtModel,
 )
+from app.jobs.schemas import Validation
 from app.schemas.parameters import MAX_LINKS
 
 Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
@@ -45,10 +46,9 @@ class StudyRequest(SamplesRequest):
     model: StudiedModels = StudiedModels()
 
 
-class StudyValidation(BaseModel):
+class StudyValidation(Validation):
     """The request is valid."""
 
-    valid: Literal[True] = True
     operation: Literal["study"] = "study"
     cost: CostEstimate
 

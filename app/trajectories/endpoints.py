@@ -4,28 +4,37 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.errors import (
-    BodyTooLarge,
     InvalidRequest,
     MalformedBody,
+    QuotaExceeded,
     TrajectoryNotFound,
     UnsupportedMediaType,
 )
-from app.http.context import OwnerDep, Service, ServiceDep
-from app.http.json_body import parse_json
-from app.http.problems import documented
+from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
+from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
+from app.http.problems import documented, escaped
+from app.keys.records import Scope
 from app.trajectories import repository, service
-from app.trajectories.schemas import Trajectory, TrajectorySummary, TrajectoryUpload
+from app.trajectories.schemas import (
+    Trajectory,
+    TrajectoryPage,
+    TrajectorySummary,
+    TrajectoryUpload,
+)
 
 router = APIRouter(tags=["trajectories"])
 
+ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 MAX_NAME_BYTES = 1024
 FORM_SCHEMA: dict[str, Any] = {
     "title": "TrajectoryFile",
@@ -35,7 +44,8 @@ FORM_SCHEMA: dict[str, Any] = {
         "file": {
             "type": "string",
             "format": "binary",
-            "description": "CSV: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
+            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), told by the ending "
+            "of its name: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
         },
         "name": {
             "type": "string",
@@ -57,69 +67,70 @@ REQUEST_BODY: dict[str, Any] = {
 
 @router.post(
     "/trajectories",
+    dependencies=[demands(Scope.DATA_WRITE)],
     operation_id="upload_trajectory",
     summary="Upload a sample flight",
     status_code=201,
-    responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest),
+    responses=documented(*BODY_ERRORS, QuotaExceeded),
     openapi_extra=REQUEST_BODY,
 )
 async def upload_trajectory(
-    request: Request, response: Response, app: ServiceDep, owner: OwnerDep
+    request: Request, response: Response, app: ServiceDep, caller: CallerDep
 ) -> TrajectorySummary:
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
-    kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    kind = media_type(request)
     if kind == "multipart/form-data":
-        stored = await _from_form(request, app, owner)
-    elif kind == "application/json" or kind.endswith("+json"):
-        body = await request.body()
-        stored = await run_in_threadpool(_from_json, body, app, owner)
+        upload, pointer = await _from_form(request, app), "/file"
+    elif is_json(kind):
+        upload, pointer = _checked(await json_document(request)), ""
     else:
         raise UnsupportedMediaType(
-            f"The body is announced as {kind or 'nothing'!r}.",
+            f"The body is announced as {kind[:60] or 'nothing'!r}.",
             "#header/Content-Type",
-            "Send multipart/form-data with a CSV `file` (curl -F file=@flight.csv), or application/json.",
+            "Send multipart/form-data with a `file` (curl -F file=@flight.csv), or application/json.",
         )
+
+    def store() -> repository.StoredTrajectory:
+        with app.database.write() as session:
+            return service.store_trajectory(session, caller, upload, pointer)
+
+    stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"
     return _summary(stored)
 
 
-async def _from_form(request: Request, app: Service, owner: str) -> repository.StoredTrajectory:
+async def _from_form(request: Request, app: Service) -> TrajectoryUpload:
     try:
         form = await request.form(max_files=1, max_fields=4, max_part_size=MAX_NAME_BYTES)
     except HTTPException as error:
-        hint = "One part `file` with the CSV and optionally one part `name`."
+        hint = "One part `file` with the flight and optionally one part `name`."
         raise MalformedBody(f"The form cannot be read: {error.detail}", hint=hint) from None
     try:
         file, name = form.get("file"), form.get("name")
         if not isinstance(file, UploadFile):
             raise InvalidRequest(
-                "The form has no file.", "/file", "Send the CSV as the part `file`: curl -F file=@flight.csv"
+                "The form has no file.", "/file", "Send it as the part `file`: curl -F file=@flight.csv"
             )
         unknown = set(form) - {"file", "name"}
         if unknown:
             raise InvalidRequest(
-                "The form has unknown parts.", f"/{min(unknown)[:60]}", "Only `file` and `name` are read."
+                "The form has unknown parts.",
+                f"/{escaped(min(unknown)[:60])}",
+                "Only `file` and `name` are read.",
             )
-
-        def read_and_store() -> repository.StoredTrajectory:
-            upload = service.from_csv(file.file, file.filename or "", name if isinstance(name, str) else None)
-            with app.database.write() as session:
-                return service.store_trajectory(session, owner, upload, "/file")
-
-        return await run_in_threadpool(read_and_store)
+        filename = file.filename or ""
+        columns = await app.parsers.flight(service.file_kind(filename), file.file, "/file")
+        return service.upload_of(columns, filename, name if isinstance(name, str) else None)
     finally:
         await form.close()
 
 
-def _from_json(body: bytes, app: Service, owner: str) -> repository.StoredTrajectory:
-    document = parse_json(body)
+def _checked(document: Any) -> TrajectoryUpload:
     try:
-        upload = TrajectoryUpload.model_validate(document)
+        return TrajectoryUpload.model_validate(document)
     except ValidationError as error:
         items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors(include_url=False)]
         raise RequestValidationError(items, body=document) from None
-    with app.database.write() as session:
-        return service.store_trajectory(session, owner, upload, "")
 
 
 def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
@@ -133,17 +144,58 @@ def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
 
 
 @router.get(
+    "/trajectories",
+    dependencies=[demands(Scope.DATA_READ)],
+    operation_id="list_trajectories",
+    summary="List uploaded flights",
+    responses=documented(InvalidRequest),
+)
+def list_trajectories(
+    app: ServiceDep,
+    owner: OwnerDep,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> TrajectoryPage:
+    """Your uploaded flights without their rows, newest first."""
+    with app.database.read() as session:
+        found = repository.list_trajectories(session, owner, before=cursor, limit=limit + 1)
+    shown = [_summary(stored) for stored in found[:limit]]
+    return TrajectoryPage(trajectories=shown, next_cursor=shown[-1].id if len(found) > limit else None)
+
+
+@router.get(
     "/trajectories/{trajectory_id}",
+    dependencies=[demands(Scope.DATA_READ)],
     operation_id="get_trajectory",
     summary="Read a sample flight back",
+    response_model=Trajectory,
     responses=documented(InvalidRequest, TrajectoryNotFound),
 )
 def get_trajectory(
     app: ServiceDep,
     owner: OwnerDep,
-    trajectory_id: Annotated[str, Path(pattern=r"^[A-Za-z0-9_]{1,64}$")],
-) -> Trajectory:
+    trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)],
+) -> Response:
     """Return an uploaded flight with its rows, in s and rad."""
     with app.database.read() as session:
-        stored, columns = repository.get_trajectory(session, owner, trajectory_id)
-    return Trajectory(**_summary(stored).model_dump(), **columns)
+        stored, columns = repository.get_trajectory_json(session, owner, trajectory_id)
+    # the rows go out as they are stored: to parse and write a long flight would hold up the other requests
+    text = _summary(stored).model_dump_json().encode()[:-1] + b"," + columns[1:]
+    return Response(text, media_type="application/json")
+
+
+@router.delete(
+    "/trajectories/{trajectory_id}",
+    dependencies=[demands(Scope.DATA_WRITE)],
+    operation_id="delete_trajectory",
+    summary="Delete an uploaded flight",
+    status_code=204,
+    responses=documented(InvalidRequest, TrajectoryNotFound),
+)
+def delete_trajectory(
+    app: ServiceDep, caller: CallerDep, trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)]
+) -> None:
+    """Delete an uploaded flight; jobs that were started with it have copies of their own."""
+    with app.database.write() as session:
+        repository.delete_trajectory(session, caller.owner, trajectory_id)
+        note(session, caller, Action.TRAJECTORY_DELETE, trajectory_id)

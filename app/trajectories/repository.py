@@ -5,17 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import Row, delete, insert, select
 
 from app.database import Session, database_time
-from app.documents import packed, unpacked
+from app.documents import packed, unpacked, unpacked_json
 from app.errors import TrajectoryNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment
 from app.tables import trajectories
+from app.trajectories.schemas import TrajectoryUpload
 
 Columns = dict[str, list[float]]
+
+SUMMARY_COLUMNS = (
+    trajectories.c.id,
+    trajectories.c.name,
+    trajectories.c.rows,
+    trajectories.c.duration_s,
+    trajectories.c.created_at,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,29 +39,64 @@ class StoredTrajectory:
     created_at: datetime
 
 
-def insert_trajectory(session: Session, owner: str, name: str, columns: Columns) -> StoredTrajectory:
-    """Store a flight whose columns were checked."""
-    time_s = columns["time_s"]
+def stored_form(columns: Columns) -> bytes:
+    """The columns as they are stored; this takes longer than all the rest, so it is done once."""
+    return packed(columns)
+
+
+def insert_trajectory(
+    session: Session, owner: str, key_id: str | None, flight: TrajectoryUpload, document: bytes
+) -> StoredTrajectory:
+    """Store a flight whose columns were checked; `document` is their stored form."""
+    time_s = flight.time_s
     row = session.execute(
         insert(trajectories)
         .values(
             id=new_identifier("traj"),
             owner=owner,
-            name=name,
+            key_id=key_id,
+            name=flight.name,
             rows=len(time_s),
             duration_s=time_s[-1] - time_s[0],
-            document=packed(columns),
+            document=document,
+            size_bytes=len(document),
             created_at=database_time(),
         )
-        .returning(
-            trajectories.c.id,
-            trajectories.c.name,
-            trajectories.c.rows,
-            trajectories.c.duration_s,
-            trajectories.c.created_at,
-        )
+        .returning(*SUMMARY_COLUMNS)
     ).one()
+    return _summary(row)
+
+
+def _summary(row: Row[*tuple[Any, ...]]) -> StoredTrajectory:
     return StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+
+
+def list_trajectories(
+    session: Session, owner: str, *, before: str | None, limit: int
+) -> list[StoredTrajectory]:
+    """Newest flights of `owner` first, older than `before` when given."""
+    query = select(*SUMMARY_COLUMNS).where(trajectories.c.owner == owner)
+    if before is not None:
+        query = query.where(trajectories.c.id < before)
+    rows = session.execute(query.order_by(trajectories.c.id.desc()).limit(limit))
+    return [_summary(row) for row in rows]
+
+
+def delete_trajectory(session: Session, owner: str, trajectory_id: str) -> None:
+    """Delete one flight; jobs that were started with it have copies of their own.
+
+    Raises
+    ------
+    TrajectoryNotFound
+        When `owner` has no such trajectory.
+    """
+    deleted = session.execute(
+        delete(trajectories)
+        .where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
+        .returning(trajectories.c.id)
+    ).one_or_none()
+    if deleted is None:
+        raise TrajectoryNotFound(trajectory_id)
 
 
 def row_counts(session: Session, owner: str, ids: Iterable[str]) -> dict[str, int]:
@@ -72,10 +117,26 @@ def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[St
     TrajectoryNotFound
         When `owner` has no such trajectory.
     """
+    row = _row(session, owner, trajectory_id)
+    return _summary(row), unpacked(row.document)
+
+
+def get_trajectory_json(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, bytes]:
+    """Read one flight with its rows as the JSON text that is stored.
+
+    Raises
+    ------
+    TrajectoryNotFound
+        When `owner` has no such trajectory.
+    """
+    row = _row(session, owner, trajectory_id)
+    return _summary(row), unpacked_json(row.document)
+
+
+def _row(session: Session, owner: str, trajectory_id: str) -> Row[*tuple[Any, ...]]:
     row = session.execute(
         select(trajectories).where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
     ).one_or_none()
     if row is None:
         raise TrajectoryNotFound(trajectory_id)
-    summary = StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
-    return summary, unpacked(row.document)
+    return row

@@ -32,6 +32,13 @@ class TrajectorySummary(BaseModel):
     created_at: datetime
 
 
+class TrajectoryPage(BaseModel):
+    """Uploaded flights, newest first."""
+
+    trajectories: list[TrajectorySummary]
+    next_cursor: str | None = Field(description="Pass as `cursor` to get the next page; null on the last.")
+
+
 class Trajectory(TrajectorySummary):
     """An uploaded flight with its rows."""
 

@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import PurePosixPath
-from typing import BinaryIO
 
 from pydantic import ValidationError
 
+from app.audit.records import Action
+from app.audit.service import note
 from app.database import Session
-from app.errors import Fault, InvalidRequest, UnsupportedMediaType
+from app.errors import Fault, InvalidRequest
+from app.http.context import Caller
+from app.keys.quota import charge_bytes
+from app.parsing.pool import refusal
 from app.schemas.fields import MIN_ROWS
 from app.trajectories.checks import columns_faults
-from app.trajectories.csv_reader import read_csv
-from app.trajectories.repository import StoredTrajectory, insert_trajectory
+from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
 from app.trajectories.schemas import TrajectoryUpload
+from samplefiles.fault import FileFault
+from samplefiles.reading import kind_of
 
-CSV_ENDINGS = ("", ".csv", ".txt")
-HINT = "Send CSV (columns t, sweep_left, sweep_right, phi, theta, psi), or the same columns as JSON."
+
+def file_kind(filename: str) -> str:
+    """What an uploaded file is, by its name.
+
+    Raises
+    ------
+    UnsupportedMediaType
+        When files of its kind are not read.
+    """
+    try:
+        return kind_of(PurePosixPath(filename).suffix)
+    except FileFault as fault:
+        raise refusal(fault, "/file") from None
 
 
 def name_from_file(filename: str) -> str:
@@ -29,33 +44,22 @@ def name_from_file(filename: str) -> str:
     return plain or "trajectory"
 
 
-def from_csv(file: BinaryIO, filename: str, name: str | None) -> TrajectoryUpload:
-    """Read an uploaded file.
+def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) -> TrajectoryUpload:
+    """Make an upload of a file's columns.
 
     Raises
     ------
-    UnsupportedMediaType
-        When its ending tells another format.
     InvalidRequest
         Naming row and column.
     """
-    ending = PurePosixPath(filename).suffix.lower()
-    if ending not in CSV_ENDINGS:
-        raise UnsupportedMediaType(f"Files of the kind {ending!r} are not read.", "/file", HINT)
-    columns = read_csv(io.TextIOWrapper(file, encoding="utf-8-sig", newline=""))
-    if len(columns["time_s"]) < MIN_ROWS:
+    named = {"time_s" if key == "t" else f"{key}_rad": values for key, values in columns.items()}
+    if len(named["time_s"]) < MIN_ROWS:
+        hint = "Send the whole flight."
         raise InvalidRequest.of(
-            [
-                Fault(
-                    "too_short",
-                    f"The file has fewer than {MIN_ROWS} rows.",
-                    "/file",
-                    "Send the whole flight.",
-                )
-            ]
+            [Fault("too_short", f"The file has fewer than {MIN_ROWS} rows.", "/file", hint)]
         )
     try:
-        return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **columns)
+        return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **named)
     except ValidationError as error:
         faults = [
             Fault(
@@ -70,7 +74,7 @@ def from_csv(file: BinaryIO, filename: str, name: str | None) -> TrajectoryUploa
 
 
 def store_trajectory(
-    session: Session, owner: str, upload: TrajectoryUpload, pointer: str
+    session: Session, caller: Caller, upload: TrajectoryUpload, pointer: str
 ) -> StoredTrajectory:
     """Check and store a flight.
 
@@ -78,8 +82,14 @@ def store_trajectory(
     ------
     InvalidRequest
         When columns differ in length or time does not rise.
+    QuotaExceeded
+        When the caller's key may not store that much more.
     """
     faults = columns_faults(upload, pointer)
     if faults:
         raise InvalidRequest.of(faults)
-    return insert_trajectory(session, owner, upload.name, upload.model_dump(exclude={"name"}))
+    document = stored_form(upload.model_dump(exclude={"name"}))
+    charge_bytes(session, caller.key_id, len(document))
+    stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
+    note(session, caller, Action.TRAJECTORY_POST, stored.id)
+    return stored

@@ -1,14 +1,24 @@
-"""``morphid db``: migrate the database."""
+"""``morphid db``: migrate, copy and put back the database."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.screen import reports_errors
+from cli.commands import options
+from cli.screen import print_json, reports_errors, stdout
 
-database = typer.Typer(help="Migrate the database.", no_args_is_help=True)
+if TYPE_CHECKING:
+    from cli.backup import Backup
+
+DataDir = Annotated[
+    Path | None,
+    typer.Option(help="Of the service (`morphid serve --data-dir`); or set MORPHID_DATABASE_URL."),
+]
+
+database = typer.Typer(help="Migrate, copy and put back the database.", no_args_is_help=True)
 
 
 @database.command("upgrade")
@@ -27,3 +37,48 @@ def downgrade_database(revision: Annotated[str, typer.Argument(help="`base` empt
     from cli.migrate import configured_url, downgrade_to
 
     downgrade_to(configured_url(), revision)
+
+
+@database.command("backup")
+@reports_errors
+def backup_database(
+    target: Annotated[Path, typer.Argument(metavar="FILE", help="Is made; must not exist.")],
+    data_dir: DataDir = None,
+    as_json: options.AsJson = False,
+) -> None:
+    """Copy the SQLite database to FILE while the service goes on."""
+    from cli.backup import backup
+    from cli.migrate import configured_url
+
+    _say("copied to", backup(configured_url(data_dir), target), as_json=as_json)
+
+
+@database.command("restore")
+@reports_errors
+def restore_database(
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="Made by `morphid db backup`.")],
+    data_dir: DataDir = None,
+    as_json: options.AsJson = False,
+) -> None:
+    """Put FILE in the place of the SQLite database of a service that has ended."""
+    from cli.backup import restore
+    from cli.migrate import configured_url
+
+    _say("put back to", restore(configured_url(data_dir), source), as_json=as_json)
+
+
+def _say(what: str, copy: Backup, *, as_json: bool) -> None:
+    if as_json:
+        print_json(
+            {
+                "file": str(copy.path),
+                "size_bytes": copy.size_bytes,
+                "jobs": copy.jobs,
+                "revision": copy.revision,
+            }
+        )
+    else:
+        stdout().print(
+            f"{copy.jobs} jobs, {copy.size_bytes} bytes, revision {copy.revision}: {what} {copy.path}",
+            soft_wrap=True,
+        )

@@ -27,6 +27,7 @@ def identify(
     generations: options.Generations = None,
     max_seconds: options.MaxSeconds = None,
     url: options.AtUrl = None,
+    api_key: options.AtUrlKey = None,
     json_out: options.JsonFile = None,
     plots: options.Plots = None,
 ) -> None:
@@ -46,7 +47,7 @@ def identify(
         generations=generations,
         max_seconds=max_seconds,
     )
-    hand_over(run(request, url), show_model, json_out=json_out, plots=plots)
+    hand_over(run(request, url, api_key), show_model, json_out=json_out, plots=plots)
 
 
 def show_model(result: Mapping[str, Any]) -> None:

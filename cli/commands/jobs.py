@@ -40,12 +40,13 @@ def list_jobs(
     status: Annotated[str | None, typer.Option(help="Only jobs in this state.")] = None,
     limit: Annotated[int, typer.Option(min=1, max=100, help="At most so many.")] = 20,
     url: options.Url = options.DEFAULT_URL,
+    api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
     """List jobs, the newest first."""
     from cli.service import Service
 
-    with Service(url) as service:
+    with Service(url, api_key) as service:
         found = service.jobs(status=status, limit=limit)
     if as_json:
         print_json(found)
@@ -55,11 +56,16 @@ def list_jobs(
 
 @jobs.command("show")
 @reports_errors
-def show_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+def show_job(
+    job: JobId,
+    url: options.Url = options.DEFAULT_URL,
+    api_key: options.ApiKey = None,
+    as_json: options.AsJson = False,
+) -> None:
     """Show one job, and its result when there is one."""
     from cli.service import Service
 
-    with Service(url) as service:
+    with Service(url, api_key) as service:
         found = service.job(job)
         has_result = found["status"] == "succeeded" or found.get("partial")
         result = service.result(job) if has_result else None
@@ -78,14 +84,19 @@ def show_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: option
 
 @jobs.command("watch")
 @reports_errors
-def watch_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+def watch_job(
+    job: JobId,
+    url: options.Url = options.DEFAULT_URL,
+    api_key: options.ApiKey = None,
+    as_json: options.AsJson = False,
+) -> None:
     """Follow a job to its end; the exit code tells how it ended. With --json, one line per change."""
     import json
 
     from cli.service import Service
 
     last: dict[str, Any] = {}
-    with Service(url) as service, meter() as bar:
+    with Service(url, api_key) as service, meter() as bar:
         for seen in service.watch(job):
             if as_json and seen != last:
                 stdout().print(json.dumps(seen), markup=False, soft_wrap=True)
@@ -101,11 +112,16 @@ def watch_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: optio
 
 @jobs.command("cancel")
 @reports_errors
-def cancel_job(job: JobId, url: options.Url = options.DEFAULT_URL, as_json: options.AsJson = False) -> None:
+def cancel_job(
+    job: JobId,
+    url: options.Url = options.DEFAULT_URL,
+    api_key: options.ApiKey = None,
+    as_json: options.AsJson = False,
+) -> None:
     """Ask for a job's end; what it found so far is kept."""
     from cli.service import Service
 
-    with Service(url) as service:
+    with Service(url, api_key) as service:
         found = service.cancel(job)
     if as_json:
         print_json(found)

@@ -106,6 +106,7 @@ def optimize(
         options.answer_option(help="Write the schedule, CSV; `morphid simulate --schedule` flies it."),
     ] = None,
     url: options.AtUrl = None,
+    api_key: options.AtUrlKey = None,
     json_out: options.JsonFile = None,
     plots: options.Plots = None,
 ) -> None:
@@ -143,7 +144,7 @@ def optimize(
     )
     request.put("/verify", verify, "--verify")
     request.put("/flexible/elements", elements, "--elements")
-    answer = run(request, url)
+    answer = run(request, url, api_key)
     if out is not None and answer.result is not None:
         _write_schedule(answer.result, out)
     hand_over(answer, show_schedule, json_out=json_out, plots=plots)

@@ -45,6 +45,10 @@ class Start(StrEnum):
 
 # of commands that talk to a service anyway
 Url = Annotated[str, typer.Option(envvar="MORPHID_URL", help="Address of the service.")]
+API_KEY_HELP = "Key of the service; better set MORPHID_API_KEY, which no process list shows."
+ApiKey = Annotated[
+    str | None, typer.Option("--api-key", envvar="MORPHID_API_KEY", show_default=False, help=API_KEY_HELP)
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
@@ -79,6 +83,9 @@ MaxSeconds = Annotated[
 ]
 
 AtUrl = Annotated[str | None, answer_option("--url", help="Run at this service instead of in this process.")]
+AtUrlKey = Annotated[
+    str | None, answer_option("--api-key", envvar="MORPHID_API_KEY", show_default=False, help=API_KEY_HELP)
+]
 JsonFile = Annotated[Path | None, answer_option("--json", help="Write the result here; `-` prints it.")]
 Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and curves into this folder.")]
 

@@ -65,6 +65,7 @@ def simulate(
         Path | None, options.answer_option(help="Write the flight, CSV, columns as the samples'.")
     ] = None,
     url: options.AtUrl = None,
+    api_key: options.AtUrlKey = None,
     json_out: options.JsonFile = None,
     plots: options.Plots = None,
 ) -> None:
@@ -85,7 +86,7 @@ def simulate(
     if environment is not None:
         request.put_file("/environment", environment, "--environment")
     _put_schedules(request, schedule, rate, final, duration)
-    answer = run(request, url)
+    answer = run(request, url, api_key)
     if out is not None and answer.result is not None:
         write_bytes(answer.files[FLIGHT_FILE], out)
         wrote(out)

@@ -33,6 +33,7 @@ def study(
     generations: options.Generations = None,
     max_seconds: options.MaxSeconds = None,
     url: options.AtUrl = None,
+    api_key: options.AtUrlKey = None,
     json_out: options.JsonFile = None,
     plots: options.Plots = None,
 ) -> None:
@@ -52,7 +53,7 @@ def study(
         generations=generations,
         max_seconds=max_seconds,
     )
-    hand_over(run(request, url), show_study, json_out=json_out, plots=plots)
+    hand_over(run(request, url, api_key), show_study, json_out=json_out, plots=plots)
 
 
 def _whole_numbers(text: str) -> list[int]:

@@ -59,7 +59,9 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
             "search": json.loads(os.environ.get("MORPHID_SEARCH", "{}")),
         }
     )
-    with Client(base_url=url, timeout=60.0) as service:
+    key = os.environ.get("MORPHID_API_KEY")
+    headers = {"Authorization": f"Bearer {key}"} if key else {}
+    with Client(base_url=url, timeout=60.0, headers=headers) as service:
         job = identify.sync(client=service, body=request)
         while isinstance(job, Job) and job.status in {
             JobStatus.QUEUED,

@@ -6,8 +6,7 @@ import json
 import os
 import sys
 
-import httpx
-from job import run, sample, save, vehicle
+from job import run, sample, save, service_at, vehicle
 
 
 def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> None:
@@ -18,7 +17,7 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> N
         "model": {"links_per_wing": 3},
         "search": json.loads(os.environ.get("MORPHID_SEARCH", "{}")),
     }
-    with httpx.Client(base_url=url, timeout=30.0) as service:
+    with service_at(url) as service:
         _, result = run(service, "identify", body)
     save(result, folder)
     for row in result["fit"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,13 @@ COLUMNS = {
     "theta_rad": "theta",
     "psi_rad": "psi",
 }
+
+
+def service_at(url: str) -> httpx.Client:
+    """Open a client; a service that demands keys gets the one in MORPHID_API_KEY."""
+    key = os.environ.get("MORPHID_API_KEY")
+    headers = {"Authorization": f"Bearer {key}"} if key else {}
+    return httpx.Client(base_url=url, timeout=30.0, headers=headers)
 
 
 def vehicle() -> dict[str, Any]:

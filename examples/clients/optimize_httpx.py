@@ -6,14 +6,13 @@ import json
 import os
 import sys
 
-import httpx
-from job import run, sample, save, vehicle
+from job import run, sample, save, service_at, vehicle
 
 
 def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> None:
     """Identify a model, then sweep the wings by 1 rad in 2 s so that the attitude varies least."""
     search = json.loads(os.environ.get("MORPHID_SEARCH", "{}"))
-    with httpx.Client(base_url=url, timeout=30.0) as service:
+    with service_at(url) as service:
         identification = {
             **vehicle(),
             "samples": [sample("train_rate_0.5", "train")],

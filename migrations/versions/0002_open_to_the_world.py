@@ -167,10 +167,12 @@ def upgrade() -> None:
         "trajectories", sa.Column("size_bytes", sa.BigInteger(), server_default=sa.text("0"), nullable=False)
     )
     op.create_index("ix_trajectories_key_id", "trajectories", ["key_id"])
+    op.create_index("ix_trajectories_created_at", "trajectories", ["created_at"])
 
 
 def downgrade() -> None:
     """Undo."""
+    op.drop_index("ix_trajectories_created_at", table_name="trajectories")
     op.drop_index("ix_trajectories_key_id", table_name="trajectories")
     op.drop_column("trajectories", "size_bytes")
     op.drop_column("trajectories", "key_id")

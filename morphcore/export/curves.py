@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
+
+from samplefiles.csv_table import write_table
 
 Document = dict[str, Any]
 
@@ -46,7 +47,7 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
     Returns
     -------
     File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, sweep_*_rad, then ``<model>_<angle>_rad``. Where
-    a flight diverged its cells are empty. Titles are ours, none can be taken for a formula.
+    a flight diverged its cells are empty.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)
@@ -64,9 +65,9 @@ def curve_table(sample: Document) -> str:
         f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
     }
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
+    write_table(
+        text, columns, ([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
+    )
     return text.getvalue()
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from morphcore.export.figure import Document
+from samplefiles.csv_table import write_table
 
 Column = Sequence[float | None]
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
@@ -50,9 +50,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
 def _table(columns: Mapping[str, Column]) -> bytes:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(_cells(row) for row in zip(*columns.values(), strict=True))
+    write_table(text, columns, (_cells(row) for row in zip(*columns.values(), strict=True)))
     return text.getvalue().encode()
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.fields import Fields
+from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
@@ -17,6 +18,7 @@ from morphcore.steps import Step
 from morphcore.threads import use_threads
 
 __all__ = [
+    "GenerationTask",
     "Identification",
     "IdentifyResult",
     "Interrupted",
@@ -81,5 +83,6 @@ def identification_from_document(document: dict[str, Any], threads: int | None =
     samples = [trajectory_from_document(item, f"/samples/{i}") for i, item in enumerate(listed)]
     model = model_settings(fields.raw("model", {}))
     search = search_settings(fields.raw("search", {}))
+    fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     return Identification(aircraft, flight, samples, model, search)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
+from morphcore.identify.generation import GenerationTask
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
@@ -22,7 +23,7 @@ from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
-from morphcore.swarm import first_swarm, next_swarm
+from morphcore.swarm import SwarmState, first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -76,6 +77,11 @@ class Identification:
             aero_coefficients=self.settings.aero_coefficients,
             bounds=self.settings.bounds,
         )
+        warm_start = self.search.warm_start
+        # (k, d) what is known before the search: the model to begin from, and always the physical guess
+        self.known: Array = np.stack(
+            [*([] if warm_start is None else [self.space.encode(warm_start)]), self.space.guess]
+        )
 
     def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
@@ -104,9 +110,7 @@ class Identification:
             begin = self._clock()
             with one_blas_thread():
                 state = self._baseline(stop) if state is None else self._advance(state, stop)
-            state = replace(state, wall_s=state.wall_s + self._clock() - begin)
-            if self.search.max_seconds is not None and state.wall_s >= self.search.max_seconds:
-                state = replace(state, phase="done")
+            state = self._timed(state, self._clock() - begin)
             yield self._step(state)
 
     def result(self, checkpoint: bytes) -> IdentifyResult:
@@ -119,14 +123,43 @@ class Identification:
         with one_blas_thread():
             return identify_result(self, decode(checkpoint), judged=False)
 
+    # a generation asked for and told, so that others may fly it
+
+    def generation_task(self, checkpoint: bytes) -> GenerationTask | None:
+        """What the step after a checkpoint flies; None where that step is no generation of a swarm."""
+        state = decode(checkpoint)
+        return self._task(state) if state.phase == "swarm" else None
+
+    def task_costs(self, points: Array, stop: Stop | None = None) -> Array:
+        """Costs (p,) of search points (p, d), rad^2: of any part of a task, whoever flies the rest."""
+        with one_blas_thread():
+            return self._costs(points, stop)
+
+    def told(self, checkpoint: bytes, cost: Array, *, wall_s: float = 0.0) -> Step:
+        """The step after a checkpoint, given the costs (p,) of its task: the step that ``steps`` gives.
+
+        ``wall_s`` : what the flights took, s.
+
+        Raises
+        ------
+        ValueError : there is no such task, or it has another number of points.
+        """
+        state = decode(checkpoint)
+        if state.phase != "swarm" or cost.shape != self._task(state).points.shape[:1]:
+            raise ValueError(f"costs {cost.shape} do not answer the task after {state.phase}")
+        with one_blas_thread():
+            return self._step(self._timed(self._moved(state, cost), wall_s))
+
     # one step each
 
     def _baseline(self, stop: Stop | None) -> SearchState:
-        """Fly the physical guess: from here on there is a best so far."""
-        cost = self._costs(self.space.guess[None, :], stop)
+        """Fly what is known before: from here on there is a best so far."""
+        cost = self._costs(self.known, stop)
         following: Phase = "swarm" if self.search.method == "pso" else "screen"
         phase: Phase = following if self.space.dimension else "done"
-        state = SearchState(phase, self.space.guess, float(cost[0]), flights=len(self.training))
+        best = int(np.argmin(cost))
+        flights = cost.size * len(self.training)
+        state = SearchState(phase, self.known[best], float(cost[best]), flights=flights)
         return _recorded(state, "baseline", 0)
 
     def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
@@ -134,14 +167,15 @@ class Identification:
         return step(state, stop)
 
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
-        """Fly candidates around the physical guess and choose the polish's starts among them."""
+        """Fly candidates around what is known and choose the polish's starts among them."""
         rng = np.random.default_rng(self.search.seed)
         spread = rng.normal(0.0, SCREEN_SPREAD, (self.search.screen, self.space.dimension))
-        points = np.clip(self.space.guess + spread, self.space.lower, self.space.upper)
-        points[0] = self.space.guess
+        points = np.clip(self.known[0] + spread, self.space.lower, self.space.upper)
+        known = self.known[: self.search.screen]
+        points[: len(known)] = known
         cost = self._costs(points, stop)
         order = np.argsort(cost, kind="stable")
-        chosen = np.unique(np.append(order[: self.search.starts - 1], 0))
+        chosen = np.unique(np.append(order[: self.search.starts - len(known)], range(len(known))))
         best = int(order[0])
         found = SearchState(
             "polish",
@@ -185,23 +219,39 @@ class Identification:
 
     def _generation(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly one generation of the swarm and move it."""
+        return self._moved(state, self._costs(self._task(state).points, stop))
+
+    def _swarm(self, state: SearchState) -> SwarmState:
+        width = self.space.upper - self.space.lower
+        known = (self.known - self.space.lower) / width
+        return state.swarm or first_swarm(self.search.swarm, known, self.search.seed)
+
+    def _task(self, state: SearchState) -> GenerationTask:
+        swarm, space = self._swarm(state), self.space
+        return GenerationTask(swarm.generation, space.lower + (space.upper - space.lower) * swarm.position)
+
+    def _moved(self, state: SearchState, cost: Array) -> SearchState:
+        """Move the swarm, given the costs of its present positions."""
         settings, space = self.search.swarm, self.space
-        width = space.upper - space.lower
-        swarm = state.swarm or first_swarm(settings, (space.guess - space.lower) / width, self.search.seed)
-        cost = self._costs(space.lower + width * swarm.position, stop)
-        moved = next_swarm(swarm, settings, cost)
+        moved = next_swarm(self._swarm(state), settings, cost)
         least = float(moved.best_cost.min())
         better = least < state.best_cost
         found = replace(
             state,
             phase="swarm" if moved.generation < settings.generations else "done",
-            best=space.lower + width * moved.leader if better else state.best,
+            best=space.lower + (space.upper - space.lower) * moved.leader if better else state.best,
             best_cost=min(least, state.best_cost),
             generation=moved.generation,
             flights=state.flights + cost.size * len(self.training),
             swarm=moved,
         )
         return _recorded(found, "swarm", cost.size, mean_cost=float(cost.mean()))
+
+    def _timed(self, state: SearchState, elapsed_s: float) -> SearchState:
+        """Count the time of a step; when the search has used up its own, that step is the last."""
+        state = replace(state, wall_s=state.wall_s + elapsed_s)
+        over = self.search.max_seconds is not None and state.wall_s >= self.search.max_seconds
+        return replace(state, phase="done") if over else state
 
     # flights
 

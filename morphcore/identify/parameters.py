@@ -33,6 +33,7 @@ DRAG_RANGE = (0.0, 0.08)
 DRAG_UNIT = 0.01
 BOUND_NAMES = ("stiffness_nm_rad", "damping_nms_rad", "division", *AERO_COEFFICIENTS)
 LARGEST_DECADES = 12.0
+WARM_START = "/search/warm_start"  # where a request says what to begin from
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,43 @@ class SearchSpace:
             profile_drag=values["profile_drag"],
             lag=values["lag_s"],
         )
+
+    def encode(self, batch: ParameterBatch) -> Array:
+        """The search point (d,) of a model (one particle), moved into the bounds.
+
+        Corrections that are not searched keep their fixed values.
+
+        Raises
+        ------
+        InvalidInput : it has other links than are sought, or wings of its own where all are sought alike.
+        """
+        if batch.links != self.links:
+            raise InvalidInput(
+                f"the search would begin from a model with {batch.links} links per wing and seeks {self.links}",
+                pointer=WARM_START,
+                hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
+            )
+        wings = batch.division.shape[1]
+        if wings not in (1, self.wing_sets):
+            raise InvalidInput(
+                f"the search would begin from a model with {wings} wings of their own",
+                pointer=WARM_START,
+                hint="set model.separate_wings, or begin from a model whose wings are alike",
+            )
+        shares = np.repeat(batch.division, self.wing_sets // wings, axis=1)
+        stiffness = np.repeat(batch.stiffness, self.wing_sets // wings, axis=1)
+        damping = np.repeat(batch.damping, self.wing_sets // wings, axis=1)
+        with np.errstate(divide="ignore"):  # no stiffness or damping at all: the lower bound stands for it
+            parts = [
+                np.log(shares[0, :, :-1] / shares[0, :, -1:]).ravel(),
+                np.log(stiffness[0]).ravel(),
+                np.log(damping[0]).ravel(),
+                *(
+                    _encode_aero(name, getattr(batch, _FIELDS[name])[:1], self._chord)
+                    for name in self.free_aero
+                ),
+            ]
+        return np.clip(np.concatenate(parts), self.lower, self.upper)
 
     @property
     def _chord(self) -> float:

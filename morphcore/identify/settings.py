@@ -10,7 +10,8 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
-from morphcore.models.equivalent import MOST_LINKS
+from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
+from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
 from morphcore.swarm import SwarmSettings
@@ -23,7 +24,11 @@ PAPER_PARTICLES = 2500
 # starts of the multi-start polish; one start at four links got stuck ten times higher than the best of
 # several
 DEFAULT_STARTS = 8
+DEFAULT_ITERATIONS = 40
 DEFAULT_SCREEN = 192  # candidates flown to find them
+# from a known model there is less to find: its surroundings, and the physical guess in case it is a bad one
+WARM_STARTS = 3
+WARM_SCREEN = 48
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,11 @@ class ModelSettings:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How they are sought: ``swarm`` rules "pso"; the other methods polish ``starts`` candidates."""
+    """How they are sought: ``swarm`` rules "pso"; the other methods polish ``starts`` candidates.
+
+    ``warm_start`` : a model (one particle) to begin from instead of the physical guess, which stays among the
+    candidates.
+    """
 
     method: Method = "hybrid"
     seed: int = 1
@@ -49,7 +58,8 @@ class SearchSettings:
     swarm: SwarmSettings = field(default_factory=SwarmSettings)
     screen: int = DEFAULT_SCREEN
     starts: int = DEFAULT_STARTS
-    iterations: int = 40
+    iterations: int = DEFAULT_ITERATIONS
+    warm_start: ParameterBatch | None = None
 
 
 def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSettings:
@@ -87,14 +97,19 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
         c2=fields.number("c2", default=default.c2, least=0.0, most=4.0),
         inertia=fields.number("inertia", default=default.inertia, least=0.0, most=1.5),
     )
-    polished = SearchSettings()
+    warm_start = None
+    if fields.has("warm_start"):
+        warm_start = parameters_from_document(fields.raw("warm_start"), f"{pointer}/warm_start")
+    warm = warm_start is not None
     settings = SearchSettings(
         method="pso" if paper else method,  # type: ignore[arg-type]
         seed=fields.whole("seed", default=1, least=0, most=LARGEST_SEED),
         max_seconds=fields.optional_number("max_seconds", above=0.0),
         swarm=swarm,
-        screen=swarm.particles if fields.has("particles") else polished.screen,
-        iterations=swarm.generations if fields.has("generations") else polished.iterations,
+        screen=swarm.particles if fields.has("particles") else WARM_SCREEN if warm else DEFAULT_SCREEN,
+        starts=WARM_STARTS if warm else DEFAULT_STARTS,
+        iterations=swarm.generations if fields.has("generations") else DEFAULT_ITERATIONS,
+        warm_start=warm_start,
     )
     fields.done()
     return settings

@@ -120,5 +120,6 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
         start=model.start,
         step_s=STEP_S if model.step_s is None else model.step_s,
     )
+    fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     return run

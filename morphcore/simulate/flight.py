@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +26,7 @@ from morphcore.simulate.record import FlightRecord, recorded_trajectory
 from morphcore.simulate.schedule import Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
+from samplefiles.csv_table import write_table
 
 Array = NDArray[np.float64]
 Schedules = Sequence[Schedule] | Mapping[str, Schedule] | Trajectory
@@ -34,7 +34,6 @@ ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 
 OUTPUT_STEP_S = 0.01  # as the example flights
 LARGEST_ROWS = 200_000  # of a trajectory
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would run a cell that begins so
 
 
 @dataclass(frozen=True)
@@ -159,10 +158,9 @@ def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
         **trajectory.extra,
     }
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(f"'{name}" if name.startswith(FORMULA_STARTS) else name for name in columns)
         # nine digits: a nanoradian of an attitude of one radian
-        writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
+        rows = ([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
+        write_table(stream, columns, rows)
 
 
 class _Fly(Protocol):

@@ -28,9 +28,10 @@ from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
-from morphcore.simulate.trajectory import MOST_ROWS, Trajectory
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.threads import use_threads
+from samplefiles.columns import MOST_ROWS
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -203,6 +204,7 @@ def simulation_from_document(document: Document, threads: int | None = None) -> 
     duration_s = fields.number("duration_s", above=0.0, most=LONGEST_FLIGHT_S)
     output_step_s = fields.number("output_step_s", default=OUTPUT_STEP_S, above=0.0, most=LONGEST_FLIGHT_S)
     environment, seed = environment_from_document(fields.raw("environment", {}))
+    fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     rows = duration_s / output_step_s + 1
     if not 3 <= rows <= MOST_ROWS:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.simulate.csv_columns import read_csv_columns
+from morphcore.simulate.file_columns import read_file_columns
 from morphcore.simulate.schedule import Schedule, Tabulated
+from samplefiles.csv_table import write_table
 
 Array = NDArray[np.float64]
 
@@ -35,19 +35,17 @@ def load_schedule_csv(path: str | Path) -> dict[str, Tabulated]:
     InvalidInput : a column is missing or holds something that is not a finite number, there are too few rows,
         or time does not rise.
     """
-    table = read_csv_columns(path)
-    columns = table.quantities(SCHEDULE_COLUMNS)
+    table = read_file_columns(path, SCHEDULE_COLUMNS)
+    columns = table.values
     time_s = columns["t"]
     if not LEAST_ROWS <= time_s.size <= MOST_ROWS:
         raise InvalidInput(f"{path} holds {time_s.size} rows", hint=f"give {LEAST_ROWS} to {MOST_ROWS} rows")
     falls = np.flatnonzero(np.diff(time_s) <= 0.0)
     if falls.size:
         raise InvalidInput(
-            f"{path}, line {table.lines[falls[0] + 1]}: time does not rise",
+            f"{table.place(falls[0] + 1)}: time does not rise",
             hint="sort the rows by time and drop doubles",
         )
-    for column in columns.values():
-        column.setflags(write=False)
     return {side: Tabulated(time_s, columns[f"sweep_{side}"]) for side in ("left", "right")}
 
 
@@ -55,7 +53,6 @@ def write_schedule_csv(schedules: Mapping[str, Schedule], time_s: Array, path: s
     """Write the hinge angles of both sides at times (k,), s; `load_schedule_csv` reads them back."""
     angles = [schedules[side].motion(time_s).angle for side in ("left", "right")]
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(SCHEDULE_COLUMNS)
         # twelve digits: second differences of rows 10 ms apart are right to 1e-7 rad/s^2
-        writer.writerows([f"{value:.12g}" for value in row] for row in zip(time_s, *angles, strict=True))
+        rows = ([f"{value:.12g}" for value in row] for row in zip(time_s, *angles, strict=True))
+        write_table(stream, SCHEDULE_COLUMNS, rows)

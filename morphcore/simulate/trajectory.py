@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
-from morphcore.simulate.csv_columns import read_csv_columns
+from morphcore.simulate.file_columns import read_file_columns
+from samplefiles.columns import MOST_ROWS
+from samplefiles.titles import FLIGHT
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
-
-MOST_ROWS = 200_000
-COLUMNS = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 
 
 @dataclass(frozen=True)
@@ -51,28 +50,25 @@ class Trajectory:
 
 
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
-    """Read a CSV file with the columns t, sweep_left, sweep_right, phi, theta, psi.
+    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, sweep_left, sweep_right, phi, theta, psi.
 
-    Units in the names are accepted (``t_s``, ``theta_deg``, ``phi_rad``); other columns of numbers land in
-    ``extra`` as they are.
+    The ending of its name tells the kind. Units in the names are accepted (``t_ms``, ``theta_deg``); other
+    columns of numbers land in ``extra`` as they are. In JSON the columns are lists of one object, in MATLAB
+    vectors or the fields of one struct; Parquet needs pyarrow.
 
     Raises
     ------
-    InvalidInput : a column is missing or holds something that is not a finite number, or time does not rise.
+    InvalidInput : the file cannot be read, a column is missing or holds something that is not a finite
+        number, or time does not rise.
     """
-    columns = read_csv_columns(path)
-    values = columns.quantities(COLUMNS)
+    columns = read_file_columns(path, FLIGHT)
     return checked(
         Trajectory(
             name=columns.path.stem,
-            time_s=values["t"],
-            sweep_left=values["sweep_left"],
-            sweep_right=values["sweep_right"],
-            phi=values["phi"],
-            theta=values["theta"],
-            psi=values["psi"],
+            time_s=columns.values["t"],
+            **{name: columns.values[name] for name in FLIGHT if name != "t"},  # type: ignore[arg-type]
             role=role,
-            extra=columns.others(COLUMNS),
+            extra=columns.others,
         ),
         pointer=f"/{columns.path.name}",
     )

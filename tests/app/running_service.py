@@ -13,6 +13,7 @@ import httpx
 import uvicorn
 
 from app.database import Database
+from app.http.server import guarded_config
 from app.jobs import store
 from app.jobs.records import Claim
 from app.main import create_app
@@ -52,7 +53,9 @@ class RunningService:
 @contextmanager
 def running_service(settings: Settings) -> Iterator[RunningService]:
     """Serve until the block ends."""
-    config = uvicorn.Config(create_app(settings), port=0, log_level="error", timeout_graceful_shutdown=2)
+    config = guarded_config(
+        create_app(settings), settings, port=0, log_level="error", timeout_graceful_shutdown=2
+    )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()

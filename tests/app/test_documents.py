@@ -8,7 +8,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.documents import digest, json_bytes, packed, unpacked
+from app.documents import json_bytes, packed, sealed, unpacked
 from app.identifiers import new_identifier
 
 DOCUMENTS = st.dictionaries(
@@ -25,7 +25,7 @@ def test_packing_loses_nothing(document: dict[str, object]) -> None:
 @given(DOCUMENTS)
 def test_digest_ignores_the_order_of_keys(document: dict[str, object]) -> None:
     """The same document written in another order has the same digest."""
-    assert digest(dict(reversed(document.items()))) == digest(document)
+    assert sealed(dict(reversed(document.items()))) == sealed(document)
 
 
 def test_text_is_json_whatever_the_numbers() -> None:

@@ -30,7 +30,7 @@ async def accept_one():
     app = create_app()
     async with app.router.lifespan_context(app):
         transport = httpx.ASGITransport(app)
-        async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
             answer = await client.post("/identify", json=json.load(sys.stdin))
             assert answer.status_code == 202
 

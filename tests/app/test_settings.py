@@ -24,9 +24,13 @@ def test_defaults_serve_one_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
-        ({"host": EVERYWHERE}, "MORPHID_ALLOW_OPEN"),
-        ({"host": "192.168.1.5"}, "MORPHID_ALLOW_OPEN"),
-        ({"host": "example.org"}, "MORPHID_ALLOW_OPEN"),
+        ({"host": EVERYWHERE, "auth": "off"}, "MORPHID_ALLOW_OPEN"),
+        ({"host": "192.168.1.5", "auth": "off"}, "MORPHID_ALLOW_OPEN"),
+        ({"host": "example.org", "auth": "off"}, "MORPHID_ALLOW_OPEN"),
+        ({"auth": "sometimes"}, "MORPHID_AUTH"),
+        ({"database_url": "postgresql://morphid:morphid@db/morphid"}, "openssl rand"),
+        ({"database_url": "postgresql://me:me@10.0.0.7/x", "auth": "keys"}, "openssl rand"),
+        ({"database_url": "postgresql://u:%50assword@db.example/x", "allow_open": True}, "openssl rand"),
         ({"database_url": "sqlite:///x", "broker_url": "redis://queue.example/0"}, "Postgres"),
         ({"heartbeat_s": 40.0}, "MORPHID_LEASE_S"),
         ({"port": 70_000}, "MORPHID_PORT"),
@@ -39,9 +43,39 @@ def test_unsafe_combinations_are_refused_in_words(overrides: dict[str, object], 
         load_settings(**overrides)
 
 
-def test_open_service_must_be_asked_for() -> None:
-    """Listening beyond this machine works when it is allowed by name."""
-    assert load_settings(host=EVERYWHERE, allow_open=True).host == EVERYWHERE
+@pytest.mark.parametrize(
+    ("given", "demanded"),
+    [
+        ({}, False),
+        ({"host": "localhost"}, False),
+        ({"host": EVERYWHERE}, True),
+        ({"host": "192.168.1.5"}, True),
+        ({"host": "morphid.example"}, True),
+        ({"host": EVERYWHERE, "allow_open": True}, False),
+        ({"auth": "keys"}, True),
+        ({"auth": "keys", "allow_open": True}, True),
+        ({"auth": "off"}, False),
+        ({"auth": "off", "host": EVERYWHERE, "allow_open": True}, False),
+    ],
+)
+def test_keys_are_demanded_beyond_this_machine(given: dict[str, object], demanded: bool) -> None:  # noqa: FBT001
+    """An open service beyond loopback exists only when it is asked for by name."""
+    assert load_settings(**given).demands_keys is demanded
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://morphid:morphid@127.0.0.1/morphid",
+        "postgresql://morphid@/morphid?host=/run/postgresql",
+        "postgresql://morphid@db.example/morphid",
+        "postgresql://morphid:5f0d6c0a2a8e@db.example/morphid",
+        "sqlite:///morphid.sqlite3",
+    ],
+)
+def test_other_passwords_are_the_operators_business(url: str) -> None:
+    """A default password matters where a network leads to the database; none may mean a certificate."""
+    assert load_settings(database_url=url).database_url == url
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "[::1]", "localhost"])

@@ -18,9 +18,39 @@ def test_a_broken_json_file_names_the_line(tmp_path: Path) -> None:
     assert caught.value.code is Exit.INVALID_INPUT
 
 
-def test_saved_names_stay_in_the_folder(tmp_path: Path) -> None:
-    """A file name from a service cannot climb out of the folder."""
-    assert save_files({"../../evil.svg": b"x"}, tmp_path / "plots") == [tmp_path / "plots" / "evil.svg"]
+NASTY_NAMES = [
+    "../../evil.svg",
+    "..",
+    ".",
+    "",
+    "/etc/evil",
+    "a/b.svg",
+    "..\\evil.svg",
+    ".bashrc",
+    "a\x00.svg",
+    "a\n.svg",
+    "\x1b]0;owned\x07.svg",
+    "a\u202egvs.svg",
+    "a.svg ",
+    "-rf",
+    "x" * 300,
+]
+
+
+@pytest.mark.parametrize("name", NASTY_NAMES)
+def test_saved_names_stay_in_the_folder(tmp_path: Path, name: str) -> None:
+    """A name from a service that is no plain file name is refused in words; nothing at all is written."""
+    with pytest.raises(CommandError, match="not a plain file name") as caught:
+        save_files({"fine.svg": b"x", name: b"x"}, tmp_path / "plots")
+    assert str(caught.value).isprintable()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_plain_names_are_saved(tmp_path: Path) -> None:
+    """Every file lands in the folder, which is made."""
+    files = {"convergence.svg": b"x", "curves_train_rate_0.8.csv": b"y"}
+    saved = save_files(files, tmp_path / "new" / "plots")
+    assert {path.name: path.read_bytes() for path in saved} == files
 
 
 def test_a_missing_folder_is_found_before_the_work(tmp_path: Path) -> None:

@@ -1,26 +1,103 @@
-"""A real Celery worker whose only operation is a random walk: faults without numerics."""
+"""A real Celery worker whose operations are random walks: faults without numerics, and some on request.
+
+Environment: ``MORPHID_TEST_CLOCK_S`` puts this process's clock wrong, ``MORPHID_TEST_DELIVERIES`` sends every
+message so often, ``MORPHID_TEST_WARM_UP_S`` lets kernels take time to compile, ``MORPHID_TEST_PAGES`` bounds
+an SQLite file as a full disk does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
 
+from sqlalchemy import event
+from sqlalchemy.engine import Engine
+
+from tests.faults import wrong_clock
+from tests.faults.ledger import SEED
 from tests.worker.conftest import Walk
-from worker import numerics, operations
+from worker import numerics, operations, tasks
+from worker.celery_app import app
+
+STEPS_PER_S = 10  # of a flight's duration: how a request at the API's door says how long a walk shall be
+PAUSE_S = 0.01
+
+
+class FaultyWalk(Walk):
+    """A walk that can swell its checkpoints, end slowly, eat memory and kill its worker."""
+
+    def steps(self, checkpoint: bytes | None, stop: operations.Stop) -> Iterator[operations.Step]:
+        """Walk, with what was asked for."""
+        for step in super().steps(checkpoint, stop):
+            number = step.progress["generation"]
+            if number == self.request.get("dies_at"):
+                die(self.request["death"])
+            ballast = b" " * (number * self.request.get("swells_bytes", 0))  # JSON may end in spaces
+            yield operations.Step(step.progress, step.checkpoint + ballast)
+
+    def outcome(self, checkpoint: bytes) -> operations.Outcome:
+        """Give the place reached, after drawing plots for a while."""
+        time.sleep(self.request.get("outcome_s", 0.0))
+        return super().outcome(checkpoint)
+
+    best_so_far = Walk.outcome
+
+
+def die(death: str) -> None:
+    """End this process in one of the ways in which jobs do it."""
+    if death == "exit":
+        os._exit(3)
+    if death == "segfault":
+        import ctypes
+
+        ctypes.string_at(0)
+    os.kill(os.getpid(), 9)  # as the kernel does when memory is short
 
 
 def begin(request: operations.Document, _threads: int) -> Walk:
     """Begin a walk."""
-    return Walk(request)
+    return FaultyWalk(request)
 
 
-def no_kernels(_threads: int) -> None:
+def begin_flight(request: operations.Document, _threads: int) -> Walk:
+    """Begin a walk where the API was asked for a flight."""
+    return FaultyWalk({"seed": SEED, "steps": flight_steps(request["duration_s"]), "pause_s": PAUSE_S})
+
+
+def flight_steps(duration_s: float) -> int:
+    """Steps of the walk that stands for a flight of this duration."""
+    return round(STEPS_PER_S * duration_s)
+
+
+def kernels(_threads: int) -> None:
     """Compile nothing: a walk needs no kernels."""
+    time.sleep(float(os.environ.get("MORPHID_TEST_WARM_UP_S", "0")))
 
 
-walks: Mapping[str, str] = {"walk": "tests.faults.walk_worker:begin"}
+here = "tests.faults.walk_worker"
+walks: Mapping[str, str] = {"walk": f"{here}:begin", "simulate": f"{here}:begin_flight"}
 operations.OPERATIONS = walks
-numerics.warm_up_library = no_kernels
+numerics.warm_up_library = kernels
 
-from worker.celery_app import app  # noqa: E402 - after the operation is in place
+if "MORPHID_TEST_PAGES" in os.environ:
+
+    @event.listens_for(Engine, "connect")
+    def _bound(connection: Any, _record: Any) -> None:
+        connection.execute(f"PRAGMA max_page_count = {int(os.environ['MORPHID_TEST_PAGES'])}")
+
+
+if "MORPHID_TEST_DELIVERIES" in os.environ:
+    publish_once = tasks.publish
+
+    def publish(job_id: str) -> None:
+        """Send a message several times."""
+        for _ in range(int(os.environ["MORPHID_TEST_DELIVERIES"])):
+            publish_once(job_id)
+
+    tasks.publish = publish
+
+wrong_clock.set_from_environment()
 
 __all__ = ["app", "begin"]

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import time
-import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from app.jobs.records import JobStatus
 from app.jobs.store import create_job, get_job
 from cli.broker import free_port, prepare_broker
 from cli.supervisor import ChildSpec, Supervisor
+from tests.servers.postgres import GivenPostgres
 
 PORT_INSIDE = "8000"
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
@@ -79,13 +79,8 @@ class Composition:
 
 
 @pytest.fixture
-def composition(root: Path, tmp_path: Path, postgres_server: str) -> Iterator[Composition]:
+def composition(root: Path, tmp_path: Path, postgres_server: GivenPostgres) -> Iterator[Composition]:
     """Postgres and a broker run; the compose file's own services are the test's to start."""
-    import psycopg
-
-    name = f"compose_{uuid.uuid4().hex}"
-    with psycopg.connect(f"postgresql://postgres@/postgres?host={postgres_server}", autocommit=True) as link:
-        link.execute(f"CREATE DATABASE {name}")
     supervisor = Supervisor(tmp_path / "logs", report=lambda _sentence: None)
     broker = prepare_broker(tmp_path)
     child = supervisor.start(broker.spec)
@@ -94,7 +89,7 @@ def composition(root: Path, tmp_path: Path, postgres_server: str) -> Iterator[Co
         services=yaml.safe_load((root / "docker-compose.yml").read_text())["services"],
         supervisor=supervisor,
         environment={
-            "MORPHID_DATABASE_URL": f"postgresql://postgres@/{name}?host={postgres_server}",
+            "MORPHID_DATABASE_URL": postgres_server.new_database(),
             "MORPHID_BROKER_URL": broker.url,
             "PATH": PATH,
         },

@@ -55,13 +55,13 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "holds no rows"),
+        ("", "the file is empty"),
         ("t,sweep_left,sweep_right\n", "holds no rows"),
         ("t,sweep_left\n0,0\n1,0\n2,0\n", "no column sweep_right"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,x\n2,0,0\n", "line 3: sweep_right is 'x'"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,nan\n2,0,0\n", "line 3: sweep_right is 'nan'"),
         ("t,sweep_left,sweep_right\n0,0,0\n\n2,0,0\n1,0,0\n", "line 5: time does not rise"),
-        ("t,sweep_left,sweep_right\n0,0,0\n1,0\n", "line 3: 2 cells under 3 names"),
+        ("t,sweep_left,sweep_right\n0,0,0\n1,0\n", "line 3: 2 cells under 3 titles"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,0\n", "holds 2 rows"),
     ],
 )
@@ -80,5 +80,5 @@ def test_a_missing_schedule_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"nowhere\.csv does not exist"):
         load_schedule_csv(tmp_path / "nowhere.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00t")
-    with pytest.raises(InvalidInput, match=r"binary\.csv cannot be read"):
+    with pytest.raises(InvalidInput, match=r"binary\.csv: this is not CSV text"):
         load_schedule_csv(tmp_path / "binary.csv")

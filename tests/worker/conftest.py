@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from app.database import Database, upgrade
+from app.jobs.creation import Terms
 from app.jobs.records import Job
 from app.jobs.store import create_job, get_job
 from worker.numerics import Kernels
@@ -100,8 +101,7 @@ class Queue:
                 owner=OWNER,
                 operation="walk",
                 request={"seed": 7, "steps": 20, **request},
-                max_seconds=max_seconds,
-                priority=priority,
+                terms=Terms(max_seconds=max_seconds, priority=priority),
             )
         return job.id
 

@@ -22,9 +22,7 @@ def test_the_reaper_runs_often_enough() -> None:
     schedule = make_app(settings).conf.beat_schedule["reap"]
     assert schedule["task"] == REAP
     assert settings.lease_s + schedule["schedule"] <= 75.0
-    assert schedule["options"]["expires"] <= schedule["schedule"], (
-        "rounds that nobody made are not caught up with"
-    )
+    assert schedule["options"]["expires"] > 3 * 3600.0, "a worker whose clock is hours wrong still takes part"
 
 
 def test_app_and_worker_agree_on_names() -> None:

@@ -32,10 +32,9 @@ def fresh_process(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 
 
 def test_thread_counts_are_fixed_for_children(fresh_process: dict[str, str]) -> None:
-    """The environment that children inherit holds the thread count and a layer that survives a fork."""
+    """Children inherit the kernels' thread count, and one thread for every pool beneath them."""
     prepare_environment(3)
     assert fresh_process["NUMBA_NUM_THREADS"] == "3"
-    assert fresh_process["NUMBA_THREADING_LAYER"] == "workqueue"
     assert fresh_process["OPENBLAS_NUM_THREADS"] == "1"
 
 

@@ -8,10 +8,10 @@ errors.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 Document = dict[str, Any]
 Stop = Callable[[], bool]
@@ -90,6 +90,28 @@ class Work(Protocol):
 
         None for work that has nothing to show before its end.
         """
+
+
+@runtime_checkable
+class SpreadWork(Work, Protocol):
+    """Work whose steps other workers can take part in."""
+
+    def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
+        """Give what the step after a checkpoint needs, in at most so many parts that fly on their own.
+
+        None where that step is not made of such parts.
+        """
+
+    def fly(self, task: bytes, stop: Stop) -> bytes:
+        """Give the outcome of one part, the same whoever flies it and whatever else it flies.
+
+        Raises
+        ------
+        WorkInterrupted : soon after ``stop()`` turned true.
+        """
+
+    def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
+        """Give the step after a checkpoint from the outcomes of all its parts, in their order."""
 
 
 Begin = Callable[[Document, int], Work]

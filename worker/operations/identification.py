@@ -2,14 +2,51 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
 from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
-from morphcore.identify import IdentifyResult, identification_from_document
-from worker.operations import Document
-from worker.operations.library_work import SearchWork, library_errors
+from morphcore.identify import Identification, IdentifyResult, identification_from_document
+from worker.operations import Document, Step, Stop
+from worker.operations.library_work import SearchWork, library_errors, shown
+
+Array = NDArray[np.float64]
 
 
-def begin(request: Document, threads: int) -> SearchWork[IdentifyResult]:
+class IdentificationWork(SearchWork[IdentifyResult]):
+    """An identification, whose generations other workers can fly parts of.
+
+    Parameters
+    ----------
+    run : the library's search.
+    """
+
+    def __init__(self, run: Identification) -> None:
+        super().__init__(run, _files)
+        self._identification = run
+
+    def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
+        """Give the next generation's search points in parts; None where no swarm's generation is next."""
+        task = self._identification.generation_task(checkpoint)
+        return None if task is None else [_packed(part) for part in task.parts(most)]
+
+    def fly(self, task: bytes, stop: Stop) -> bytes:
+        """Give the costs of some search points."""
+        with library_errors():
+            return _packed(self._identification.task_costs(_unpacked(task), stop))
+
+    def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
+        """Move the swarm by the costs of all parts."""
+        with library_errors():
+            costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
+            return shown(self._identification.told(checkpoint, costs, wall_s=elapsed_s))
+
+
+def begin(request: Document, threads: int) -> IdentificationWork:
     """Check the request and prepare the search.
 
     Raises
@@ -17,9 +54,19 @@ def begin(request: Document, threads: int) -> SearchWork[IdentifyResult]:
     WorkRefused : the request cannot be flown.
     """
     with library_errors():
-        return SearchWork(identification_from_document(request, threads=threads), _files)
+        return IdentificationWork(identification_from_document(request, threads=threads))
 
 
 def _files(result: IdentifyResult, document: Document) -> dict[str, bytes]:
     curves = result.curves()
     return {**identification_plots(document, curves), **curve_tables(curves)}
+
+
+def _packed(values: Array) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, values, allow_pickle=False)
+    return stream.getvalue()
+
+
+def _unpacked(data: bytes) -> Array:
+    return np.asarray(np.load(io.BytesIO(data), allow_pickle=False), dtype=np.float64)

@@ -62,8 +62,7 @@ class SearchWork(Generic[Result]):
         """Search, step by step."""
         with library_errors():
             for step in self._run.steps(checkpoint=checkpoint, stop=stop):
-                progress = {name: getattr(step, name) for name in PROGRESS}
-                yield Step(progress=progress, checkpoint=step.checkpoint)
+                yield shown(step)
 
     def outcome(self, checkpoint: bytes) -> Outcome:
         """Give the result with its plots and tables."""
@@ -76,6 +75,11 @@ class SearchWork(Generic[Result]):
         """Give the best found so far, without plots: drawing them takes seconds."""
         document = self._run.best_so_far(checkpoint).to_document()
         return Outcome(document, result_file(document))
+
+
+def shown(step: Any) -> Step:
+    """Give a step of the library as the runner sees it."""
+    return Step(progress={name: getattr(step, name) for name in PROGRESS}, checkpoint=step.checkpoint)
 
 
 def result_file(document: Document) -> dict[str, bytes]:

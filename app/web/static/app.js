@@ -1,31 +1,11 @@
 "use strict";
-/* Two views: the list of jobs (#/) and one job (#/jobs/ID). Progress comes by server-sent events. */
+/* Three views: the list of jobs (#/), one job (#/jobs/ID), and a field for the API key when one is wanted. */
 
 const view = document.getElementById("view");
 const FINAL = ["succeeded", "failed", "cancelled", "expired"];
 const LIVE_ROWS = 3; // event streams of the list: a browser opens six connections per host at most
 const LIST_POLL_MS = 3000;
 let leave = () => {};
-
-async function call(path, options = {}) {
-  const answer = await fetch(path, { headers: { Accept: "application/json" }, ...options });
-  if (answer.status === 204) return null;
-  const body = await answer.json();
-  if (!answer.ok) throw Object.assign(new Error(body.detail), { problem: body });
-  return body;
-}
-
-function follow(job, onEvent, after = 0) {
-  const source = new EventSource(`/jobs/${job}/events?after=${after}`);
-  const names = ["queued", "started", "progress", "requeued", "released", "cancelling", ...FINAL];
-  for (const name of names) {
-    source.addEventListener(name, (event) => {
-      if (FINAL.includes(name)) source.close();
-      onEvent(name, JSON.parse(event.data));
-    });
-  }
-  return source;
-}
 
 function problemCard(error) {
   const told = error.problem ?? { detail: error.message };
@@ -137,7 +117,7 @@ function headCard(job) {
       ["Running for", show.duration(elapsed)],
       ["Remaining", FINAL.includes(job.status) ? "–" : show.duration(progress.eta_s)],
       ["Attempt", `${job.attempt} of ${job.max_attempts}`],
-      ...(job.model_id ? [["Kept as", element("a", { href: `/models/${job.model_id}` }, "identified model")]] : []),
+      ...(job.model_id ? [["Kept as", fileLink(`/models/${job.model_id}`, `${job.model_id}.json`, {}, "identified model")]] : []),
     ]),
   );
 }
@@ -193,7 +173,47 @@ async function jobView(id) {
   leave = () => { source.close(); clearInterval(timer); };
 }
 
+/* ---- key ---- */
+
+function keyView() {
+  leave();
+  leave = () => {};
+  const refused = session.key !== "";
+  session.key = "";
+  document.getElementById("who").replaceChildren();
+  const field = element("input", { type: "password", id: "key", autocomplete: "off", spellcheck: "false", placeholder: "mid_…" });
+  const form = element(
+    "form",
+    { class: "row", on: { submit: (event) => { event.preventDefault(); session.key = field.value.trim(); if (session.key) start(); } } },
+    element("label", { for: "key" }, "API key"), field, element("button", { type: "submit" }, "Use this key"),
+  );
+  view.replaceChildren(element(
+    "section",
+    { class: "card" },
+    element("h1", {}, refused ? "This key is not valid" : "This service needs an API key"),
+    refused ? element("p", { class: "soft" }, "It is unknown, was revoked or has expired.") : null,
+    form,
+    element("p", { class: "soft" }, "It stays in this tab and is forgotten with it. The operator makes keys with "), element("pre", { class: "mono" }, "morphid keys create --owner NAME --name PURPOSE"),
+  ));
+  field.focus();
+}
+
+async function who() {
+  const sign = document.getElementById("who");
+  if (!session.key) return sign.replaceChildren();
+  const me = await call("/me").catch(() => null);
+  if (me === null) return sign.replaceChildren();
+  const forget = element("button", { on: { click: () => { session.key = ""; start(); } } }, "Forget the key");
+  sign.replaceChildren(element("span", { class: "soft", title: me.scopes.join(", ") }, me.owner), forget);
+}
+
 /* ---- frame ---- */
+
+async function start() {
+  const held = session.key !== "";
+  await who(); // one call tells whether the key is good
+  if (!held || session.key) route();
+}
 
 async function route() {
   leave();
@@ -202,24 +222,30 @@ async function route() {
   try {
     await (match ? jobView(match[1]) : listView());
   } catch (error) {
-    view.replaceChildren(problemCard(error));
+    if (error.status !== 401) view.replaceChildren(problemCard(error));
   }
+}
+
+/* What is wrong with the service, the worst first. */
+function complaint(state) {
+  if (state.database !== "ok") return ["bad", `database ${state.database}`];
+  if (state.broker !== "ok") return ["warn", `broker ${state.broker}`];
+  if (state.status !== "ready") return ["warn", `workers: ${state.workers?.status ?? "unknown"}`];
+  return ["good", "ready"];
 }
 
 async function health() {
   const sign = document.getElementById("health");
+  let told = ["bad", "service unreachable"];
   try {
-    const state = await (await fetch("/readyz")).json();
-    const good = state.status === "ready";
-    sign.className = `health ${good ? (state.broker === "ok" ? "good" : "warn") : "bad"}`;
-    sign.textContent = good ? (state.broker === "ok" ? "ready" : `broker ${state.broker}`) : `database ${state.database}`;
-  } catch {
-    sign.className = "health bad";
-    sign.textContent = "service unreachable";
-  }
+    told = complaint(await (await fetch("/readyz")).json());
+  } catch { /* it is what it says */ }
+  sign.className = `health ${told[0]}`;
+  sign.textContent = told[1];
 }
 
 addEventListener("hashchange", route);
 setInterval(health, 10000);
+session.onRefused = keyView;
 health();
-route();
+start();

@@ -143,8 +143,8 @@ function resultCards(operation, result) {
 
 function filesCards(files) {
   const plots = files.filter((file) => file.name.endsWith(".svg"));
-  const figures = plots.map((file) => element("figure", {}, element("a", { href: file.href, target: "_blank" }, element("img", { src: file.href, alt: file.name, loading: "lazy" })), element("figcaption", {}, file.name.replace(".svg", "").replaceAll("_", " "))));
-  const downloads = files.map((file) => element("a", { href: file.href, download: file.name }, `${file.name} (${show.bytes(file.size_bytes)})`));
+  const figures = plots.map((file) => element("figure", {}, fileLink(file.href, file.name, { target: "_blank" }, showImage(element("img", { alt: file.name, loading: "lazy" }), file.href)), element("figcaption", {}, file.name.replace(".svg", "").replaceAll("_", " "))));
+  const downloads = files.map((file) => fileLink(file.href, file.name, { download: file.name }, `${file.name} (${show.bytes(file.size_bytes)})`));
   return [
     figures.length ? card("Plots", element("div", { class: "plots" }, ...figures)) : null,
     downloads.length ? card("Files", element("div", { class: "files" }, ...downloads)) : null,

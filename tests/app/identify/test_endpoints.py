@@ -32,7 +32,8 @@ def test_accepts_with_the_broker_away(any_service: RunningService) -> None:
     assert (job["status"], job["attempt"], job["progress"]) == ("queued", 0, None)
     assert [sample["name"] for sample in job["request"]["samples"]] == list(SAMPLE_NAMES)
     with any_service.database.read() as session:
-        assert turns.next_unit(session) == job["id"]
+        assert (unit := turns.next_unit(session)) is not None
+        assert unit.job_id == job["id"]
         stored = store.load_request(session, job["id"])
     assert stored["aircraft"] == document["aircraft"]
     assert stored["flight"] == document["flight"]

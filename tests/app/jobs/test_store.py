@@ -13,6 +13,7 @@ from sqlalchemy import func, select, update
 from app.database import Database, database_time
 from app.errors import IdempotencyConflict, JobNotFound
 from app.jobs import store
+from app.jobs.creation import Terms
 from app.jobs.reaper import reap
 from app.jobs.records import Claim, Job, JobStatus
 from app.tables import artifacts, job_events, job_results, jobs, models
@@ -221,7 +222,7 @@ def test_cancel_in_every_state(database: Database) -> None:
 
 def test_release_keeps_the_attempt(database: Database) -> None:
     """A worker that stops gracefully gives the job back without using up an attempt."""
-    job = new_job(database, max_attempts=1)
+    job = new_job(database, terms=Terms(max_attempts=1))
     for _ in range(3):
         claim = claimed(database, job.id)
         assert claim.attempt == 1
@@ -244,7 +245,7 @@ def test_release_of_a_cancelling_job_cancels_it(database: Database) -> None:
 
 def test_poison_job_fails_after_its_attempts(database: Database) -> None:
     """A job whose worker is lost every time fails as `worker_lost` after exactly max_attempts claims."""
-    job = new_job(database, max_attempts=2)
+    job = new_job(database, terms=Terms(max_attempts=2))
     claimed(database, job.id, lease_s=-1.0)
     with database.write() as session:
         assert reap(session).requeued == (job.id,)
@@ -296,7 +297,7 @@ def test_lost_messages_are_repeated(database: Database) -> None:
 
 def test_deadline_counts_from_the_first_claim(database: Database) -> None:
     """A job past its deadline is told to its worker first, then ended by the reaper as expired."""
-    job = new_job(database, max_seconds=1.0)
+    job = new_job(database, terms=Terms(max_seconds=1.0))
     assert current(database, job.id).deadline_at is None
     claim = claimed(database, job.id, lease_s=HOUR_S)
     with database.write() as session:

@@ -10,6 +10,8 @@ from sqlalchemy import delete, update
 
 from app.database import Database, database_time
 from app.jobs import store
+from app.jobs.chunk_rows import Unit, UnitKind
+from app.jobs.creation import Terms
 from app.jobs.records import Claim
 from app.jobs.turns import next_job_of, next_unit, owners_in_turn
 from app.tables import jobs, owners
@@ -19,8 +21,8 @@ from tests.app.jobs.test_store import new_job
 def served(database: Database) -> Claim | None:
     """Play a worker: take the job whose turn it is, in one transaction."""
     with database.write() as session:
-        job_id = next_unit(session)
-        return None if job_id is None else store.claim_job(session, job_id, "w")
+        unit = next_unit(session)
+        return None if unit is None else store.claim_job(session, unit.job_id, "w")
 
 
 def order(database: Database, *, finish: bool) -> list[str]:
@@ -43,7 +45,7 @@ def queue(database: Database, **counts: int) -> None:
 
 def test_urgent_first_then_oldest(database: Database) -> None:
     """Inside an owner: higher priority first, then older first; in the end nothing."""
-    ids = [new_job(database, priority=priority).id for priority in (0, 0, 5, -5, 0)]
+    ids = [new_job(database, terms=Terms(priority=priority)).id for priority in (0, 0, 5, -5, 0)]
     expected = [ids[2], *sorted([ids[0], ids[1], ids[4]]), ids[3]]
     taken = [claim.job_id for claim in iter(lambda: served(database), None)]
     assert taken == expected
@@ -68,8 +70,8 @@ def test_fewest_running_first(database: Database) -> None:
 def test_priority_stays_inside_its_owner(database: Database) -> None:
     """Nobody passes another owner by calling all their jobs urgent."""
     for _ in range(3):
-        new_job(database, owner="loud", priority=100)
-    new_job(database, owner="quiet", priority=-100)
+        new_job(database, owner="loud", terms=Terms(priority=100))
+    new_job(database, owner="quiet", terms=Terms(priority=-100))
     assert "quiet" in order(database, finish=True)[:2]
 
 
@@ -121,5 +123,5 @@ def test_too_late_to_start(database: Database) -> None:
     late, other = new_job(database), new_job(database)
     with database.write() as session:
         session.execute(update(jobs).where(jobs.c.id == late.id).values(deadline_at=database_time() - 1.0))
-        assert next_unit(session) == other.id
+        assert next_unit(session) == Unit(UnitKind.JOB, other.id)
         assert store.claim_job(session, late.id, "w") is None

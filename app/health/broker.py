@@ -1,0 +1,46 @@
+"""Is the broker there? A real PING, with its password: an open port alone says little."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+from urllib.parse import urlsplit
+
+BROKER_TIMEOUT_S = 0.5
+REDIS_SCHEMES = frozenset({"redis", "rediss", "unix"})
+NOT_CHECKED = "not checked (no Redis)"
+UNREACHABLE = "unreachable"
+BROKER_GOOD = frozenset({"ok", NOT_CHECKED})
+
+
+@lru_cache(maxsize=4)
+def broker_client(url: str) -> Any:
+    """Return a client that asks once and does not wait long."""
+    from redis import Redis  # lazy: half a second of imports
+    from redis.backoff import NoBackoff
+    from redis.retry import Retry
+
+    return Redis.from_url(
+        url,
+        socket_connect_timeout=BROKER_TIMEOUT_S,
+        socket_timeout=BROKER_TIMEOUT_S,
+        retry=Retry(NoBackoff(), 0),
+        decode_responses=True,
+    )
+
+
+def broker_state(url: str) -> str:
+    """Ask the broker for a sign of life: ``ok``, or what is wrong."""
+    if urlsplit(url).scheme not in REDIS_SCHEMES:
+        return NOT_CHECKED
+    from redis import exceptions
+
+    try:
+        broker_client(url).ping()
+    except exceptions.AuthenticationError:
+        return "refuses our password"
+    except (exceptions.ConnectionError, exceptions.TimeoutError, OSError):
+        return UNREACHABLE
+    except exceptions.RedisError as error:
+        return f"answers {str(error)[:80]!r}"  # loading, out of memory: worth reading
+    return "ok"

@@ -1,0 +1,192 @@
+"""The gate before every route: where a request comes from, and whose key it carries.
+
+It stands before bodies are read and paths are looked at, and is closed by default: what is not on the short
+public list needs a valid key. What a key may do is said by each route (`app.http.context.demands`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from contextlib import suppress
+from functools import partial
+
+from fastapi.concurrency import run_in_threadpool
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.datastructures import Headers
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.audit import repository as audit
+from app.audit.records import Action
+from app.errors import DatabaseAway, ServiceError, TooManyRefusals, Unauthorized
+from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
+from app.http.origins import Doors, refusal
+from app.http.problems import MEDIA_TYPE, problem_document
+from app.http.request_id import current_request_id
+from app.keys.keyring import FRESH_S, Refusal
+from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
+from app.keys.refusal_limit import RefusalLimit
+from app.keys.secret import KeyText
+from app.settings import Settings
+
+PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
+PUBLIC_FOLDER = "/static/"
+ADDRESS_LENGTH = 64  # a proxy may pass on anything
+LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
+
+logger = logging.getLogger(__name__)
+
+
+class Gate:
+    """ASGI middleware that knows the caller before anything else is done.
+
+    Parameters
+    ----------
+    app : ASGI application
+    settings : Settings
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self._doors = Doors.of(settings)
+        self._demands_keys = settings.demands_keys
+        self._limit = RefusalLimit()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request, or refuse it."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        error = refusal(scope, self._doors)
+        if error is not None:
+            await _answer(error, scope, receive, send)
+            return
+        path: str = scope["path"]
+        if path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDER):
+            await self.app(scope, receive, send)
+            return
+        address = scope["client"][0][:ADDRESS_LENGTH] if scope.get("client") else ""
+        if not self._demands_keys:
+            caller = Caller(LOCAL_OWNER, None, EVERY_SCOPE, current_request_id(), address, NO_QUOTA)
+            scope[CALLER] = caller
+            await self.app(scope, receive, send)
+            return
+        try:
+            key, text = await self._key(scope, address)
+        except ServiceError as refused:
+            await _answer(refused, scope, receive, send)
+            return
+        scope[CALLER] = Caller(key.owner, key.id, key.scopes, current_request_id(), address, key.quota)
+        await _while_the_key_opens(self.app, text, scope, receive, send)
+
+    async def _key(self, scope: Scope, address: str) -> tuple[ApiKey, KeyText]:
+        """Find the key that the request carries.
+
+        Raises
+        ------
+        Unauthorized
+            It carries none, or one that does not open.
+        TooManyRefusals
+            The address has sent too many of those.
+        """
+        given = Headers(scope=scope).getlist("authorization")
+        if not given:
+            raise Unauthorized  # not a guess: the page asks once without, to learn that keys are demanded
+        scheme, _, credentials = given[0].partition(" ")
+        well_formed = len(given) == 1 and scheme.lower() == "bearer"
+        text = KeyText.parsed(credentials.strip()) if well_formed else None
+        prefix = "" if text is None else text.prefix
+        service: Service = scope["app"].state.service
+        wait_s = self._limit.wait_s(address, prefix)
+        if wait_s > 0:
+            raise TooManyRefusals(wait_s)
+        if text is None:
+            raise self._refused(service, address, "", Refusal.MALFORMED)
+        found = await _checked(service, text)
+        if isinstance(found, Refusal):
+            raise self._refused(service, address, prefix, found)
+        self._limit.note_opened(address, prefix)
+        return found, text
+
+    def _refused(self, service: Service, address: str, prefix: str, reason: Refusal) -> Unauthorized:
+        if reason in (Refusal.EXPIRED, Refusal.REVOKED):
+            self._limit.forget(address, prefix)
+        if self._limit.note_refused(address):
+            _note_refused(service, address, prefix, reason)
+        return Unauthorized()
+
+
+def _note_refused(service: Service, address: str, prefix: str, refused: Refusal) -> None:
+    logger.warning("an API key was refused: %s, prefix %r, from %s", refused.value, prefix, address)
+    service.afterwards.put(
+        partial(
+            audit.insert_entry,
+            action=Action.AUTH_REFUSED,
+            owner=None,
+            target=prefix or None,
+            outcome=refused.value,
+            request_id=current_request_id(),
+            address=address,
+        )
+    )
+
+
+async def _checked(service: Service, text: KeyText) -> ApiKey | Refusal:
+    if service.keys.is_fresh(text):
+        return service.keys.check(text)  # a digest: not worth a thread
+    try:
+        return await run_in_threadpool(service.keys.check, text)
+    except SQLAlchemyError as error:
+        logger.warning("API keys cannot be looked up: %s", error)
+        raise DatabaseAway from None
+
+
+async def _while_the_key_opens(
+    app: ASGIApp, text: KeyText, scope: Scope, receive: Receive, send: Send
+) -> None:
+    """Serve a request; end a stream, which may last for hours, when its key is revoked or expires."""
+    service: Service = scope["app"].state.service
+    checked_at = time.monotonic()
+    ended = False
+
+    async def send_while_open(message: Message) -> None:
+        nonlocal checked_at, ended
+        now = time.monotonic()
+        if message.get("more_body") and now - checked_at >= FRESH_S:
+            checked_at = now
+            with suppress(DatabaseAway):  # the stream has its own troubles then
+                ended = not isinstance(await _checked(service, text), ApiKey)
+        if ended:
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+            raise ClientDisconnect
+        await send(message)
+
+    try:
+        await app(scope, receive, send_while_open)
+    except Exception:
+        if not ended:
+            raise
+
+
+async def _answer(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer with a problem document; what the client still sends is thrown away for `LINGER_S`."""
+    body = json.dumps(problem_document(error, scope["path"])).encode()
+    headers = {
+        "content-type": MEDIA_TYPE,
+        "content-length": str(len(body)),
+        "connection": "close",
+        **error.headers,
+    }
+    start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+    await send({"type": "http.response.start", "status": error.status, "headers": start})
+    await send({"type": "http.response.body", "body": body, "more_body": True})
+    try:
+        async with asyncio.timeout(LINGER_S):
+            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
+                pass
+    except TimeoutError:
+        pass
+    await send({"type": "http.response.body", "body": b"", "more_body": False})

@@ -1,0 +1,119 @@
+"""Who may send a request at all: no page of another site, nobody by a name that is not ours.
+
+A service on loopback is open to every program of its user, and a browser is one: any web page could have it
+post jobs (cross-site requests), or read answers after its own name has been pointed at 127.0.0.1 (DNS
+rebinding). Browsers tell where a request comes from (``Sec-Fetch-Site``, ``Origin``) and by which name
+(``Host``); pages cannot forge these. Programs that are not browsers send none or any, and are let through.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers
+from starlette.types import Scope
+
+from app.errors import CrossSiteRequest, ServiceError, WrongHost
+from app.settings import Settings, is_loopback
+
+OWN_SITES = frozenset({"same-origin", "none"})  # none: typed, or a bookmark
+
+
+@dataclass(frozen=True, slots=True)
+class Doors:
+    """What is let in.
+
+    Attributes
+    ----------
+    hosts : frozenset of str or None
+        Names that the service answers for, beside addresses and loopback names; None: any name.
+    loopback_only : bool
+        Refuse whatever came over a network, however the server was told to listen.
+    """
+
+    hosts: frozenset[str] | None
+    loopback_only: bool
+
+    @classmethod
+    def of(cls, settings: Settings) -> Doors:
+        """The doors that the settings open.
+
+        With keys a foreign page gains nothing by a name of its own: it has no key. So names are then
+        restricted only on request.
+        """
+        named = settings.host_names
+        if settings.demands_keys:
+            return cls(hosts=named or None, loopback_only=False)
+        return cls(hosts=named | {settings.host.lower()}, loopback_only=not settings.allow_open)
+
+
+def refusal(scope: Scope, doors: Doors) -> ServiceError | None:
+    """Return why a request is not even looked at; None when it may be."""
+    headers = Headers(scope=scope)
+    if doors.loopback_only and not _came_over_loopback(scope):
+        return WrongHost(
+            "The service was started for its own machine only.",
+            hint="Set MORPHID_HOST to the address that it listens on; it then demands API keys.",
+        )
+    if doors.hosts is not None and not _answers_for(headers.get("host", ""), doors.hosts):
+        return WrongHost(
+            "The service does not go by the name in the Host header.",
+            "#header/Host",
+            "Use its address, or add the name to MORPHID_ALLOWED_HOSTS.",
+        )
+    if _from_another_site(scope, headers):
+        return CrossSiteRequest(
+            "A page of another site made the browser send this.",
+            "#header/Origin",
+            "Open the service's own page, or call the API from a program.",
+        )
+    return None
+
+
+def _came_over_loopback(scope: Scope) -> bool:
+    # a Unix socket has no address; a proxy on this machine that tells the client's address is seen through
+    return all(
+        end is None or end[1] is None or not end[0] or is_loopback(end[0])
+        for end in (scope.get("server"), scope.get("client"))
+    )
+
+
+def _answers_for(host: str, names: frozenset[str]) -> bool:
+    name = _name_of(host)
+    if name is None:
+        return False
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return name in names or is_loopback(name) or name.endswith(".localhost")
+    return True  # nobody can point an address elsewhere
+
+
+def _name_of(host: str) -> str | None:
+    try:
+        parts = urlsplit(f"//{host}")
+        _ = parts.port  # must be a number
+    except ValueError:
+        return None
+    if parts.username is not None or parts.path or parts.query or parts.fragment:
+        return None
+    return parts.hostname
+
+
+def _from_another_site(scope: Scope, headers: Headers) -> bool:
+    site = headers.get("sec-fetch-site")
+    if site is not None:
+        return site not in OWN_SITES and not _is_navigation(scope, headers)
+    origin = headers.get("origin")
+    return origin is not None and urlsplit(origin).netloc.lower() != headers.get("host", "").lower()
+
+
+def _is_navigation(scope: Scope, headers: Headers) -> bool:
+    """Whether someone followed a link to here: the answer is shown to them, not to the page with the link."""
+    return (
+        scope["method"] in ("GET", "HEAD")
+        and headers.get("sec-fetch-mode") == "navigate"
+        and headers.get("sec-fetch-dest") == "document"
+    )

@@ -1,0 +1,294 @@
+"""The server process: uvicorn with limits on slow clients. ``python -m app.http.server --host --port``.
+
+Uvicorn itself waits for headers and for readers as long as a client likes. The parser of requests is h11: it
+bounds the size of headers and is strict about what is ambiguous, where the faster one does neither.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import logging
+import resource
+import socket
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import h11
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.server import ServerState
+
+from app.errors import ServiceBusy, ServiceError
+from app.http.problems import MEDIA_TYPE, problem_document
+from app.settings import Settings, load_settings
+
+MAX_HEADER_BYTES = 32 * 1024  # request line and headers
+LINGER_S = 1.0  # to read an answer that came before the end of the request
+LEAST_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
+DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
+KEEP_ALIVE_S = 5
+STOP_S = 5  # for open answers when the process is told to end
+DRAIN_S = 1.0  # then: for requests that are on their way through connections that wait
+SPARE_FILES = 200  # for databases, brokers, uploads, logs
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionLimits:
+    """What one connection, and all together, may take.
+
+    Attributes
+    ----------
+    most : int
+        Connections at once.
+    header_s : float
+        From the first byte of a request (or the connection's beginning) to the end of its headers.
+    write_s : float
+        After which it is looked whether a client reads the answer that waits for it.
+    """
+
+    most: int = 4096
+    header_s: float = 10.0
+    write_s: float = 30.0
+
+
+class HttpError(ServiceError):
+    """What is refused before there is a request that the application could answer."""
+
+    def __init__(self, status: int, code: str, title: str, hint: str) -> None:
+        super().__init__(title + ".", hint=hint)
+        self.status = status
+        self.code = code
+        self.title = title
+
+
+SLOW_HEADERS = HttpError(
+    408, "slow_headers", "The headers of the request did not arrive in time", "Send the request in one go."
+)
+LARGE_HEADERS = HttpError(
+    431,
+    "headers_too_large",
+    "The headers of the request are too large",
+    "Shorten the address and the headers.",
+)
+BAD_REQUEST = HttpError(
+    400, "bad_request", "This is not an HTTP request", "Escape the address, and send what HTTP/1.1 says."
+)
+
+
+class GuardedConfig(uvicorn.Config):
+    """Uvicorn's settings with the limits of connections."""
+
+    def __init__(self, app: Any, limits: ConnectionLimits, **others: Any) -> None:
+        super().__init__(
+            app,
+            http=GuardedProtocol,
+            ws="none",
+            h11_max_incomplete_event_size=MAX_HEADER_BYTES,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            server_header=False,
+            access_log=False,
+            **others,
+        )
+        self.limits = limits
+
+
+class GuardedProtocol(H11Protocol):
+    """One connection with time limits for headers and readers."""
+
+    def __init__(
+        self,
+        config: GuardedConfig,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)
+        self.limits = config.limits
+        self._header_timer: asyncio.TimerHandle | None = None
+        self._write_timer: asyncio.TimerHandle | None = None
+        self._linger_timer: asyncio.TimerHandle | None = None
+        self._drain_timer: asyncio.TimerHandle | None = None
+        self._unread = 0  # bytes that wait for the client, when last looked at
+        self._refused = False
+        self._ending = False
+
+    # a connection begins and ends
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a connection, or turn it away when there are too many."""
+        super().connection_made(transport)
+        _notice_dead_peers(transport)
+        if len(self.connections) > self.limits.most:
+            self._refuse(ServiceBusy("There are too many connections to this service."))
+            self.transport.close()  # at once: each one that lingers is one more
+        else:
+            self._header_timer = self.loop.call_later(self.limits.header_s, self._headers_late)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._cancel("_header_timer", "_write_timer", "_linger_timer", "_drain_timer")
+        self._unset_keepalive_if_required()
+        super().connection_lost(exc)
+
+    def shutdown(self) -> None:
+        """End when the server does: open answers first, and requests whose first byte is still on its way.
+
+        Closed at once, a connection that waits would lose the request that its client is just sending.
+        """
+        self._ending = True
+        if self.cycle is None or self.cycle.response_complete:
+            self._drain_timer = self.loop.call_later(DRAIN_S, super().shutdown)
+        else:
+            super().shutdown()
+
+    # headers
+
+    def data_received(self, data: bytes) -> None:
+        """Read a piece; the time for headers runs from a request's first byte and no piece prolongs it."""
+        if self._refused or self.transport.is_closing():
+            return
+        if self._header_timer is None and self._between_requests():
+            self._header_timer = self.loop.call_later(self.limits.header_s, self._headers_late)
+        super().data_received(data)
+        if self._ending and self.cycle is not None:
+            self.cycle.keep_alive = False
+        self._cancel("_linger_timer" if self._between_requests() else "_header_timer")
+
+    def _between_requests(self) -> bool:
+        return self.conn.their_state is h11.IDLE
+
+    def _headers_late(self) -> None:
+        self._header_timer = None
+        if self.conn.trailing_data[0]:
+            self._refuse(SLOW_HEADERS)
+        else:
+            self.transport.close()
+
+    def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's sentence; ours says more
+        """Answer what is no request with a problem document, where an answer has not begun."""
+        # called where the parser's error is handled
+        too_large = getattr(sys.exception(), "error_status_hint", None) == LARGE_HEADERS.status
+        self._refuse(LARGE_HEADERS if too_large else BAD_REQUEST)
+
+    def _refuse(self, error: ServiceError) -> None:
+        """Answer and hang up; a client that is still sending gets to read the answer before."""
+        self._refused = True
+        self._cancel("_header_timer")
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):  # another answer is under way
+            self.transport.close()
+            return
+        self.transport.write(_answer(error))
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+        self._linger_timer = self.loop.call_later(LINGER_S, self.transport.close)
+
+    # answers
+
+    def on_response_complete(self) -> None:
+        """End the connection soon when the client still sends a request that was answered already."""
+        unasked = self.conn.their_state is h11.SEND_BODY
+        super().on_response_complete()
+        if unasked and not self.transport.is_closing():
+            self._linger_timer = self.loop.call_later(LINGER_S, self.transport.close)
+
+    def pause_writing(self) -> None:
+        """Watch a client that does not read."""
+        super().pause_writing()
+        self._unread = self.transport.get_write_buffer_size()
+        self._write_timer = self.loop.call_later(self.limits.write_s, self._look_at_reader)
+
+    def resume_writing(self) -> None:
+        """The client has read."""
+        self._cancel("_write_timer")
+        super().resume_writing()
+
+    def _look_at_reader(self) -> None:
+        unread = self.transport.get_write_buffer_size()
+        if self._unread - unread < LEAST_READ_RATE * self.limits.write_s:
+            logger.info("a client that does not read was hung up on")
+            self.transport.abort()
+            return
+        self._unread = unread
+        self._write_timer = self.loop.call_later(self.limits.write_s, self._look_at_reader)
+
+    def _cancel(self, *timers: str) -> None:
+        for name in timers:
+            timer: asyncio.TimerHandle | None = getattr(self, name)
+            if timer is not None:
+                timer.cancel()
+                setattr(self, name, None)
+
+
+def _answer(error: ServiceError) -> bytes:
+    content = json.dumps(problem_document(error, "")).encode()
+    headers = {
+        "Content-Type": MEDIA_TYPE,
+        "Content-Length": str(len(content)),
+        **error.headers,
+        "Connection": "close",
+    }
+    lines = [f"HTTP/1.1 {error.status} ", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
+    return "\r\n".join(lines).encode() + content
+
+
+def _notice_dead_peers(transport: asyncio.Transport) -> None:
+    """Let the system end connections whose other end is gone without a word."""
+    connection: socket.socket | None = transport.get_extra_info("socket")
+    if connection is None or connection.family not in (socket.AF_INET, socket.AF_INET6):
+        return
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in (("TCP_KEEPIDLE", int(DEAD_PEER_S)), ("TCP_USER_TIMEOUT", int(1000 * DEAD_PEER_S))):
+        if hasattr(socket, name):  # not on every system
+            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+
+def most_connections(asked: int) -> int:
+    """Let the process open as many files as it may, and bound connections by that."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = asked + SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < needed:
+        soft = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    if soft == resource.RLIM_INFINITY:
+        return asked
+    return max(1, min(asked, soft - SPARE_FILES))
+
+
+def guarded_config(app: Any, settings: Settings, **others: Any) -> GuardedConfig:
+    """Uvicorn's configuration for `app` with the limits of `settings`; `others` as in `uvicorn.Config`."""
+    limits = ConnectionLimits(
+        most=most_connections(settings.max_connections),
+        header_s=settings.header_timeout_s,
+        write_s=settings.write_timeout_s,
+    )
+    return GuardedConfig(app, limits, **others)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Serve until SIGTERM or SIGINT."""
+    settings = load_settings()
+    parser = argparse.ArgumentParser(prog="python -m app.http.server", description="Serve the API.")
+    parser.add_argument("--host", default=settings.host)
+    parser.add_argument("--port", type=int, default=settings.port)
+    chosen = parser.parse_args(arguments)
+    config = guarded_config(
+        "app.main:create_app",
+        settings,
+        factory=True,
+        host=chosen.host,
+        port=chosen.port,
+        timeout_graceful_shutdown=STOP_S,
+    )
+    server = uvicorn.Server(config)
+    server.run()
+    if not server.started:
+        sys.exit(uvicorn.config.STARTUP_FAILURE)
+
+
+if __name__ == "__main__":
+    main()

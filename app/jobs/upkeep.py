@@ -1,0 +1,99 @@
+"""The reaper and the retention inside the API process: they go on while every worker is busy for hours.
+
+Workers reap too, whenever one is free. Each change is a compare-and-set, so nobody gets in another's way.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+import threading
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database import Database
+from app.jobs.queue import Publisher
+from app.jobs.reaper import reap
+from app.jobs.records import ReapReport
+from app.jobs.retention import Keep, forget
+from app.settings import Settings
+
+REAP_EVERY_S = 10.0
+FORGET_EVERY_S = 300.0
+STOP_S = 5.0
+
+log = logging.getLogger(__name__)
+
+
+class Upkeep:
+    """One thread that makes a round every ten seconds.
+
+    Parameters
+    ----------
+    database : Database
+    publisher : Publisher
+        Takes the wake-up messages.
+    settings : Settings
+    reap_every_s : float
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        publisher: Publisher,
+        settings: Settings,
+        *,
+        reap_every_s: float = REAP_EVERY_S,
+    ) -> None:
+        self._database = database
+        self._publisher = publisher
+        self._republish_after_s = settings.republish_after_s
+        self._keep = Keep.of(settings)
+        self._reap_every_s = reap_every_s
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="upkeep", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, after the round that is being made."""
+        self._stopping.set()
+        self._thread.join(STOP_S)
+
+    def _run(self) -> None:
+        forget_in_s = 0.0
+        # not all processes at once after a common start
+        pause_s = self._reap_every_s * random.uniform(0.5, 1.0)  # noqa: S311 - no secret hangs on it
+        while not self._stopping.wait(pause_s):
+            forget_in_s -= pause_s
+            pause_s = self._reap_every_s
+            try:
+                self.reap()
+                if forget_in_s <= 0.0:
+                    more = self.forget()
+                    forget_in_s = 0.0 if more else FORGET_EVERY_S
+            except SQLAlchemyError as error:
+                log.warning("no upkeep this time, the database does not answer: %s", error)
+
+    def reap(self) -> ReapReport:
+        """Make one round of the reaper."""
+        with self._database.write() as session:
+            report = reap(session, republish_after_s=self._republish_after_s)
+        for kind in ("requeued", "failed", "cancelled", "expired"):
+            for job_id in getattr(report, kind):
+                log.warning("reaper: job %s %s", job_id, kind)
+        for job_id in report.publish:
+            self._publisher.publish(job_id)
+        return report
+
+    def forget(self) -> bool:
+        """Make one round of retention; tell whether there is more to forget."""
+        if self._keep == Keep():
+            return False
+        with self._database.write() as session:
+            forgotten = forget(session, self._keep)
+        if forgotten.jobs or forgotten.trajectories:
+            log.info("forgot %d jobs and %d trajectories", forgotten.jobs, forgotten.trajectories)
+        return forgotten.more

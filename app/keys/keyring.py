@@ -1,0 +1,93 @@
+"""Checking keys: a digest per request, an indexed read per key every two seconds, never a write."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+
+from app.afterwards import Afterwards
+from app.database import Database
+from app.keys.records import ApiKey
+from app.keys.repository import StoredKey, find_key, note_use
+from app.keys.secret import KeyText
+
+FRESH_S = 2.0  # a revoked key opens nothing after this long, in every process
+REMEMBERED = 10_000  # keys; further ones are read for each request
+
+
+class Refusal(StrEnum):
+    """Why a key does not open: for the audit log, never for the caller."""
+
+    MALFORMED = "malformed"
+    UNKNOWN = "unknown"
+    EXPIRED = "expired"
+    REVOKED = "revoked"
+
+
+@dataclass(slots=True)
+class _Remembered:
+    stored: StoredKey
+    read_at: float
+    use_is_due: bool
+
+
+class KeyRing:
+    """The keys of the database, remembered for a moment.
+
+    Parameters
+    ----------
+    database : Database
+    afterwards : Afterwards
+        Takes the note of a key's last use, which no request waits for.
+    clock
+        Seconds that only rise.
+    """
+
+    def __init__(
+        self, database: Database, afterwards: Afterwards, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._database = database
+        self._afterwards = afterwards
+        self._clock = clock
+        self._remembered: OrderedDict[str, _Remembered] = OrderedDict()
+
+    def is_fresh(self, text: KeyText) -> bool:
+        """Whether `check` needs no look at the database."""
+        known = self._remembered.get(text.prefix)
+        return known is not None and self._clock() - known.read_at < FRESH_S
+
+    def check(self, text: KeyText) -> ApiKey | Refusal:
+        """Tell whose key it is, or why it opens nothing; reads the database unless it `is_fresh`."""
+        known = self._remembered.get(text.prefix)
+        if known is None or self._clock() - known.read_at >= FRESH_S:
+            known = self._read(text.prefix)
+        if known is None or not text.opens(known.stored.secret_sha256):
+            return Refusal.UNKNOWN
+        key = known.stored.key
+        if key.revoked_at is not None:
+            return Refusal.REVOKED
+        if key.expired:
+            return Refusal.EXPIRED
+        if known.use_is_due:
+            known.use_is_due = False
+            self._afterwards.put(partial(note_use, key_id=key.id))
+        return key
+
+    def _read(self, prefix: str) -> _Remembered | None:
+        read_at = self._clock()  # before the read: what is remembered is never younger than it seems
+        with self._database.read() as session:
+            stored = find_key(session, prefix)
+        if stored is None:
+            # unknown prefixes are not remembered: guesses must not push out keys that are in use
+            self._remembered.pop(prefix, None)
+            return None
+        known = _Remembered(stored, read_at, stored.use_is_due)
+        self._remembered[prefix] = known
+        self._remembered.move_to_end(prefix)
+        if len(self._remembered) > REMEMBERED:
+            self._remembered.popitem(last=False)
+        return known

@@ -1,0 +1,126 @@
+"""SQL of API keys, for authentication and the operator's command line; no endpoint makes or lists keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Row, insert, or_, select, update
+
+from app.database import Session, database_time
+from app.identifiers import new_identifier
+from app.jobs.records import moment, optional_moment
+from app.keys.records import ApiKey, Quota, Scope
+from app.keys.secret import KeyText
+from app.tables import api_keys
+
+USE_NOTED_EVERY_S = 60.0  # the last use is for people who tidy up: a minute is exact enough
+
+COLUMNS = (
+    *(column for column in api_keys.c if column.name != "secret_sha256"),
+    (database_time() >= api_keys.c.expires_at).label("expired"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class StoredKey:
+    """A key with what is needed to check it."""
+
+    key: ApiKey
+    secret_sha256: str
+    use_is_due: bool  # the noted last use is older than `USE_NOTED_EVERY_S`
+
+
+def _key(row: Row[*tuple[Any, ...]]) -> ApiKey:
+    known = {scope.value for scope in Scope}  # a later version may have stored scopes of its own
+    return ApiKey(
+        id=row.id,
+        owner=row.owner,
+        name=row.name,
+        prefix=row.prefix,
+        scopes=frozenset(Scope(name) for name in row.scopes if name in known),
+        quota=Quota(row.max_jobs_in_flight, row.max_flights_per_day, row.max_stored_bytes),
+        created_at=moment(row.created_at),
+        expires_at=optional_moment(row.expires_at),
+        revoked_at=optional_moment(row.revoked_at),
+        last_used_at=optional_moment(row.last_used_at),
+        expired=bool(row.expired),
+    )
+
+
+def insert_key(
+    session: Session,
+    text: KeyText,
+    *,
+    owner: str,
+    name: str,
+    scopes: Sequence[Scope],
+    quota: Quota,
+    expires_at: float | None,
+) -> ApiKey:
+    """Store a key: its prefix, and a digest of its secret."""
+    key_id = new_identifier("key")
+    session.execute(
+        insert(api_keys).values(
+            id=key_id,
+            owner=owner,
+            name=name,
+            prefix=text.prefix,
+            secret_sha256=text.digest(),
+            scopes=sorted(scope.value for scope in scopes),
+            max_jobs_in_flight=quota.max_jobs_in_flight,
+            max_flights_per_day=quota.max_flights_per_day,
+            max_stored_bytes=quota.max_stored_bytes,
+            created_at=database_time(),
+            expires_at=expires_at,
+        )
+    )
+    return _key(session.execute(select(*COLUMNS).where(api_keys.c.id == key_id)).one())
+
+
+def find_key(session: Session, prefix: str) -> StoredKey | None:
+    """Find the key with this prefix, whatever its state."""
+    due = or_(
+        api_keys.c.last_used_at.is_(None), api_keys.c.last_used_at < database_time() - USE_NOTED_EVERY_S
+    )
+    row = session.execute(
+        select(*COLUMNS, api_keys.c.secret_sha256, due.label("use_is_due")).where(api_keys.c.prefix == prefix)
+    ).one_or_none()
+    return None if row is None else StoredKey(_key(row), row.secret_sha256, bool(row.use_is_due))
+
+
+def key_by_id(session: Session, key_id: str) -> ApiKey:
+    """Read one key that is known to exist."""
+    return _key(session.execute(select(*COLUMNS).where(api_keys.c.id == key_id)).one())
+
+
+def list_keys(session: Session, *, owner: str | None = None) -> list[ApiKey]:
+    """All keys, or those of one owner, oldest first."""
+    query = select(*COLUMNS).order_by(api_keys.c.id)
+    if owner is not None:
+        query = query.where(api_keys.c.owner == owner)
+    return [_key(row) for row in session.execute(query)]
+
+
+def revoke_key(session: Session, name: str) -> ApiKey | None:
+    """Revoke the key with this id or prefix; a revoked one stays as it is. None when there is none."""
+    chosen = or_(api_keys.c.id == name, api_keys.c.prefix == name)
+    session.execute(
+        update(api_keys).where(chosen, api_keys.c.revoked_at.is_(None)).values(revoked_at=database_time())
+    )
+    row = session.execute(select(*COLUMNS).where(chosen)).one_or_none()
+    return None if row is None else _key(row)
+
+
+def note_use(session: Session, key_id: str) -> None:
+    """Write down that the key is in use, unless another process just did."""
+    now = database_time()
+    session.execute(
+        update(api_keys)
+        .where(
+            api_keys.c.id == key_id,
+            or_(api_keys.c.last_used_at.is_(None), api_keys.c.last_used_at < now - USE_NOTED_EVERY_S),
+        )
+        .values(last_used_at=now)
+    )

@@ -1,0 +1,69 @@
+"""What the life of jobs adds to the counters; called by `app.jobs.rows.transition`, in its transaction.
+
+How long jobs wait and take are histograms over all processes, kept as counters: one per bucket, not yet added
+up.
+"""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Mapping
+from typing import Any
+
+from sqlalchemy import Row
+
+from app.database import Session
+from app.observability.counters import count_all, written
+
+FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
+BUCKETS_S = (0.5, 1.0, 2.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0, 14400.0)  # of seconds a job waits or takes
+
+ATTEMPTS = "job_attempts"
+FINISHED = "jobs_finished"
+FLIGHTS = "flights"
+LEASES_LOST = "leases_lost"
+REAP_ROUNDS = "reap_rounds"  # the reaper counts these itself
+RELEASED = "jobs_released"
+RUN_TIME = "job_run"  # each of these two with BUCKET and MILLISECONDS
+WAIT_TIME = "job_wait"
+BUCKET = "_bucket"
+MILLISECONDS = "_milliseconds"
+
+
+def note_transition(
+    session: Session, row: Row[tuple[Any, ...]], event: str | None, payload: Mapping[str, Any] | None
+) -> None:
+    """Count a change of a job.
+
+    Parameters
+    ----------
+    row : the job after the change.
+    event, payload : what the history says of it; a change without an event counts for nothing.
+    """
+    if event is None or event == "progress":
+        return
+    labels = {"operation": row.operation}
+    rises: dict[str, int] = {}
+    if event == "started":
+        rises[written(ATTEMPTS, labels)] = 1
+        if row.attempt == 1:
+            rises |= _observed(WAIT_TIME, labels, row.started_at - row.created_at)
+    if event == "released":
+        rises[RELEASED] = 1
+    if (payload or {}).get("reason") == "lease_lost":
+        rises[LEASES_LOST] = 1
+    if row.status in FINAL:
+        rises[written(FINISHED, {**labels, "status": row.status})] = 1
+        rises[written(FLIGHTS, labels)] = row.flights
+        if row.started_at is not None and row.finished_at is not None:
+            rises |= _observed(RUN_TIME, labels, row.finished_at - row.started_at)
+    count_all(session, rises)
+
+
+def _observed(name: str, labels: Mapping[str, str], seconds: float) -> dict[str, int]:
+    place = bisect.bisect_left(BUCKETS_S, seconds)
+    edge = f"{BUCKETS_S[place]:g}" if place < len(BUCKETS_S) else "+Inf"
+    return {
+        written(name + BUCKET, {**labels, "le": edge}): 1,
+        written(name + MILLISECONDS, labels): max(round(seconds * 1000.0), 0),
+    }

@@ -1,0 +1,153 @@
+"""Log lines of the API and the workers: one event, one line, for eyes or as JSON for machines.
+
+``MORPHID_LOG_FORMAT=text|json`` and ``MORPHID_LOG_LEVEL`` choose. What a line says of its own beside its
+message is handed over as ``extra={"facts": {...}}``; what a whole piece of work has in common comes from
+`app.observability.context`. Secrets that slip into a message are blotted out.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import sys
+from datetime import UTC, datetime
+from typing import IO, Any
+
+from app.documents import finite
+from app.observability.context import current_facts
+from app.observability.tracing import current_trace_id
+
+FORMATS = ("text", "json")
+# those of others have handlers of their own: they go through ours instead
+GATHERED = (
+    "uvicorn",
+    "uvicorn.error",
+    "uvicorn.access",
+    "celery",
+    "celery.task",
+    "celery.redirected",
+    "alembic",
+)
+NOISY = {
+    "uvicorn.access": logging.WARNING,  # ours tells route, owner and duration, and no query strings
+    "celery.worker.strategy": logging.WARNING,  # "received": a message is only a hint
+    "celery.app.trace": logging.WARNING,  # "succeeded": the runner tells what became of the job
+    "kombu": logging.WARNING,
+    "httpx": logging.WARNING,
+    "opentelemetry": logging.WARNING,
+}
+MAX_MESSAGE = 8_000  # characters; a line must not be a megabyte because somebody's field name was one
+SECRETS = (
+    (re.compile(r"\b(mid_[0-9A-Za-z]+_)[0-9A-Za-z_-]+"), r"\1***"),  # API keys
+    (re.compile(r"\b(whsec_)[0-9A-Za-z+/=_-]+"), r"\1***"),  # webhook secrets
+    (re.compile(r"(?i)\b(bearer\s+)[^\s\"']+"), r"\1***"),
+    (re.compile(r"(://[^:/@\s]*:)[^@/\s]+@"), r"\1***@"),  # passwords in addresses
+)
+
+
+def blotted(text: str) -> str:
+    """Return `text` without secrets."""
+    for pattern, replacement in SECRETS:
+        text = pattern.sub(replacement, text)
+    return text
+
+
+def printable(text: str) -> str:
+    """Return `text` with escapes for what would move a terminal's cursor or begin a line of its own."""
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
+class FactsFilter(logging.Filter):
+    """Writes down the facts of the moment: a line may be formatted in another thread."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Complete a record; every one passes."""
+        facts = current_facts()
+        facts.update(getattr(record, "facts", {}))
+        trace_id = current_trace_id()
+        if trace_id:
+            facts["trace_id"] = trace_id
+        record.facts = facts
+        return True
+
+
+def _time(record: logging.LogRecord) -> str:
+    return (
+        datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    )
+
+
+def _message(record: logging.LogRecord) -> str:
+    try:
+        message = record.getMessage()
+    except (TypeError, ValueError):
+        message = f"{record.msg} {record.args}"  # a line with a mistake is worth more than none
+    return blotted(message)[:MAX_MESSAGE]
+
+
+class JsonFormatter(logging.Formatter):
+    """One JSON object per line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line of a record."""
+        line: dict[str, Any] = {
+            "time": _time(record),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": _message(record),
+            **getattr(record, "facts", {}),
+        }
+        if record.exc_info and record.exc_info[0] is not None:
+            line["exception"] = blotted(self.formatException(record.exc_info))
+        if record.stack_info:
+            line["stack"] = record.stack_info
+        return json.dumps(finite(line), ensure_ascii=True, default=str)
+
+
+class TextFormatter(logging.Formatter):
+    """``time level logger: message [facts]``; only an exception takes more than one line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line of a record."""
+        facts = " ".join(
+            f"{name}={printable(str(value))}" for name, value in getattr(record, "facts", {}).items()
+        )
+        message = "\n  ".join(printable(line) for line in _message(record).splitlines())
+        line = f"{_time(record)} {record.levelname.lower():8}{record.name}: {message}"
+        if facts:
+            line += f" [{facts}]"
+        if record.exc_info and record.exc_info[0] is not None:
+            line += "\n" + blotted(self.formatException(record.exc_info))
+        return line
+
+
+def make_handler(kind: str, stream: IO[str] | None = None) -> logging.Handler:
+    """Return a handler that writes lines of `kind` to `stream` (standard error)."""
+    handler = logging.StreamHandler(stream or sys.stderr)
+    handler.addFilter(FactsFilter())
+    handler.setFormatter(JsonFormatter() if kind == "json" else TextFormatter())
+    return handler
+
+
+def configure_logging(kind: str, level: str) -> None:
+    """Make this process log in one way, whichever library speaks.
+
+    Parameters
+    ----------
+    kind : "text" or "json"
+    level : least severity that is told, "INFO"
+    """
+    root = logging.getLogger()
+    for handler in root.handlers[:]:
+        root.removeHandler(handler)
+    root.addHandler(make_handler(kind))
+    root.setLevel(level.upper())
+    for name in GATHERED:
+        logger = logging.getLogger(name)
+        logger.handlers.clear()
+        logger.propagate = True
+        logger.setLevel(logging.NOTSET)
+    for name, least in NOISY.items():
+        logging.getLogger(name).setLevel(max(least, root.level))
+    logging.captureWarnings(capture=True)

@@ -1,0 +1,25 @@
+"""Latency and number of HTTP requests of this API process.
+
+Several API processes each tell their own; Prometheus adds them up by scraping each.
+"""
+
+from __future__ import annotations
+
+from prometheus_client import CollectorRegistry, Gauge, Histogram
+
+LATENCY_BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0)
+
+REGISTRY = CollectorRegistry()
+
+LATENCY = Histogram(
+    "morphid_http_request_seconds",
+    "Time until an answer begins. waited: the caller asked to wait for a job's end (Prefer: wait).",
+    ("method", "route", "status", "waited"),
+    buckets=LATENCY_BUCKETS_S,
+    registry=REGISTRY,
+)
+IN_FLIGHT = Gauge(
+    "morphid_http_requests_in_flight",
+    "Requests that are being served, open event streams among them.",
+    registry=REGISTRY,
+)

@@ -1,0 +1,62 @@
+"""The parser process: ``python -m app.parsing.child KIND MEMORY CPU WALL ROWS``, a file on its stdin.
+
+It reads one file, writes one frame (`app.parsing.frame`) and ends. Its parent is `app.parsing.pool`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import Any, BinaryIO
+
+from app.errors import MalformedBody
+from app.parsing.confinement import Limits, confine, confine_time
+from app.parsing.frame import BadFrame, pack
+from app.parsing.json_text import parse_json
+from samplefiles.columns import Wanted
+from samplefiles.fault import FileFault
+from samplefiles.reading import read_columns
+
+BODY = "body"  # the JSON body of a request; any other kind is a file's, from `samplefiles.reading`
+LOADED_BEFORE = {"parquet": ("pyarrow.parquet",), "matlab": ("scipy.io", "scipy.io.matlab")}
+
+
+def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
+    """What is said of a file: its document or columns, or what is wrong with it."""
+    try:
+        if kind == BODY:
+            return {"document": parse_json(stream.read())}
+        return {"columns": read_columns(stream, kind, wanted).values}
+    except MalformedBody as error:
+        return {"malformed": [error.detail, error.pointer, error.hint]}
+    except FileFault as fault:
+        return {"fault": [fault.code, fault.detail, fault.hint, fault.row, fault.line, fault.title]}
+    except (MemoryError, RecursionError) as error:
+        return {"failed": type(error).__name__}
+
+
+def main(arguments: list[str]) -> None:
+    """Read standard input under limits and write a frame."""
+    kind, *words, rows = arguments
+    limits = Limits.of(words)
+    confine_time(limits)
+    for module in LOADED_BEFORE.get(kind, ()):
+        try:
+            importlib.import_module(module)
+        except ImportError:
+            break  # the reader says what to install
+    confine(limits)
+    try:
+        frame = pack(answer(kind, sys.stdin.buffer, Wanted(most_rows=int(rows))))
+    except BadFrame:
+        frame = pack({"failed": "TooMuchText"})
+    except (MemoryError, RecursionError) as error:
+        frame = pack({"failed": type(error).__name__})
+    sys.stdout.buffer.write(frame)
+    sys.stdout.buffer.flush()
+    os._exit(0)  # libraries' farewells are nobody's business, and may hang
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

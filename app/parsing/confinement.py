@@ -1,0 +1,75 @@
+"""What a parser process may use: memory, time, nothing to write to, nobody to call."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import signal
+from dataclasses import dataclass
+
+MIB = 2**20
+LIBRARIES_BYTES = 2**30  # address space for code and what allocators reserve without using it
+OPEN_FILES = 64
+GRACE_S = 5  # beyond the parent's patience: a parser whose parent died ends by itself
+NICE = 5  # answering requests comes first
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits of one parser process.
+
+    Attributes
+    ----------
+    memory_bytes : int
+        Data of the process, libraries' own included.
+    cpu_s : int
+        Time of computation.
+    wall_s : int
+        Time until the parent gives up.
+    """
+
+    memory_bytes: int = 512 * MIB
+    cpu_s: int = 10
+    wall_s: int = 20
+
+    def words(self) -> list[str]:
+        """The limits as arguments of the process."""
+        return [str(self.memory_bytes), str(self.cpu_s), str(self.wall_s)]
+
+    @classmethod
+    def of(cls, words: list[str]) -> Limits:
+        """Read `words`."""
+        memory_bytes, cpu_s, wall_s = map(int, words)
+        return cls(memory_bytes, cpu_s, wall_s)
+
+
+def confine_time(limits: Limits) -> None:
+    """Before anything else: the process ends by itself, whatever becomes of its parent."""
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(limits.wall_s + GRACE_S)
+    _limit("RLIMIT_CPU", limits.cpu_s)
+    _limit("RLIMIT_CORE", 0)
+    with contextlib.suppress(OSError):
+        os.nice(NICE)
+
+
+def confine(limits: Limits) -> None:
+    """When the libraries are loaded and before the first byte from outside is read."""
+    # data counts what is used; address space is the rough limit where the kernel does not count data
+    _limit("RLIMIT_DATA", limits.memory_bytes)
+    _limit("RLIMIT_AS", limits.memory_bytes + LIBRARIES_BYTES)
+    _limit("RLIMIT_FSIZE", 0)
+    _limit("RLIMIT_NOFILE", OPEN_FILES)
+    _limit("RLIMIT_NPROC", 0)  # no child, no thread (root is exempt: do not run the service as root)
+
+
+def _limit(name: str, value: int) -> None:
+    number = getattr(resource, name, None)
+    if number is None:  # not on this system
+        return
+    _, hard = resource.getrlimit(number)
+    if hard != resource.RLIM_INFINITY:
+        value = min(value, hard)
+    with contextlib.suppress(ValueError, OSError):  # some systems refuse some limits; the others hold
+        resource.setrlimit(number, (value, value))

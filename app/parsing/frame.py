@@ -1,0 +1,116 @@
+"""What a parser process answers: a JSON text whose long lists of numbers stand beside it as plain bytes.
+
+The reader of a frame trusts nothing in it: every length is checked, and no more is made of it than JSON
+values and lists of numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from array import array
+from typing import Any
+
+MAGIC = b"MPF1"
+HEAD = struct.Struct("<4sII")  # magic, bytes of the JSON text, count of arrays
+ARRAY = struct.Struct("<cQ")  # type code, bytes
+WIDTHS = {b"d": 8, b"q": 8}  # float64, int64
+SHORTEST_ARRAY = 64  # items; shorter lists stay in the JSON text
+MOST_EXCEPTIONS = 20  # of a list: items that are no numbers, kept beside it so that their place can be named
+MARK = "\x00"  # key of a place holder; no text from outside holds this character
+MAX_TEXT_BYTES = 4 * 2**20  # of everything that is no number; our requests need some kilobytes
+LARGEST_EXACT = 2**53  # integers beyond it are no exact floats
+
+
+class BadFrame(ValueError):
+    """A parser's answer is not one."""
+
+
+def pack(value: Any) -> bytes:
+    """Make a frame of a JSON value; `array` objects may stand in the place of lists.
+
+    Raises
+    ------
+    BadFrame
+        When what is not numbers takes more than `MAX_TEXT_BYTES`.
+    """
+    arrays: list[tuple[bytes, bytes]] = []
+    text = json.dumps(_skeleton(value, arrays), separators=(",", ":")).encode()
+    if len(text) > MAX_TEXT_BYTES:
+        raise BadFrame(f"{len(text)} bytes that are no numbers")
+    parts = [HEAD.pack(MAGIC, len(text), len(arrays)), text]
+    for code, data in arrays:
+        parts += [ARRAY.pack(code, len(data)), data]
+    return b"".join(parts)
+
+
+def unpack(frame: bytes) -> Any:
+    """Read a frame.
+
+    Raises
+    ------
+    BadFrame
+        When it is anything else.
+    """
+    try:
+        magic, text_bytes, count = HEAD.unpack_from(frame)
+        at = HEAD.size + text_bytes
+        if magic != MAGIC or text_bytes > MAX_TEXT_BYTES:
+            raise BadFrame("not a frame")
+        text = frame[HEAD.size : at]
+        arrays: list[list[Any]] = []
+        for _ in range(count):
+            code, length = ARRAY.unpack_from(frame, at)
+            at += ARRAY.size
+            if length % WIDTHS[code] or at + length > len(frame):
+                raise BadFrame("an array of the wrong length")
+            arrays.append(array(code.decode(), frame[at : at + length]).tolist())
+            at += length
+        if at != len(frame):
+            raise BadFrame("more bytes than were announced")
+        return json.loads(text, object_hook=lambda found: _restored(found, arrays))
+    except (struct.error, KeyError, IndexError, TypeError, ValueError, RecursionError) as error:
+        raise BadFrame(f"a parser's answer cannot be read: {type(error).__name__}") from None
+
+
+def _restored(found: dict[str, Any], arrays: list[list[Any]]) -> Any:
+    if MARK not in found:
+        return found
+    numbers = arrays[found[MARK]]
+    for position, item in found["else"]:
+        numbers[position] = item
+    return numbers
+
+
+def _skeleton(value: Any, arrays: list[tuple[bytes, bytes]]) -> Any:
+    if isinstance(value, array):
+        return _placed(value, [], arrays)
+    if isinstance(value, dict):
+        return {key: _skeleton(item, arrays) for key, item in value.items()}
+    if isinstance(value, list):
+        if len(value) >= SHORTEST_ARRAY and (found := _numbers(value)) is not None:
+            return _placed(*found, arrays)
+        return [_skeleton(item, arrays) for item in value]
+    return value
+
+
+def _placed(numbers: array[Any], exceptions: list[Any], arrays: list[tuple[bytes, bytes]]) -> dict[str, Any]:
+    arrays.append((numbers.typecode.encode(), numbers.tobytes()))
+    return {MARK: len(arrays) - 1, "else": exceptions}
+
+
+def _numbers(items: list[Any]) -> tuple[array[Any], list[Any]] | None:
+    """A list as an array and the few items that are no numbers with their places; None when it is no such."""
+    kinds = set(map(type, items))
+    if kinds == {float}:
+        return array("d", items), []
+    exceptions: list[Any] = []
+    numbers = array("d" if float in kinds else "q")
+    for position, item in enumerate(items):
+        number = type(item) is float or (type(item) is int and abs(item) <= LARGEST_EXACT)
+        if not number:
+            if len(exceptions) == MOST_EXCEPTIONS or isinstance(item, (dict, list)):
+                return None
+            exceptions.append([position, item])
+        numbers.append(item if number else 0)
+    return numbers, exceptions

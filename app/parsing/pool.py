@@ -1,0 +1,220 @@
+"""The parsers of an API process: one process a file, a few at once, killed and reaped whatever happens."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from fastapi.concurrency import run_in_threadpool
+
+from app.errors import Fault, InvalidRequest, MalformedBody, ServiceBusy, UnsupportedMediaType
+from app.parsing.child import BODY
+from app.parsing.confinement import Limits
+from app.parsing.frame import BadFrame, unpack
+from app.schemas.fields import MAX_ROWS
+from samplefiles.fault import TITLES, FileFault
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
+PIECE = 2**18
+QUEUE_S = 30.0  # a client that waits longer is better told to come again
+FORMAT_FAULTS = frozenset({"unknown_format", "needs_pyarrow", "matlab_v73", "matlab_object"})
+
+logger = logging.getLogger(__name__)
+
+
+class _Unanswered(Exception):
+    """The process ended or was ended without an answer; the argument says why."""
+
+
+class ParserPool:
+    """Starts parser processes.
+
+    Parameters
+    ----------
+    at_once : int
+        Processes at the same time.
+    limits : Limits
+        Of each process.
+    queue_s : float
+        Longest wait for one; a request that waits longer is told that the service is busy.
+    """
+
+    def __init__(self, at_once: int, limits: Limits, queue_s: float = QUEUE_S) -> None:
+        self._free = asyncio.Semaphore(at_once)
+        self._queue_s = queue_s
+        self._limits = limits
+
+    async def json_document(self, file: BinaryIO) -> Any:
+        """Parse the JSON text in a file, as `parse_json` would.
+
+        Raises
+        ------
+        MalformedBody
+            It is not a sensible JSON text.
+        ServiceBusy
+            Too many others are being read.
+        """
+        try:
+            answer = await self._read(BODY, file)
+        except _Unanswered as why:
+            raise MalformedBody(f"The body cannot be read: {why}.", hint="Send less text.") from None
+        if "malformed" in answer:
+            raise MalformedBody(*answer["malformed"])
+        return answer["document"]
+
+    async def flight(self, kind: str, file: BinaryIO, pointer: str) -> dict[str, list[float]]:
+        """Read the columns of a flight, SI units, by their standard names.
+
+        Parameters
+        ----------
+        kind : str
+            As `samplefiles.reading.kind_of` says.
+        file : binary file
+            With a descriptor.
+        pointer : str
+            Where faults point to: ``{pointer}/{row}/{column}``.
+
+        Raises
+        ------
+        InvalidRequest
+            Naming row and column.
+        UnsupportedMediaType
+            The file is of a form that is not read here.
+        ServiceBusy
+            Too many others are being read.
+        """
+        try:
+            answer = await self._read(kind, file)
+        except _Unanswered as why:
+            hint = "Send a plain file of six columns of numbers; leave out everything else."
+            raise InvalidRequest.of(
+                [Fault("unreadable_file", f"The file cannot be read: {why}.", pointer, hint)]
+            ) from None
+        if "fault" in answer:
+            raise refusal(FileFault(*answer["fault"]), pointer)
+        columns: dict[str, list[float]] = answer["columns"]
+        return columns
+
+    async def _read(self, kind: str, file: BinaryIO) -> dict[str, Any]:
+        async with self._turn():
+            answer: dict[str, Any] = await run_in_threadpool(_answer_of, kind, file, self._limits)
+        return answer
+
+    @asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        try:
+            async with asyncio.timeout(self._queue_s):
+                await self._free.acquire()
+        except TimeoutError:
+            raise ServiceBusy("Too many files are being read at the moment.") from None
+        try:
+            yield
+        finally:
+            self._free.release()
+
+
+def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMediaType:
+    """Tell a file's fault as a problem of the request."""
+    detail = fault.detail[:1].upper() + fault.detail[1:] + "."
+    hint = fault.hint[:1].upper() + fault.hint[1:] + "."
+    if fault.code in FORMAT_FAULTS:
+        return UnsupportedMediaType(detail, pointer, hint)
+    place = "".join(f"/{part}" for part in (fault.row, _token(fault.title)) if part not in (None, ""))
+    if fault.title and fault.row is None and fault.title != TITLES:
+        place = f"/{_token(fault.title)}"
+    return InvalidRequest.of([Fault(fault.code, detail, f"{pointer}{place}", hint)])
+
+
+def _token(title: str) -> str:
+    return title[:60].replace("~", "~0").replace("/", "~1")
+
+
+def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
+    """Run one process on `file` (any position: it is read from its beginning)."""
+    file.flush()
+    file.seek(0)
+    os.lseek(file.fileno(), 0, os.SEEK_SET)
+    command = [sys.executable, "-s", "-P", "-m", "app.parsing.child", kind, *limits.words(), str(MAX_ROWS)]
+    started = time.monotonic()
+    with subprocess.Popen(
+        command,
+        stdin=file.fileno(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=_environment(),
+        cwd="/",
+        start_new_session=True,  # Ctrl-C is the parent's; and one signal ends whatever it started
+    ) as process:
+        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
+        try:
+            frame = _drained(process.stdout, started + limits.wall_s)
+            process.wait(max(0.1, started + limits.wall_s - time.monotonic()))
+            found: dict[str, Any] = unpack(frame)
+        except (BadFrame, TimeoutError, subprocess.TimeoutExpired) as error:
+            _end(process)
+            logger.warning(
+                "a parser of %s gave no answer: %s, exit %s", kind, type(error).__name__, process.returncode
+            )
+            raise _Unanswered(_reason(error, process.returncode)) from None
+        finally:
+            _end(process)
+    if "failed" in found:
+        raise _Unanswered(
+            "it needs too much memory" if found["failed"] == "MemoryError" else "it is too complex"
+        )
+    return found
+
+
+def _drained(pipe: Any, deadline: float) -> bytes:
+    """What comes out of a pipe; BadFrame when it is too much, TimeoutError when it takes too long."""
+    found = bytearray()
+    ready = select.poll()
+    ready.register(pipe, select.POLLIN | select.POLLHUP)
+    while True:
+        left_s = deadline - time.monotonic()
+        if left_s <= 0 or not ready.poll(left_s * 1000):
+            raise TimeoutError
+        piece = os.read(pipe.fileno(), PIECE)
+        if not piece:
+            return bytes(found)
+        found += piece
+        if len(found) > MAX_ANSWER_BYTES:
+            raise BadFrame("too long an answer")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _reason(error: Exception, exit_code: int | None) -> str:
+    if isinstance(error, BadFrame) and exit_code not in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "its reader broke off"
+    return "it takes too long"
+
+
+def _environment() -> dict[str, str]:
+    """No secret of the service, and libraries that keep to one thread and the system's own allocator."""
+    return {
+        "PATH": os.defpath,
+        "LC_ALL": "C.UTF-8",
+        "PYTHONPATH": str(ROOT),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+        "ARROW_DEFAULT_MEMORY_POOL": "system",
+        "ARROW_IO_THREADS": "1",
+    }

@@ -1,0 +1,1 @@
+"""Webhooks: a job's end is told to an address of its owner."""

@@ -1,0 +1,219 @@
+"""Which addresses a webhook may have: nothing inside this machine or its networks is ever connected to.
+
+A name is looked up once per try; the connection then goes to the very address that was checked, so that a
+name that changes its mind between check and use gains nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import re
+import socket
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from urllib.parse import SplitResult, urlsplit
+
+from app.settings import is_loopback
+
+Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+Resolver = Callable[[str, int], list[str]]
+
+MAX_URL = 2000
+LOWEST_PORT = 1024  # below are mail, SSH and the like; of those only HTTPS's own
+LOOKUP_S = 3.0  # at creation; the sender has its own limit
+MAX_LOOKUPS = 32  # at once; a name server that does not answer must not eat the process's threads
+HOST = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,251}[A-Za-z0-9_])?\.?")
+NUMBER = re.compile(
+    r"(?:\d+|0[xX][0-9A-Fa-f]*)"
+)  # as a last label: an address in disguise, 127.1 or 0x7f000001
+NAT64 = ipaddress.ip_network("64:ff9b::/96")
+GLOBAL_UNICAST_6 = ipaddress.ip_network("2000::/3")
+NEVER = tuple(
+    ipaddress.ip_network(block)
+    for block in (
+        "168.63.129.16/32",  # Azure's metadata and host services, in public space
+        "192.0.0.0/24",  # protocol assignments
+        "192.88.99.0/24",  # 6to4 relays
+        "2001::/23",  # protocol assignments: Teredo, ORCHID
+        "3fff::/20",  # documentation
+    )
+)
+
+
+class AddressRefused(Exception):
+    """The address is not one that webhooks are sent to; the message says why."""
+
+
+def is_public(address: Address) -> bool:
+    """Tell whether `address` is global unicast, and so is any IPv4 address that is wrapped in it."""
+    if isinstance(address, ipaddress.IPv6Address):
+        if address.scope_id is not None:
+            return False
+        inner = address.ipv4_mapped or address.sixtofour
+        if inner is None and address in NAT64:
+            inner = ipaddress.IPv4Address(int(address) & 0xFFFFFFFF)
+        if inner is not None:
+            return is_public(inner)
+        if address not in GLOBAL_UNICAST_6:
+            return False
+    elif address.is_reserved:
+        return False
+    listed = any(address in block for block in NEVER if block.version == address.version)
+    return address.is_global and not address.is_multicast and not listed
+
+
+def look_up(host: str, port: int) -> list[str]:
+    """Every address of `host`, as the system's resolver tells them."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    return list(dict.fromkeys(str(entry[4][0]) for entry in found))
+
+
+_lookups = threading.BoundedSemaphore(MAX_LOOKUPS)
+
+
+def _in_own_thread(resolve: Resolver, host: str, port: int) -> Future[list[str]]:
+    """Look up in a daemon thread: the system's resolver cannot be told to hurry; nobody waits for it."""
+    future: Future[list[str]] = Future()
+    if not _lookups.acquire(blocking=False):
+        future.set_exception(OSError("too many names are being looked up"))
+        return future
+
+    def run() -> None:
+        found: list[str] = []
+        failure: Exception | None = None
+        try:
+            found = resolve(host, port)
+        except (OSError, UnicodeError) as error:
+            failure = OSError(str(error))
+        finally:
+            _lookups.release()
+        if not future.set_running_or_notify_cancel():
+            return  # nobody waits for it any more
+        if failure is not None:
+            future.set_exception(failure)
+        else:
+            future.set_result(found)
+
+    threading.Thread(target=run, name="webhook-lookup", daemon=True).start()
+    return future
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """An address that may be connected to.
+
+    Attributes
+    ----------
+    addresses : tuple of str
+        Of the host, all checked.
+    """
+
+    url: str
+    host: str
+    addresses: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AddressPolicy:
+    """What addresses webhooks may have.
+
+    Parameters
+    ----------
+    allow_private : bool
+        For development on one machine: loopback and private networks too, and ``http`` to loopback.
+    resolve : callable
+        ``(host, port) -> addresses``; raises OSError for a name that is not known.
+    """
+
+    allow_private: bool = False
+    resolve: Resolver = look_up
+
+    def check_url(self, url: str) -> SplitResult:
+        """Check what can be seen without a look-up.
+
+        Raises
+        ------
+        AddressRefused
+        """
+        if len(url) > MAX_URL or not url.isascii() or re.search(r"[\x00-\x20\x7f\\]", url):
+            raise AddressRefused(f"A URL has at most {MAX_URL} characters, all ASCII, without spaces.")
+        try:
+            parts = urlsplit(url)
+            port = parts.port
+        except ValueError:
+            raise AddressRefused("The URL cannot be read.") from None
+        host = parts.hostname or ""
+        plain_allowed = self.allow_private and is_loopback(host)
+        if parts.scheme != "https" and not (parts.scheme == "http" and plain_allowed):
+            raise AddressRefused("The URL must begin with https://.")
+        if "@" in parts.netloc:
+            raise AddressRefused("The URL must not hold a user name or password.")
+        if parts.fragment:
+            raise AddressRefused("The URL must not have a fragment (#...).")
+        if port is not None and port < LOWEST_PORT and port != (443 if parts.scheme == "https" else 80):
+            raise AddressRefused(f"The port must be 443, or {LOWEST_PORT} and above.")
+        self._check_host(host)
+        return parts
+
+    def _check_host(self, host: str) -> None:
+        try:
+            address = ipaddress.ip_address(host)
+        except ValueError:
+            last_label = host.rstrip(".").rpartition(".")[2]
+            if not HOST.fullmatch(host) or NUMBER.fullmatch(last_label):
+                raise AddressRefused("The host is not a name or an address.") from None
+        else:
+            self._check_address(str(address))
+
+    def _check_address(self, text: str) -> None:
+        try:
+            address = ipaddress.ip_address(text)
+        except ValueError:
+            raise AddressRefused("The name has no readable address.") from None
+        if is_public(address):
+            return
+        # link-local stays out even here: cloud machines keep their credentials there
+        near = address.is_loopback or (address.is_private and not address.is_link_local)
+        special = address.is_unspecified or address.is_multicast or address.is_reserved
+        if not (self.allow_private and near and not special):
+            raise AddressRefused("The address is not a public one.")
+
+    def _checked(self, parts: SplitResult, addresses: list[str]) -> Target:
+        if not addresses:
+            raise AddressRefused("The name has no address.")
+        for address in addresses:
+            self._check_address(address)
+            if parts.scheme != "https" and not is_loopback(address):
+                raise AddressRefused("Plain http is for this machine only.")
+        return Target(parts.geturl(), (parts.hostname or "").rstrip("."), tuple(addresses))
+
+    def check_now(self, url: str) -> None:
+        """Check a URL with what its name resolves to now; a name that is not known yet passes.
+
+        Raises
+        ------
+        AddressRefused
+        """
+        parts = self.check_url(url)
+        try:
+            found = _in_own_thread(self.resolve, parts.hostname or "", parts.port or 443).result(LOOKUP_S)
+        except OSError:  # also that it took too long
+            return  # the first try will tell: see the webhook's deliveries
+        self._checked(parts, found)
+
+    async def target(self, url: str) -> Target:
+        """Look the name up, once, and return where to connect to.
+
+        Raises
+        ------
+        AddressRefused
+            When any of its addresses is not allowed.
+        OSError
+            When the name is not known.
+        """
+        parts = self.check_url(url)
+        lookup = _in_own_thread(self.resolve, parts.hostname or "", parts.port or 443)
+        return self._checked(parts, await asyncio.wrap_future(lookup))

@@ -1,0 +1,154 @@
+"""Endpoints of webhooks."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query
+
+from app.audit.records import Action
+from app.audit.service import note
+from app.errors import (
+    BodyTooLarge,
+    InvalidRequest,
+    MalformedBody,
+    TooManyWebhooks,
+    UnsupportedMediaType,
+    WebhookDisabled,
+    WebhookNotFound,
+)
+from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
+from app.http.json_body import JsonRoute
+from app.http.problems import documented
+from app.keys.records import Scope
+from app.webhooks import repository, service
+from app.webhooks.addresses import AddressPolicy
+from app.webhooks.schemas import (
+    EXAMPLE_WEBHOOK,
+    Delivery,
+    DeliveryPage,
+    Message,
+    NewWebhook,
+    Webhook,
+    WebhookList,
+    WebhookRequest,
+)
+
+router = APIRouter(tags=["webhooks"], route_class=JsonRoute, dependencies=[demands(Scope.WEBHOOKS)])
+
+ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
+WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
+
+
+@router.post(
+    "/webhooks",
+    operation_id="create_webhook",
+    summary="Be told when jobs end",
+    status_code=201,
+    responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, TooManyWebhooks),
+)
+def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) -> NewWebhook:
+    """Register an address; the answer holds the secret that signs every message, this once.
+
+    Messages follow Standard Webhooks. Each end of a job is sent at least once, in no fixed order.
+    """
+    service.check_address(AddressPolicy(allow_private=app.settings.webhook_allow_private), request.url)
+    with app.database.write() as session:
+        made = service.create(session, caller.owner, request)
+        note(session, caller, Action.WEBHOOK_CREATE, made.id)
+        return made
+
+
+@router.get("/webhooks", operation_id="list_webhooks", summary="List webhooks")
+def list_webhooks(app: ServiceDep, owner: OwnerDep) -> WebhookList:
+    """Your webhooks, newest first."""
+    with app.database.read() as session:
+        return service.listing(session, owner)
+
+
+@router.get(
+    "/webhooks/{webhook_id}",
+    operation_id="get_webhook",
+    summary="Look at a webhook",
+    responses=documented(InvalidRequest, WebhookNotFound),
+)
+def get_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Webhook:
+    """Address, events, and why it is disabled if it is."""
+    with app.database.read() as session:
+        return service.get(session, owner, webhook_id)
+
+
+@router.delete(
+    "/webhooks/{webhook_id}",
+    operation_id="delete_webhook",
+    summary="Delete a webhook",
+    status_code=204,
+    responses=documented(InvalidRequest, WebhookNotFound),
+)
+def delete_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> None:
+    """Delete a webhook with its deliveries, sent or not."""
+    with app.database.write() as session:
+        repository.delete_webhook(session, caller.owner, webhook_id)
+        note(session, caller, Action.WEBHOOK_DELETE, webhook_id)
+
+
+@router.post(
+    "/webhooks/{webhook_id}/enable",
+    operation_id="enable_webhook",
+    summary="Enable a webhook",
+    responses=documented(InvalidRequest, WebhookNotFound),
+)
+def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> Webhook:
+    """Send to a webhook again that was disabled. Jobs that ended meanwhile are not told: list them."""
+    with app.database.write() as session:
+        enabled = service.enable(session, caller.owner, webhook_id)
+        note(session, caller, Action.WEBHOOK_UPDATE, webhook_id)
+        return enabled
+
+
+@router.post(
+    "/webhooks/{webhook_id}/test",
+    operation_id="test_webhook",
+    summary="Send a test message",
+    status_code=202,
+    responses=documented(InvalidRequest, WebhookNotFound, WebhookDisabled),
+)
+def test_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Delivery:
+    """Send a `webhook.test` message within a few seconds; see the deliveries for what became of it."""
+    with app.database.write() as session:
+        return service.test(session, owner, webhook_id)
+
+
+@router.get(
+    "/webhooks/{webhook_id}/deliveries",
+    operation_id="list_webhook_deliveries",
+    summary="List what was sent to a webhook",
+    responses=documented(InvalidRequest, WebhookNotFound),
+)
+def list_webhook_deliveries(
+    app: ServiceDep,
+    owner: OwnerDep,
+    webhook_id: WebhookId,
+    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> DeliveryPage:
+    """Messages with the fate of their last try, newest first."""
+    with app.database.read() as session:
+        return service.delivery_page(session, owner, webhook_id, cursor=cursor, limit=limit)
+
+
+messages = APIRouter(tags=["webhooks"])  # not served: what receivers are sent, for the OpenAPI document
+
+
+@messages.post(
+    "job_ended",
+    operation_id="job_ended",
+    summary="A job has ended",
+    responses={
+        204: {"description": "Any 2xx: the message was taken."},
+        "default": {"description": "Not taken: it is sent again. 410 disables the webhook."},
+    },
+    status_code=204,
+)
+def job_ended(message: Message) -> None:
+    """Sent to webhooks by Standard Webhooks: `webhook-id`, `webhook-timestamp` and `webhook-signature`."""

@@ -1,0 +1,118 @@
+"""The outbox: a job's end and its deliveries are written in one transaction.
+
+Imported by the job store, and so by workers: nothing here speaks HTTP.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Row, Table, delete, insert, select
+
+from app.database import Session, database_time
+from app.documents import Document
+from app.identifiers import new_identifier
+from app.jobs.records import FINISHED, moment
+from app.tables import webhook_deliveries, webhooks
+
+WAITING = "waiting"
+DELIVERED = "delivered"
+GIVEN_UP = "given_up"
+
+TEST_EVENT = "webhook.test"
+JOB_EVENTS = tuple(f"job.{status}" for status in FINISHED)
+MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
+
+
+def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
+    """Write one delivery for each of the owner's webhooks that wants to know how the job ended.
+
+    Parameters
+    ----------
+    row
+        The job's row after the change; one that has not ended is left alone.
+    """
+    if row.status not in FINISHED:
+        return
+    event = f"job.{row.status}"
+    # key share: a webhook that is being deleted at this moment must not take the job's end down with it
+    hooks = session.execute(
+        select(webhooks.c.id, webhooks.c.events)
+        .where(webhooks.c.owner == row.owner, webhooks.c.disabled_at.is_(None))
+        .order_by(webhooks.c.id)
+        .with_for_update(read=True, key_share=True)
+    ).all()
+    for hook in hooks:
+        if event in hook.events:
+            session.execute(
+                insert_once(session, webhook_deliveries).values(
+                    new_delivery(hook.id, event, _ended(event, row), job_id=row.id)
+                )
+            )
+
+
+def new_delivery(webhook_id: str, event: str, payload: Document, *, job_id: str | None = None) -> Document:
+    """Columns of a delivery that waits to be sent at once."""
+    return {
+        "id": new_identifier("msg"),
+        "webhook_id": webhook_id,
+        "job_id": job_id,
+        "type": event,
+        "payload": payload,
+        "status": WAITING,
+        "attempt": 0,
+        "fence": 0,
+        "next_at": database_time(),
+        "created_at": database_time(),
+    }
+
+
+def insert_once(session: Session, table: Table) -> Any:
+    """An INSERT that leaves alone what is there already."""
+    if session.dialect.name == "sqlite":
+        from sqlalchemy.dialects import sqlite
+
+        return sqlite.insert(table).on_conflict_do_nothing()
+    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
+
+    return postgresql.insert(table).on_conflict_do_nothing()
+
+
+def note_test(session: Session, webhook_id: str, at: float) -> str:
+    """Write a test delivery and return its id."""
+    payload = {"type": TEST_EVENT, "timestamp": moment(at).isoformat(), "data": {"webhook_id": webhook_id}}
+    values = new_delivery(webhook_id, TEST_EVENT, payload)
+    session.execute(insert(webhook_deliveries).values(values))
+    return str(values["id"])
+
+
+def forget_before(session: Session, time: float) -> int:
+    """Delete deliveries that ended before `time` (s since 1970 UTC); return how many there were."""
+    return session.execute(
+        delete(webhook_deliveries).where(
+            webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)), webhook_deliveries.c.finished_at < time
+        )
+    ).rowcount
+
+
+def _ended(event: str, row: Row[*tuple[Any, ...]]) -> Document:
+    at = f"/jobs/{row.id}"
+    return {
+        "type": event,
+        "timestamp": moment(row.finished_at).isoformat(),
+        "data": {
+            "id": row.id,
+            "operation": row.operation,
+            "status": row.status,
+            "error": _small(row.error),
+            "model_id": row.model_id,
+            "links": {"self": at, "result": f"{at}/result", "artifacts": f"{at}/artifacts"},
+        },
+    }
+
+
+def _small(error: Document | None) -> Document | None:
+    """Give code, sentence and hint of a job's error."""
+    if error is None:
+        return None
+    return {name: str(error.get(name, ""))[:MAX_DETAIL] for name in ("code", "detail", "hint")}

@@ -1,0 +1,193 @@
+"""One POST to a receiver that may be anybody: pinned address, verified name, no redirect, little patience."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import ssl
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from app.version import VERSION
+from app.webhooks.addresses import AddressPolicy, AddressRefused, Target
+from app.webhooks.retries import parse_retry_after
+
+if TYPE_CHECKING:
+    import httpx
+
+MAX_ANSWER_BYTES = 64 * 1024  # read so that the receiver can finish its sentence, and thrown away
+MAX_ADDRESSES = 3  # of a name, tried one after the other
+GONE = 410
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long one try may last, s; `total_s` counts from the look-up to the last byte."""
+
+    connect_s: float = 4.0
+    read_s: float = 8.0
+    total_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of one try.
+
+    Attributes
+    ----------
+    status : int or None
+        HTTP status; None when there was no answer.
+    error : str or None
+        Why the try failed, in one short sentence that holds nothing of what the receiver said.
+    retry_after_s : float or None
+        What the receiver asked for.
+    """
+
+    status: int | None
+    error: str | None = None
+    retry_after_s: float | None = None
+
+    @property
+    def delivered(self) -> bool:
+        """Whether the receiver took the message."""
+        return self.status is not None and 200 <= self.status < 300
+
+    @property
+    def gone(self) -> bool:
+        """Whether the receiver wants no more messages."""
+        return self.status == GONE
+
+
+class Poster:
+    """Posts messages; an asynchronous context that owns its client.
+
+    Parameters
+    ----------
+    policy : AddressPolicy
+        Which addresses may be connected to.
+    trust : ssl.SSLContext, optional
+        Whom to believe; the usual authorities when None.
+    """
+
+    def __init__(
+        self, policy: AddressPolicy, trust: ssl.SSLContext | None = None, patience: Patience | None = None
+    ) -> None:
+        self._policy = policy
+        self._trust = trust
+        self._patience = patience or Patience()
+        self._client: httpx.AsyncClient | None = None
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._client is not None:
+            await self._client.aclose()
+            self._client = None
+
+    def _opened(self) -> httpx.AsyncClient:
+        if self._client is None:
+            import httpx  # lazy: most processes have nothing to send
+
+            # its lines would hold the receivers' addresses, with what is secret in their queries
+            logging.getLogger("httpx").setLevel(logging.WARNING)
+            self._client = httpx.AsyncClient(
+                verify=self._trust or httpx.create_ssl_context(),
+                trust_env=False,  # a proxy would connect to an address that nobody checked
+                follow_redirects=False,
+                timeout=httpx.Timeout(self._patience.read_s, connect=self._patience.connect_s),
+                # no connection outlives its message: the next one is looked up and checked anew
+                limits=httpx.Limits(max_keepalive_connections=0),
+            )
+        return self._client
+
+    async def post(self, url: str, headers: Mapping[str, str], body: bytes) -> Answer:
+        """Send one message; every failure is an answer, never an exception."""
+        import httpx
+
+        seen: list[Answer] = []
+        failure: Exception | None = None
+        try:
+            async with asyncio.timeout(self._patience.total_s):
+                target = await self._policy.target(url)
+                await self._to_first(target, headers, body, seen)
+        except (AddressRefused, OSError, ValueError, httpx.HTTPError, httpx.InvalidURL) as error:
+            failure = error
+        if seen:  # also of a receiver that said its status, and then dripped or broke off
+            return seen[0]
+        return Answer(None, "No address was tried." if failure is None else _why(failure))
+
+    async def _to_first(
+        self, target: Target, headers: Mapping[str, str], body: bytes, seen: list[Answer]
+    ) -> None:
+        """Send to the first of the checked addresses that lets itself be connected to."""
+        import httpx
+
+        chosen = target.addresses[:MAX_ADDRESSES]
+        for position, address in enumerate(chosen):
+            try:
+                return await self._exchange(target, address, headers, body, seen)
+            except (httpx.ConnectError, httpx.ConnectTimeout):
+                if position == len(chosen) - 1:
+                    raise
+        return None
+
+    async def _exchange(
+        self, target: Target, address: str, headers: Mapping[str, str], body: bytes, seen: list[Answer]
+    ) -> None:
+        import httpx
+
+        url = httpx.URL(target.url)
+        request = self._opened().build_request(
+            "POST",
+            url.copy_with(host=address),
+            headers={
+                "host": url.netloc.decode("ascii"),
+                "content-type": "application/json",
+                "user-agent": f"MorphID/{VERSION}",
+                "accept-encoding": "identity",
+                **headers,
+            },
+            content=body,
+            extensions={"sni_hostname": target.host},  # the certificate is the name's, not the address's
+        )
+        response = await self._opened().send(request, stream=True)
+        try:
+            status = response.status_code
+            asked = parse_retry_after(response.headers.get("retry-after"), time.time())
+            error = None if 200 <= status < 300 else f"The receiver answered {status}."
+            seen.append(Answer(status, error, asked))
+            size = 0
+            async for piece in response.aiter_raw():
+                size += len(piece)
+                if size > MAX_ANSWER_BYTES:
+                    break
+        finally:
+            await response.aclose()
+
+
+def _why(failure: Exception) -> str:
+    """Say why there was no answer, with nothing of what the receiver said."""
+    import httpx
+
+    if isinstance(failure, AddressRefused):
+        return f"Refused: {failure}"
+    chain: BaseException | None = failure if isinstance(failure, httpx.ConnectError) else None
+    while chain is not None:
+        if isinstance(chain, ssl.SSLCertVerificationError):
+            return "The receiver's certificate is not valid for its name."
+        chain = chain.__cause__ or chain.__context__
+    sentences: tuple[tuple[tuple[type[Exception], ...], str], ...] = (
+        ((TimeoutError, httpx.TimeoutException), "There was no answer in time."),
+        ((httpx.ConnectError,), "No (secure) connection came about."),
+        ((httpx.HTTPError,), "The exchange broke off."),
+        ((OSError,), "The name is not known."),
+    )
+    return next(
+        (words for kinds, words in sentences if isinstance(failure, kinds)), "The URL cannot be used."
+    )

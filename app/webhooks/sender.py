@@ -1,0 +1,197 @@
+"""The sender: takes deliveries whose time has come and posts them, in a thread of the API process.
+
+It has its own event loop: a slow receiver, a handshake or a busy database never holds up the API.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import ssl
+import threading
+from collections import Counter
+from dataclasses import dataclass, field
+from random import Random, SystemRandom
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database import Database, database_time
+from app.documents import json_bytes
+from app.webhooks import deliveries
+from app.webhooks.addresses import AddressPolicy
+from app.webhooks.deliveries import Clock, Dispatch
+from app.webhooks.posting import Answer, Patience, Poster
+from app.webhooks.signature import signed_headers
+
+STOP_S = 1.0  # what is under way may end; then it is given back and sent again by the next process
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class SenderSettings:
+    """How a sender goes about it.
+
+    Attributes
+    ----------
+    poll_s : float
+        Time between two looks at the table, s.
+    most_at_once, most_per_owner : int
+        Deliveries under way, in all and of one owner.
+    disable_after : int
+        Given-up deliveries in a row that disable a webhook.
+    """
+
+    policy: AddressPolicy = field(default_factory=AddressPolicy)
+    trust: ssl.SSLContext | None = None
+    patience: Patience = field(default_factory=Patience)
+    poll_s: float = 1.0
+    most_at_once: int = 16
+    most_per_owner: int = 4
+    disable_after: int = 5
+    lease_s: float = deliveries.LEASE_S
+    clock: Clock = database_time
+    rng: Random = field(default_factory=SystemRandom)
+
+
+class WebhookSender:
+    """Sends what waits in the outbox.
+
+    Parameters
+    ----------
+    database : Database
+    settings : SenderSettings
+    """
+
+    def __init__(self, database: Database, settings: SenderSettings) -> None:
+        self._database = database
+        self._settings = settings
+        self._under_way: dict[asyncio.Task[None], Dispatch] = {}
+        self._stopping = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._wake: asyncio.Event | None = None
+
+    def start(self) -> None:
+        """Begin to send, in a thread of its own."""
+        self._thread = threading.Thread(target=self._main, name="webhook-sender", daemon=True)
+        self._thread.start()
+
+    def stop(self, patience_s: float = 2 * STOP_S + 1.0) -> None:
+        """End within a second or two; what is not done stays in the table."""
+        self._stopping.set()
+        loop, wake = self._loop, self._wake
+        if loop is not None and wake is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(wake.set)
+        if self._thread is not None:
+            self._thread.join(patience_s)
+
+    def _main(self) -> None:
+        asyncio.run(self.run())
+
+    async def run(self) -> None:
+        """Send until `stop` is called."""
+        self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
+        async with Poster(self._settings.policy, self._settings.trust, self._settings.patience) as poster:
+            waiting = asyncio.create_task(self._wake.wait())
+            try:
+                while not self._stopping.is_set():
+                    await self._begin(poster)
+                    await asyncio.wait(
+                        {waiting, *self._under_way},
+                        timeout=self._settings.poll_s,
+                        return_when=asyncio.FIRST_COMPLETED,
+                    )
+            finally:
+                waiting.cancel()
+                await self._wind_down()
+
+    async def send_due(self) -> int:
+        """Send what is due now, once each, and return how many tries were made."""
+        async with Poster(self._settings.policy, self._settings.trust, self._settings.patience) as poster:
+            tries = 0
+            while begun := await self._begin(poster):
+                tries += begun
+                await asyncio.wait(set(self._under_way))
+            return tries
+
+    async def _begin(self, poster: Poster) -> int:
+        """Claim as many deliveries as may be under way beside those that are, and begin to send them."""
+        room = self._settings.most_at_once - len(self._under_way)
+        if room <= 0:
+            return 0
+        owners = Counter(dispatch.owner for dispatch in self._under_way.values())
+        try:
+            taken = await asyncio.to_thread(self._take, room, owners)
+        except SQLAlchemyError as error:
+            logger.warning("cannot look for webhook deliveries: %s", error)
+            return 0
+        for dispatch in taken:
+            task = asyncio.create_task(self._deliver(poster, dispatch))
+            self._under_way[task] = dispatch
+            task.add_done_callback(self._ended)
+        return len(taken)
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        dispatch = self._under_way.pop(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            logger.error("webhook delivery %s broke the sender", dispatch.id, exc_info=error)
+
+    def _take(self, room: int, under_way: Counter[str]) -> list[Dispatch]:
+        """Look, and only when there is something to send, write."""
+        chosen = self._settings
+        busy = [owner for owner, count in under_way.items() if count >= chosen.most_per_owner]
+        with self._database.read() as session:
+            found = deliveries.due(session, room, chosen.most_per_owner, busy, chosen.clock)
+        mine = []
+        for item in found:
+            if under_way[item.owner] < chosen.most_per_owner:
+                under_way[item.owner] += 1
+                mine.append(item)
+        if not mine:
+            return []
+        with self._database.write() as session:
+            return deliveries.claim(session, mine, chosen.lease_s, chosen.clock)
+
+    async def _deliver(self, poster: Poster, dispatch: Dispatch) -> None:
+        body = json_bytes(dispatch.payload)
+        headers = signed_headers(dispatch.secret, dispatch.id, dispatch.at, body)
+        try:
+            answer = await poster.post(dispatch.url, headers, body)
+            status = await asyncio.to_thread(self._settle, dispatch, answer)
+        except SQLAlchemyError as error:
+            # the claim's lease ends, and the delivery is sent again under the same id
+            logger.warning("cannot write what became of delivery %s: %s", dispatch.id, error)
+            return
+        logger.info("webhook delivery %s, try %d: %s", dispatch.id, dispatch.tries, answer.error or status)
+
+    def _settle(self, dispatch: Dispatch, answer: Answer) -> str | None:
+        with self._database.write() as session:
+            return deliveries.settle(
+                session,
+                dispatch,
+                answer,
+                rng=self._settings.rng,
+                disable_after=self._settings.disable_after,
+                clock=self._settings.clock,
+            )
+
+    async def _wind_down(self) -> None:
+        """Let what is under way end, for a moment; give the rest back."""
+        if not self._under_way:
+            return
+        await asyncio.wait(set(self._under_way), timeout=STOP_S)
+        left = dict(self._under_way)
+        for task in left:
+            task.cancel()
+        await asyncio.gather(*left, return_exceptions=True)
+        if left:
+            await asyncio.to_thread(self._release, list(left.values()))
+
+    def _release(self, left: list[Dispatch]) -> None:
+        try:
+            with self._database.write() as session:
+                for dispatch in left:
+                    deliveries.release(session, dispatch, self._settings.clock)
+        except SQLAlchemyError as error:
+            logger.warning("webhook deliveries stay claimed until their lease ends: %s", error)

@@ -1,0 +1,113 @@
+"""What endpoints ask of webhooks."""
+
+from __future__ import annotations
+
+from sqlalchemy import select
+
+from app.database import Session, database_time
+from app.errors import Fault, InvalidRequest, TooManyWebhooks, WebhookDisabled
+from app.webhooks import repository
+from app.webhooks.addresses import AddressPolicy, AddressRefused
+from app.webhooks.outbox import note_test
+from app.webhooks.repository import StoredDelivery, StoredWebhook
+from app.webhooks.schemas import Delivery, DeliveryPage, NewWebhook, Webhook, WebhookList, WebhookRequest
+from app.webhooks.signature import new_secret
+
+MAX_WEBHOOKS = 20  # of one owner
+
+
+def _shown(hook: StoredWebhook) -> Webhook:
+    return Webhook(
+        id=hook.id,
+        url=hook.url,
+        events=hook.events,
+        enabled=hook.disabled_at is None,
+        disabled_at=hook.disabled_at,
+        disabled_reason=hook.disabled_reason,
+        failures=hook.failures,
+        created_at=hook.created_at,
+    )
+
+
+def _shown_delivery(delivery: StoredDelivery) -> Delivery:
+    return Delivery(
+        id=delivery.id,
+        type=delivery.type,
+        job_id=delivery.job_id,
+        status=delivery.status,
+        tries=delivery.attempt,
+        response_status=delivery.response_status,
+        error=delivery.error,
+        created_at=delivery.created_at,
+        next_try_at=delivery.next_at,
+        finished_at=delivery.finished_at,
+    )
+
+
+def check_address(policy: AddressPolicy, url: str) -> None:
+    """Refuse an address that nothing would be sent to; looks the name up, so not inside a transaction.
+
+    Raises
+    ------
+    InvalidRequest
+    """
+    try:
+        policy.check_now(url)
+    except AddressRefused as error:
+        hint = "Give an https address that can be reached from the public internet."
+        raise InvalidRequest.of([Fault("address_refused", str(error), "/url", hint)]) from None
+
+
+def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
+    """Store a webhook and make its secret.
+
+    Raises
+    ------
+    TooManyWebhooks
+    """
+    if repository.count_webhooks(session, owner) >= MAX_WEBHOOKS:
+        raise TooManyWebhooks(MAX_WEBHOOKS)
+    secret = new_secret()
+    stored = repository.insert_webhook(session, owner, request.url, list(request.events), secret)
+    return NewWebhook(**_shown(stored).model_dump(), secret=secret)
+
+
+def listing(session: Session, owner: str) -> WebhookList:
+    """Every webhook of the owner."""
+    return WebhookList(webhooks=[_shown(hook) for hook in repository.list_webhooks(session, owner)])
+
+
+def get(session: Session, owner: str, webhook_id: str) -> Webhook:
+    """One webhook."""
+    return _shown(repository.get_webhook(session, owner, webhook_id))
+
+
+def enable(session: Session, owner: str, webhook_id: str) -> Webhook:
+    """Send to a webhook again."""
+    return _shown(repository.enable_webhook(session, owner, webhook_id))
+
+
+def test(session: Session, owner: str, webhook_id: str) -> Delivery:
+    """Write a test message.
+
+    Raises
+    ------
+    WebhookDisabled
+    """
+    hook = repository.get_webhook(session, owner, webhook_id)
+    if hook.disabled_at is not None:
+        raise WebhookDisabled(webhook_id)
+    delivery_id = note_test(session, webhook_id, session.execute(select(database_time())).scalar_one())
+    return _shown_delivery(repository.get_delivery(session, delivery_id))
+
+
+def delivery_page(
+    session: Session, owner: str, webhook_id: str, *, cursor: str | None, limit: int
+) -> DeliveryPage:
+    """One page of a webhook's deliveries, newest first."""
+    found = repository.list_deliveries(session, owner, webhook_id, before=cursor, limit=limit + 1)
+    shown = found[:limit]
+    return DeliveryPage(
+        deliveries=[_shown_delivery(delivery) for delivery in shown],
+        next_cursor=shown[-1].id if len(found) > limit else None,
+    )

@@ -1,0 +1,39 @@
+"""Secrets and signatures by Standard Webhooks (https://www.standardwebhooks.com)."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import secrets
+
+PREFIX = "whsec_"
+SECRET_BYTES = 32  # the standard asks for 24 to 64
+
+
+def new_secret() -> str:
+    """Make a secret in the form that the standard's libraries take."""
+    return PREFIX + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
+
+
+def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
+    """Headers by which the receiver knows sender, message and time.
+
+    Parameters
+    ----------
+    secret : str
+        ``whsec_<base64>``.
+    message_id : str
+        The same in every try, so that the receiver can leave out what it has seen.
+    timestamp : float
+        Of this try, s since 1970 UTC.
+    """
+    seconds = str(int(timestamp))
+    key = base64.b64decode(secret.removeprefix(PREFIX))
+    signed = b".".join((message_id.encode(), seconds.encode(), body))
+    signature = base64.b64encode(hmac.digest(key, signed, hashlib.sha256)).decode()
+    return {
+        "webhook-id": message_id,
+        "webhook-timestamp": seconds,
+        "webhook-signature": f"v1,{signature}",
+    }

@@ -1,0 +1,62 @@
+"""The doctor's round: which checks are made, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from cli.doctor import machine, remote, service
+from cli.doctor.findings import Check, Finding, examined, fail, ok
+
+
+def round_here(data_dir: Path | None) -> Iterator[Finding]:
+    """Examine this installation, and the service that the settings describe."""
+    from app.settings import UnsafeSettings, load_settings
+
+    checks: list[tuple[str, Check]] = [
+        ("python", machine.python),
+        ("packages", machine.packages),
+        ("compiler", machine.compiler),
+        ("cores", machine.cores),
+        ("open files", machine.files),
+    ]
+    yield from examined(checks)
+    try:
+        settings = load_settings(**({} if data_dir is None else {"data_dir": data_dir}))
+    except UnsafeSettings as error:
+        yield fail("settings", str(error), "correct the MORPHID_ variables; docs/operations.md lists them")
+        return
+    yield from examined(
+        [
+            ("data directory", partial(machine.data_dir, settings.data_dir, sqlite=settings.uses_sqlite)),
+            ("settings", partial(service.unsafe, settings)),
+            ("database", partial(service.database, settings)),
+            ("broker", _broker(settings.broker_url)),
+            ("jobs", partial(service.work, settings)),
+            ("keys", partial(service.keys, settings)),
+            ("port", partial(service.port, settings.host, settings.port)),
+        ]
+    )
+
+
+def _broker(url: str) -> Check:
+    import os
+
+    return partial(service.broker, url) if "MORPHID_BROKER_URL" in os.environ else _own_broker
+
+
+def _own_broker() -> Iterator[Finding]:
+    """`morphid serve` brings its own where none is named; its password is known to its children only."""
+    from cli.broker import find_server
+    from cli.exits import CommandError
+
+    try:
+        yield ok("broker", f"`morphid serve` runs {find_server()}")
+    except CommandError as error:
+        yield fail("broker", error.message, error.hint)
+
+
+def round_there(url: str, api_key: str | None) -> Iterator[Finding]:
+    """Examine a service from outside."""
+    yield from examined([("service", partial(remote.service, url.rstrip("/"), api_key))])

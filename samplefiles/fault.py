@@ -1,0 +1,51 @@
+"""What is wrong with a file, as one value that the library and the service tell in their own words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SHOWN_CHARACTERS = 60  # of a title or cell that a stranger wrote
+TITLES = "titles"
+
+
+def shown(text: object) -> str:
+    """A piece of a stranger's text, short, with every character that a terminal would obey escaped."""
+    return str(text)[:SHOWN_CHARACTERS].encode("unicode_escape").decode("ascii")
+
+
+@dataclass(eq=False)
+class FileFault(Exception):
+    """The file cannot be read as a flight.
+
+    Attributes
+    ----------
+    code : str
+        Stable and machine-readable.
+    detail : str
+        A sentence for people, without the file's name.
+    hint : str
+        What to do about it.
+    row : int or None
+        Row of numbers, from 0.
+    line : int or None
+        Line of a text file on which that row stands, from 1.
+    title : str
+        The column; `TITLES` when the set of columns is wrong, empty when it is about the whole file.
+    """
+
+    code: str
+    detail: str
+    hint: str
+    row: int | None = None
+    line: int | None = None
+    title: str = ""
+
+    def __str__(self) -> str:
+        return self.detail
+
+    @property
+    def place(self) -> str:
+        """Where in the file, for people: ``line 3``, ``row 2``, or nothing."""
+        if self.line is not None:
+            return f"line {self.line}"
+        return "" if self.row is None else f"row {self.row} (from 0)"

@@ -1,0 +1,79 @@
+"""Laws of the place in the queue, proved on SQLite and on Postgres."""
+
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import insert, select, update
+
+from app.database import Database, database_time
+from app.jobs import store
+from app.jobs.creation import Terms
+from app.jobs.records import Job
+from app.jobs.waiting import QueuePlace, place_of_next, queue_place
+from app.tables import jobs, workers
+from tests.app.jobs.test_store import new_job
+from tests.app.jobs.test_turns import queue, served
+
+
+def places(database: Database) -> dict[str, int]:
+    """Tell the position of every queued job."""
+    with database.read() as session:
+        rows = session.execute(select(jobs.c.id, jobs.c.owner).where(jobs.c.status == "queued")).all()
+        found = {row.id: queue_place(session, store.get_job(session, row.owner, row.id)) for row in rows}
+    assert all(found.values())
+    return {job_id: place.position for job_id, place in found.items() if place is not None}
+
+
+@pytest.mark.parametrize("taken_before", [0, 1, 3])
+def test_positions_are_the_order_of_turns(database: Database, taken_before: int) -> None:
+    """Jobs begin in the order of their positions, whoever owns them and however many run already."""
+    queue(database, many=5, few=2, one=1)
+    for owner, priority in (("many", 7), ("few", -3)):
+        new_job(database, owner=owner, terms=Terms(priority=priority))
+    for _ in range(taken_before):
+        served(database)
+    told = places(database)
+    began = [claim.job_id for claim in iter(lambda: served(database), None)]
+    assert sorted(told, key=told.__getitem__) == began
+    assert sorted(told.values()) == list(range(1, len(began) + 1))
+
+
+def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
+    """What a validation tells is the position that the job has when it is posted then."""
+    queue(database, many=4, few=1)
+    served(database)
+    with database.read() as session:
+        told = place_of_next(session, "few", "identify", 0).position
+    job = new_job(database, owner="few")
+    assert places(database)[job.id] == told
+
+
+def told_eta(database: Database, job: Job) -> float | None:
+    """When the job is told to begin, s."""
+    with database.read() as session:
+        place = queue_place(session, job)
+    assert isinstance(place, QueuePlace)
+    return place.eta_s
+
+
+def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
+    """Nothing known, nothing told; then ends needed before it, times the usual duration, over the workers."""
+    queue(database, a=2)
+    last = new_job(database, owner="a")
+    assert told_eta(database, last) is None
+    claim = served(database)
+    assert claim is not None
+    with database.write() as session:
+        store.finish_job(session, claim, "succeeded")
+        session.execute(
+            update(jobs).where(jobs.c.id == claim.job_id).values(started_at=jobs.c.finished_at - 10.0)
+        )
+    served(database)  # one runs, none before the last
+    assert told_eta(database, last) == pytest.approx(10.0, abs=1e-3)
+    with database.write() as session:
+        for name, age_s in (("live", 1.0), ("gone", 3600.0)):
+            seen = database_time() - age_s
+            session.execute(
+                insert(workers).values(name=name, version="1", slots=4, busy=0, started_at=seen, seen_at=seen)
+            )
+    assert told_eta(database, last) == 0.0  # three of four slots are free

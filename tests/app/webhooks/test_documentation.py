@@ -1,0 +1,67 @@
+"""What docs/webhooks.md tells receivers is true."""
+
+from __future__ import annotations
+
+import re
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from standardwebhooks import Webhook
+
+from app.webhooks.retries import DELAYS_S, MAX_TRIES
+from app.webhooks.sender import SenderSettings
+from app.webhooks.service import MAX_WEBHOOKS
+from app.webhooks.signature import new_secret, signed_headers
+
+PAPER = Path(__file__).resolve().parents[3] / "docs" / "webhooks.md"
+BODY = b'{"type":"job.succeeded"}'
+WORDS_S = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    """The paper, its lines joined."""
+    return " ".join(PAPER.read_text(encoding="utf-8").split())
+
+
+@pytest.fixture(scope="module")
+def verified() -> Any:
+    """The function that the paper shows."""
+    (example,) = re.findall(r"```python\n(.*?)```", PAPER.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(example, PAPER.name, "exec"), names)  # noqa: S102 - our own text
+    return names["verified"]
+
+
+def test_the_example_verifies_what_is_sent(verified: Any) -> None:
+    """The example takes our headers and those of the standard's own library, and nothing else."""
+    secret, now = new_secret(), time.time()
+    ours = signed_headers(secret, "msg_1", now, BODY)
+    theirs = Webhook(secret).sign("msg_1", datetime.now(UTC), BODY.decode())
+    assert verified(secret, ours, BODY)
+    assert verified(secret, {**ours, "webhook-signature": f"v2,x= {theirs}"}, BODY)
+    assert not verified(secret, ours, BODY + b" ")
+    assert not verified(new_secret(), ours, BODY)
+    assert not verified(secret, {**ours, "webhook-id": "msg_2"}, BODY)
+    assert not verified(secret, signed_headers(secret, "msg_1", now - 1000.0, BODY), BODY)
+
+
+def test_the_figures_are_the_codes(text: str) -> None:
+    """Delays, tries and limits in the paper are those of the code."""
+    (listed,) = re.findall(r"tried again after (.*?) \(", text)
+    delays = [float(number) * WORDS_S[unit] for number, unit in re.findall(r"(\d+) (s|min|h)\b", listed)]
+    assert tuple(delays) == DELAYS_S
+    assert f"after the {('', 'first', '', '', '', '', '', 'seventh')[MAX_TRIES]} try" in text
+    assert f"An owner may have {MAX_WEBHOOKS}." in text
+    settings = SenderSettings()
+    assert (settings.disable_after, settings.most_at_once, settings.most_per_owner) == (5, 16, 4)
+    assert settings.patience.total_s == 10.0
+    for words in (
+        "five messages in a row",
+        "Sixteen messages at once, four of one owner",
+        "within ten seconds",
+    ):
+        assert words in text

@@ -1,0 +1,78 @@
+"""Postgres crashes in mid-commit; two processes hammer one SQLite file."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from app.database import upgrade
+from tests.faults.posting import Client, Posting, percentile
+from tests.faults.rig import Rig
+from tests.servers.postgres import PostgresServer
+
+HAMMER_S = 10.0
+
+pytestmark = [pytest.mark.faults, pytest.mark.timeout(300)]
+
+
+@pytest.mark.parametrize("pair", ["postgres-redis"], indirect=True)
+def test_postgres_crashes_in_mid_commit(rig: Rig, crashing_postgres: PostgresServer) -> None:
+    """Gone at once twice, a backend killed twice, amid commits: 503s, no false 202; jobs wait and go on."""
+    rig.start_worker(slots=2)
+    rig.start_api()
+    long = [rig.add(steps=80, pause_s=0.1) for _ in range(2)]
+    rig.until(lambda: all(rig.generation(job_id) >= 2 for job_id in long), 30.0)
+    postings = [Posting(Client(rig), [2.5] * 60, pause_s=0.1) for _ in range(2)]
+    for posting in postings:
+        posting.start()
+    with rig.tended():
+        for crash in ("server", "backend", "server", "backend"):
+            time.sleep(2.0)
+            if crash == "server":
+                crashing_postgres.crash()
+                time.sleep(3.0)
+                crashing_postgres.start()
+            else:
+                crashing_postgres.kill_a_backend(rig.database.url.replace("+psycopg", ""))
+                crashing_postgres.wait_until_up()
+        for posting in postings:
+            posting.finish()
+    rig.settle()
+    refused_s: list[float] = []
+    for posting in postings:
+        posting.client.assert_honest(may_break=False)
+        refused_s += posting.client.took_s(503)
+    refused_s.sort()
+    attempts = [rig.job(job_id).attempt for job_id in long]
+    print(
+        f"Postgres crashed 4 times: {len(rig.ledger.promises)} jobs accepted, {len(refused_s)} times 503 "
+        f"(p95 {1e3 * percentile(refused_s, 0.95):.0f} ms); attempts of the running jobs {attempts}"
+    )
+    assert refused_s, "nobody asked while it was away"
+
+
+@pytest.mark.parametrize("pair", ["sqlite-embedded"])
+def test_two_processes_hammer_one_file(pair: str, tmp_path: Path, root: Path) -> None:
+    """Writers and readers of two processes on one SQLite file: nobody is ever told that it is locked."""
+    url = f"{pair.partition('-')[0]}:///{tmp_path / 'hammered.sqlite3'}"
+    upgrade(url)
+    command = [sys.executable, "-m", "tests.faults.hammer", url, str(HAMMER_S)]
+    processes = [subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    reports = []
+    for process in processes:
+        output, _ = process.communicate(timeout=HAMMER_S + 60.0)
+        assert process.returncode == 0
+        reports.append(json.loads(output))
+    jobs, writes = sum(each["jobs"] for each in reports), sum(each["writes"] for each in reports)
+    longest_s = max(each["longest_s"] for each in reports)
+    print(
+        f"SQLite hammered by 2 processes, 6 writers and 4 readers for {HAMMER_S:g} s: {jobs} jobs, "
+        f"{writes / HAMMER_S:.0f} transactions a second, longest {longest_s:.2f} s, no error"
+    )
+    assert [each["errors"] for each in reports] == [[], []]
+    assert jobs > 0

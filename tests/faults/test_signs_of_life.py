@@ -1,0 +1,75 @@
+"""What is told of a worker is true: it takes messages, or it does not, whatever its process looks like."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+
+import httpx
+import pytest
+
+from tests.faults.rig import Rig
+
+SEEN_EVERY_S = 0.5
+WITHIN_S = 20.0  # three signs missed are 1.5 s; the rest is for a busy machine
+
+pytestmark = pytest.mark.faults
+
+
+def test_a_worker_that_no_longer_consumes_is_not_ready(rig: Rig) -> None:
+    """Stopped, without living children, cut off from the broker: stalled each time, then ok again."""
+    seen = {"MORPHID_WORKER_SEEN_EVERY_S": str(SEEN_EVERY_S)}
+    rig.start_api(seen)
+    worker = rig.start_worker(environment=seen)
+
+    def told() -> tuple[str, str]:
+        state = httpx.get(f"{rig.url}/readyz").json()
+        return state["status"], state["workers"]["status"]
+
+    def until(*state: str) -> None:
+        rig.until(lambda: told() == state, WITHIN_S)
+
+    def strict() -> int:
+        return httpx.get(f"{rig.url}/readyz", params={"strict": True}).status_code
+
+    until("ready", "ok")
+    assert strict() == 200
+    assert worker.pid is not None
+    for pid in (worker.pid, *rig.pool_children()):
+        os.kill(pid, signal.SIGSTOP)
+        until("degraded", "stalled")
+        assert strict() == 503
+        assert httpx.get(f"{rig.url}/readyz").status_code == 200, "jobs are still taken and kept"
+        os.kill(pid, signal.SIGCONT)
+        until("ready", "ok")
+    rig.take_away("broker")
+    until("degraded", "stalled")
+    rig.bring_back("broker")
+    until("ready", "ok")
+    rig.take_away("worker")
+    until("degraded", "none")
+    rig.bring_back("worker")
+    until("ready", "ok")
+
+
+def test_a_hung_broker_is_not_ok(rig: Rig) -> None:
+    """A broker that is stopped takes connections and answers nothing: neither it nor the worker is ok."""
+    seen = {"MORPHID_WORKER_SEEN_EVERY_S": str(SEEN_EVERY_S)}
+    rig.start_api(seen)
+    rig.start_worker(environment=seen)
+
+    def told() -> tuple[str, str]:
+        state = httpx.get(f"{rig.url}/readyz").json()
+        return state["broker"], state["workers"]["status"]
+
+    def until(condition: Callable[[], bool]) -> None:
+        rig.until(condition, WITHIN_S)
+
+    until(lambda: told() == ("ok", "ok"))
+    broker = rig.supervisor.children["broker"].pid
+    assert broker is not None
+    os.kill(broker, signal.SIGSTOP)
+    until(lambda: told() == ("unreachable", "stalled"))
+    os.kill(broker, signal.SIGCONT)
+    until(lambda: told() == ("ok", "ok"))

@@ -1,0 +1,108 @@
+"""A generation flown in parts: the same costs, the same steps, the same result, to the bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify.generation import GenerationTask
+from morphcore.identify.state import SearchState, decode
+from morphcore.lanes import LANES
+from morphcore.swarm import SwarmSettings
+from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+
+Array = NDArray[np.float64]
+SWARM = SearchSettings(method="pso", seed=5, swarm=SwarmSettings(particles=75, generations=3))
+
+
+def search(settings: SearchSettings = SWARM) -> Identification:
+    """Two links, a second of one flight."""
+    samples = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric"), 40)]
+    return Identification(
+        reference_aircraft(), reference_flight(), samples, ModelSettings(links_per_wing=2), settings
+    )
+
+
+def content(state: SearchState) -> tuple[object, ...]:
+    """A state without its wall time, which no two runs share."""
+    assert state.swarm is not None
+    arrays = (state.best, state.swarm.position, state.swarm.velocity, state.swarm.best_cost)
+    return (
+        *(array.tobytes() for array in arrays),
+        state.phase,
+        state.best_cost,
+        state.generation,
+        state.flights,
+        state.history,
+        str(state.swarm.random),
+    )
+
+
+@pytest.mark.parametrize("particles", [1, 15, 16, 17, 75, 160])
+@pytest.mark.parametrize("most", [1, 2, 7, 100])
+def test_parts_are_whole_blocks_and_make_up_the_task(particles: int, most: int) -> None:
+    """Parts come in order, are whole blocks of lanes but for the end, and are never empty or too many."""
+    points = np.arange(3.0 * particles).reshape(particles, 3)
+    parts = GenerationTask(0, points).parts(most)
+    np.testing.assert_array_equal(np.concatenate(parts), points)
+    assert len(parts) == min(most, -(-particles // LANES))
+    assert all(part.shape[0] % LANES == 0 for part in parts[:-1])
+    assert all(part.shape[0] > 0 for part in parts)
+
+
+def test_a_cost_does_not_depend_on_its_part() -> None:
+    """Flown in parts of any number, each model costs what it costs among all, to the bit."""
+    run = search()
+    first = next(iter(run.steps()))
+    task = run.generation_task(first.checkpoint)
+    assert task is not None
+    whole = run.task_costs(task.points)
+    for most in (2, 3, 5):
+        parts = [run.task_costs(part) for part in task.parts(most)]
+        np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_asked_and_told_is_the_search_itself() -> None:
+    """A swarm whose generations are flown in parts by other processes goes through the same states."""
+    steps = list(search().steps())
+    run, others = search(), [search(), search()]  # each stands for a process with its own plans
+    step = next(iter(run.steps()))
+    for expected in steps[1:]:
+        task = run.generation_task(step.checkpoint)
+        assert task is not None
+        assert task.generation == step.generation
+        costs = [others[i % 2].task_costs(part) for i, part in enumerate(task.parts(4))]
+        step = run.told(step.checkpoint, np.concatenate(costs), wall_s=1.0)
+        assert content(decode(step.checkpoint)) == content(decode(expected.checkpoint))
+        assert (step.fraction, step.best_cost, step.flights, step.message) == (
+            expected.fraction,
+            expected.best_cost,
+            expected.flights,
+            expected.message,
+        )
+    assert run.generation_task(step.checkpoint) is None, "the search is over"
+    assert decode(step.checkpoint).wall_s >= SWARM.swarm.generations
+
+
+def test_only_a_swarm_can_be_asked() -> None:
+    """Other searches have no task, and costs that answer no task are refused."""
+    run = search(SearchSettings(screen=16, starts=2, iterations=2))
+    for step in run.steps():
+        assert run.generation_task(step.checkpoint) is None
+    with pytest.raises(ValueError, match="do not answer"):
+        run.told(step.checkpoint, np.ones(16))
+    swarm = search()
+    first = next(iter(swarm.steps()))
+    with pytest.raises(ValueError, match="do not answer"):
+        swarm.told(first.checkpoint, np.ones(74))
+
+
+def test_the_time_of_the_flights_counts() -> None:
+    """What others took to fly a generation is time of the search: its budget ends it."""
+    settings = SearchSettings(method="pso", seed=5, max_seconds=100.0, swarm=SWARM.swarm)
+    run = search(settings)
+    first = next(iter(run.steps()))
+    assert run.told(first.checkpoint, np.ones(75), wall_s=1.0).fraction < 1.0
+    assert run.told(first.checkpoint, np.ones(75), wall_s=100.0).fraction == 1.0

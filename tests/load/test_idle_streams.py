@@ -1,0 +1,111 @@
+"""A thousand idle event streams on one API process: little memory, little work, nobody notices them."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import resource
+import time
+from urllib.parse import urlsplit
+
+import httpx
+import psutil
+import pytest
+
+from app.jobs.store import claim_job, save_progress
+from tests.faults.rig import OWNER, Rig
+from tests.load.conftest import Tell
+from tests.load.figures import Times
+from tests.load.filling import fill
+
+pytestmark = pytest.mark.slow
+
+STREAMS = 1000
+AT_ONCE = 50  # connections that are being opened
+MOST_RSS = 300e6  # bytes
+IDLE_S = 20.0  # longer than the signs of life are apart
+CALL_P95_MS = 200.0
+NEWS_S = 2.0
+
+Stream = tuple[str, asyncio.StreamReader, asyncio.StreamWriter]
+
+
+async def opened(url: str, job_id: str, gate: asyncio.Semaphore) -> Stream:
+    """Open one stream over a socket of its own and read the past."""
+    at = urlsplit(url)
+    async with gate:
+        reader, writer = await asyncio.open_connection(at.hostname, at.port, limit=2**12)
+        request = (
+            f"GET /jobs/{job_id}/events HTTP/1.1\r\nHost: {at.netloc}\r\nAccept: text/event-stream\r\n\r\n"
+        )
+        writer.write(request.encode())
+        await writer.drain()
+        await asyncio.wait_for(reader.readuntil(b"event: queued"), 30.0)
+    return job_id, reader, writer
+
+
+async def time_of_calls(url: str, ids: list[str]) -> Times:
+    """How long other calls take meanwhile."""
+    chosen = random.Random(2)
+    times = []
+    async with httpx.AsyncClient(base_url=url, timeout=10.0) as client:
+        for _ in range(100):
+            begun = time.perf_counter()
+            (await client.get(f"/jobs/{chosen.choice(ids)}")).raise_for_status()
+            times.append(time.perf_counter() - begun)
+    return Times.of(times)
+
+
+def progress(rig: Rig, job_id: str) -> None:
+    """Play a worker that begins a job and reports."""
+    with rig.database.write() as session:
+        claim = claim_job(session, job_id, "w")
+        assert claim is not None
+        assert save_progress(session, claim, {"fraction": 0.5}, None)
+
+
+async def time_of_news(rig: Rig, streams: list[Stream]) -> Times:
+    """How long it takes from a worker's commit to a stream's event."""
+    times = []
+    for job_id, reader, _ in random.Random(3).sample(streams, 20):
+        await asyncio.to_thread(progress, rig, job_id)
+        begun = time.perf_counter()
+        await asyncio.wait_for(reader.readuntil(b"event: progress"), 10.0)
+        times.append(time.perf_counter() - begun)
+    return Times.of(times)
+
+
+def test_a_thousand_idle_streams(rig: Rig, tell: Tell) -> None:
+    """1,000 streams of 1,000 jobs under 300 MB; other calls and news do not notice them."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = 2 * STREAMS + 500
+    if hard != resource.RLIM_INFINITY and hard < needed:
+        pytest.skip(f"this system allows {hard} open files")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, needed), hard))
+    ids = fill(rig.database, OWNER, STREAMS, steps=10)
+    api = psutil.Process(rig.start_api().pid)
+    before = api.memory_info().rss
+
+    async def measure() -> tuple[float, float, Times, Times]:
+        gate = asyncio.Semaphore(AT_ONCE)
+        streams = await asyncio.gather(*(opened(rig.url, job_id, gate) for job_id in ids))
+        begun, worked = time.monotonic(), sum(api.cpu_times()[:2])
+        await asyncio.sleep(IDLE_S)
+        load = (sum(api.cpu_times()[:2]) - worked) / (time.monotonic() - begun)
+        calls = await time_of_calls(rig.url, ids)
+        news = await time_of_news(rig, list(streams))
+        rss = api.memory_info().rss
+        for _, _, writer in streams:
+            writer.close()
+        return rss, load, calls, news
+
+    rss, load, calls, news = asyncio.run(measure())
+    tell(
+        f"{STREAMS} idle streams: {rss / 1e6:.0f} MB resident ({before / 1e6:.0f} MB without), "
+        f"{100.0 * load:.0f} per cent of a core"
+    )
+    tell(f"GET /jobs/{{id}} beside them: {calls}")
+    tell(f"from a worker's commit to the stream: {news}")
+    assert rss < MOST_RSS
+    assert calls.p95_ms < CALL_P95_MS
+    assert news.p95_ms < 1e3 * NEWS_S

@@ -1,0 +1,49 @@
+"""A spread identification through the whole service: API, broker and a worker process."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from cli.service import Service
+from tests.identification_request import identification
+from tests.live import LiveService
+from tests.worker.spread.processes import spread
+
+SEARCH = {"method": "pso", "particles": 96, "generations": 3, "seed": 5}
+
+
+def ended(client: Service, request: dict[str, Any]) -> dict[str, Any]:
+    """Submit, wait for the end, give the job."""
+    *_, last = client.watch(client.submit("identify", request)["id"], poll_s=0.1)
+    return last
+
+
+def test_distributed_is_single_through_the_service(live_service: LiveService) -> None:
+    """Posted with the mode `distributed` an identification ends with the numbers of the mode `single`."""
+    request = identification("train_rate_0.8", links=2, search=SEARCH)
+    with Service(live_service.url) as client:
+        jobs = [ended(client, asked) for asked in (spread(request, chunks=3), request)]
+        assert [job["status"] for job in jobs] == ["succeeded"] * 2, live_service.logs()
+        together, single = (client.result(job["id"]) for job in jobs)
+    assert together["model"] == single["model"]
+    assert together["fit"] == single["fit"]
+    assert together["search"]["history"] == single["search"]["history"]
+
+
+def test_a_cancelled_spread_job_ends_soon(live_service: LiveService) -> None:
+    """Cancelled through the API while chunks are flown it ends within seconds and leaves its best so far."""
+    search = {**SEARCH, "particles": 960, "generations": 500}
+    request = spread(identification("train_rate_0.8", links=3, search=search))
+    with Service(live_service.url) as client:
+        job_id = client.submit("identify", request)["id"]
+        while not (client.job(job_id)["progress"] or {}).get("generation"):
+            time.sleep(0.1)
+        client.cancel(job_id)
+        asked_at = time.monotonic()
+        *_, job = client.watch(job_id, poll_s=0.05)
+        took_s = time.monotonic() - asked_at
+        assert (job["status"], job["partial"]) == ("cancelled", True)
+        assert client.result(job_id)["search"]["generations"] >= 1
+    print(f"cancelled within {took_s:.2f} s")
+    assert took_s < 10.0  # two seconds on a quiet machine (docs/distributed.md); this one may be busy
