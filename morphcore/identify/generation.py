@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class GenerationTask:
         when one process flies them all. What a block's lanes share (the strips that any of them touches)
         could otherwise differ.
         """
-        blocks = -(-self.points.shape[0] // LANES)
+        blocks = -(-self.points.shape[0] // TOGETHER)
         count = max(1, min(most, blocks))
-        bounds = np.arange(count + 1) * blocks // count * LANES
+        bounds = np.arange(count + 1) * blocks // count * TOGETHER
         return [self.points[low:high] for low, high in itertools.pairwise(bounds)]

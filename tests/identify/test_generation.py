@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.state import SearchState, decode
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from morphcore.swarm import SwarmSettings
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
@@ -47,8 +47,8 @@ def test_parts_are_whole_blocks_and_make_up_the_task(particles: int, most: int) 
     points = np.arange(3.0 * particles).reshape(particles, 3)
     parts = GenerationTask(0, points).parts(most)
     np.testing.assert_array_equal(np.concatenate(parts), points)
-    assert len(parts) == min(most, -(-particles // LANES))
-    assert all(part.shape[0] % LANES == 0 for part in parts[:-1])
+    assert len(parts) == min(most, -(-particles // TOGETHER))
+    assert all(part.shape[0] % TOGETHER == 0 for part in parts[:-1])
     assert all(part.shape[0] > 0 for part in parts)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.geometry.lattice import LatticeSettings, VortexCore
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.models.tree import chain_tree
@@ -154,8 +154,8 @@ def test_a_trim_does_not_depend_on_who_shares_its_slab():
     batch.lift_factor[40] = 1e-12
     plan = instant(model, SWEPT)
     together = trim(model, batch, plan)
-    for low in range(0, 96, LANES):
-        part = slice(low, low + LANES)
+    for low in range(0, 96, TOGETHER):
+        part = slice(low, low + TOGETHER)
         alone = trim(model, batch.select(part), plan)
         for name in ("alpha", "force_B", "moment_B", "q_joint", "converged", "residual"):
             np.testing.assert_array_equal(getattr(alone, name), getattr(together, name)[part])

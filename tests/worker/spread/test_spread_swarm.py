@@ -10,15 +10,15 @@ from sqlalchemy import select
 from app.database import Database
 from app.jobs.reaper import reap
 from app.tables import job_chunks
-from morphcore.lanes import LANES
+from morphcore.lanes import TOGETHER
 from tests.identification_request import identification
 from tests.worker.spread.processes import Workers, spread
 from worker.attempt import Ending
 from worker.numerics import Kernels, warm_up_library
 from worker.runner import Runner
 
-SMALL = {"method": "pso", "particles": 4 * LANES + 3, "generations": 3, "seed": 4}
-LARGER = {"method": "pso", "particles": 40 * LANES, "generations": 4, "seed": 4}
+SMALL = {"method": "pso", "particles": 4 * TOGETHER + 3, "generations": 3, "seed": 4}
+LARGER = {"method": "pso", "particles": 40 * TOGETHER, "generations": 4, "seed": 4}
 CHUNK_LEASE_S = 2.0
 
 
