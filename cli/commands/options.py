@@ -81,6 +81,9 @@ Generations = Annotated[int | None, search_option("--generations", min=1, help="
 MaxSeconds = Annotated[
     float | None, search_option("--max-seconds", min=1.0, help="Stop searching after this long.")
 ]
+WarmStart = Annotated[
+    Path | None, search_option("--warm-start", help="Begin from the model of this earlier result (JSON).")
+]
 
 AtUrl = Annotated[str | None, answer_option("--url", help="Run at this service instead of in this process.")]
 AtUrlKey = Annotated[
