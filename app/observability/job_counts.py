@@ -46,7 +46,7 @@ def note_transition(
     rises: dict[str, int] = {}
     if event == "started":
         rises[written(ATTEMPTS, labels)] = 1
-        if row.attempt == 1:
+        if row.fence == 1:  # a job that was handed back begins its first attempt again
             rises |= _observed(WAIT_TIME, labels, row.started_at - row.created_at)
     if event == "released":
         rises[RELEASED] = 1
