@@ -53,7 +53,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")
 
 AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
 FlightFile = Annotated[Path, flight_option("--flight", help="Flight condition, JSON.")]
-Samples = Annotated[list[Path], flight_option("--sample", help="Sample flight to fit, CSV; repeat.")]
+Samples = Annotated[
+    list[Path], flight_option("--sample", help="Sample flight to fit: CSV, JSON, Parquet, MATLAB; repeat.")
+]
 HeldOut = Annotated[
     list[Path] | None, flight_option("--held-out", help="Sample flight to predict, not to fit; repeat.")
 ]
