@@ -158,7 +158,9 @@ class WebhookNotFound(NotFound):
     title = "There is no such webhook"
 
     def __init__(self, webhook_id: str) -> None:
-        super().__init__(f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours.")
+        super().__init__(
+            f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours."
+        )
 
 
 class Conflict(ServiceError):
