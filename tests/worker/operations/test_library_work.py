@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pytest
 
 from morphcore.errors import InvalidInput, MorphError
-from morphcore.simulate.batch import Interrupted
+from morphcore.stopping import Interrupted
 from worker.operations import Document, Stop, WorkInterrupted, WorkRefused
 from worker.operations.library_work import SearchWork, library_errors
 
