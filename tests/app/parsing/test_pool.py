@@ -115,6 +115,7 @@ def test_faults_come_with_their_place(file_of: FileOf) -> None:
     assert caught.value.pointer == "/file/1/sweep_left"
 
 
+@pytest.mark.slow
 def test_a_million_keys_and_a_deep_nest_are_told(file_of: FileOf) -> None:
     """Bodies that are costly to parse are refused in the words of the parser."""
     many = b"{" + b",".join(b'"%d":1' % number for number in range(1_000_000)) + b"}"
@@ -203,7 +204,7 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
 def test_too_many_wait_in_vain(monkeypatch: pytest.MonkeyPatch, file_of: FileOf) -> None:
     """One at a time; who waits too long is told to come again, and the turn is given back."""
     played(monkeypatch, "import time; time.sleep(60)")
-    parsers = ParserPool(1, Limits(wall_s=2), queue_s=0.2)
+    parsers = ParserPool(1, Limits(wall_s=1), queue_s=0.2)
 
     async def crowd() -> list[Any]:
         calls = [parsers.flight("csv", file_of(FLIGHT), "/file") for _ in range(4)]
