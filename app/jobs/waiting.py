@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import Row, and_, func, select
+from sqlalchemy import and_, func, select
 
 from app.database import Session, database_time
 from app.jobs.chunk_rows import HANDED_OUT, RUNNING
 from app.jobs.records import HELD, Job, JobStatus
+from app.jobs.turns import waiting_owners
 from app.tables import job_chunks, jobs, owners, workers
 
 ALIVE_S = 60.0  # a worker that was not seen for so long is not counted on
@@ -75,7 +76,7 @@ def idle_slots(session: Session) -> int:
 
 
 def _place(session: Session, owner: str, operation: str, mine_ahead: int) -> QueuePlace:
-    lines = _lines(session)
+    lines = _lines(session, owner)
     ahead = mine_ahead + _others_ahead(lines, owner, mine_ahead)
     took_s = _usual_duration(session, operation)
     if took_s is None:
@@ -99,19 +100,21 @@ def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None)
     return int(session.scalar(select(urgent + before)) or 0)
 
 
-def _lines(session: Session) -> dict[str, _Line]:
-    """Every owner's part of the queue."""
-
-    def counted(*statuses: str) -> dict[str, int]:
-        query = select(jobs.c.owner, func.count().label("jobs")).where(jobs.c.status.in_(statuses))
-        rows: list[Row[tuple[str, int]]] = list(session.execute(query.group_by(jobs.c.owner)))
-        return {row.owner: row.jobs for row in rows}
-
-    queued, held = counted(JobStatus.QUEUED.value), counted(*HELD)
+def _lines(session: Session, mine: str) -> dict[str, _Line]:
+    """Every owner's part of the queue; how much of it is one's own was counted already."""
+    waiting = waiting_owners()
+    count = select(func.count()).select_from(jobs)
+    count = count.where(jobs.c.status == JobStatus.QUEUED.value, jobs.c.owner == waiting.c.owner)
+    others = session.execute(
+        select(waiting.c.owner, count.scalar_subquery().label("jobs")).where(waiting.c.owner != mine)
+    )
+    queued = {row.owner: row.jobs for row in others}
+    by_owner = select(jobs.c.owner, func.count().label("jobs")).where(jobs.c.status.in_(HELD))
+    held = {row.owner: row.jobs for row in session.execute(by_owner.group_by(jobs.c.owner))}
     served = {row.owner: row.served_at for row in session.execute(select(owners))}
     return {
         owner: _Line(queued.get(owner, 0), held.get(owner, 0), served.get(owner, 0.0))
-        for owner in queued.keys() | held.keys()
+        for owner in queued.keys() | held.keys() | {mine}
     }
 
 
@@ -122,7 +125,7 @@ def _others_ahead(lines: dict[str, _Line], owner: str, mine_ahead: int) -> int:
     the same number who runs more comes first, since he was not served in the turns before, then who was
     served least recently.
     """
-    mine = lines.get(owner, _Line(0, 0, 0.0))
+    mine = lines[owner]
     turn = mine.running + mine_ahead
     ahead = 0
     for other, line in lines.items():
