@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -24,6 +25,22 @@ LONGEST_WAIT_S = 25.0  # 15 s for SQLite's write lock, 10 s for a row of Postgre
 pytestmark = [pytest.mark.faults, pytest.mark.timeout(300)]
 
 
+class Stream(threading.Thread):
+    """Follows a job on one connection to its end."""
+
+    def __init__(self, rig: Rig, job_id: str) -> None:
+        super().__init__(daemon=True)
+        self._url = f"{rig.url}/jobs/{job_id}/events"
+        self.last = ""
+
+    def run(self) -> None:
+        """Keep the type of the newest event."""
+        with httpx.stream("GET", self._url, timeout=60.0) as answer:
+            for line in answer.iter_lines():
+                if line.startswith("event: "):
+                    self.last = line.removeprefix("event: ")
+
+
 @pytest.mark.parametrize("pair", ["postgres-redis"], indirect=True)
 def test_postgres_crashes_in_mid_commit(rig: Rig, crashing_postgres: PostgresServer) -> None:
     """Gone at once twice, a backend killed twice, amid commits: 503s, no false 202; jobs wait and go on."""
@@ -31,6 +48,8 @@ def test_postgres_crashes_in_mid_commit(rig: Rig, crashing_postgres: PostgresSer
     rig.start_api()
     long = [rig.add(steps=80, pause_s=0.1) for _ in range(2)]
     rig.until(lambda: all(rig.generation(job_id) >= 2 for job_id in long), 30.0)
+    stream = Stream(rig, long[0])
+    stream.start()
     postings = [Posting(Client(rig), [2.5] * 60, pause_s=0.1) for _ in range(2)]
     for posting in postings:
         posting.start()
@@ -47,6 +66,8 @@ def test_postgres_crashes_in_mid_commit(rig: Rig, crashing_postgres: PostgresSer
         for posting in postings:
             posting.finish()
     rig.settle()
+    stream.join(30.0)
+    assert stream.last == "succeeded", "the event stream outlived the crashes on one connection"
     refused_s: list[float] = []
     for posting in postings:
         posting.client.assert_honest(may_break=False)
