@@ -64,7 +64,7 @@ async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: flo
 
     def show() -> Job:
         with service.database.read() as session:
-            return jobs.shown(session, get_job(session, owner, job_id))
+            return jobs.shown(session, service.queue, get_job(session, owner, job_id))
 
     if timeout_s <= 0.0:
         return await asyncio.to_thread(show)
