@@ -158,7 +158,9 @@ class WebhookNotFound(NotFound):
     title = "There is no such webhook"
 
     def __init__(self, webhook_id: str) -> None:
-        super().__init__(f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours.")
+        super().__init__(
+            f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours."
+        )
 
 
 class Conflict(ServiceError):
@@ -300,7 +302,7 @@ class TooManyRefusals(TooManyRequests):
 QUOTA_HINTS = {
     "jobs_in_flight": "Wait until a job has ended, or cancel one.",
     "flights_per_day": "Wait until midnight UTC, or ask for less: fewer particles, generations, samples.",
-    "stored_bytes": "Delete jobs that are not needed any more.",
+    "stored_bytes": "Delete jobs and flights that are not needed any more.",
 }
 
 

@@ -27,6 +27,7 @@ from app.identify.endpoints import router as identify
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
 from app.jobs.upkeep import Upkeep
+from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
 from app.keys.endpoints import router as keys
 from app.keys.keyring import KeyRing
@@ -108,7 +109,9 @@ def _lifespan(settings: Settings) -> Any:
         afterwards = Afterwards(database)
         keys = KeyRing(database, afterwards)
         parsers = ParserPool(settings.parsers, Limits(settings.parser_memory_bytes))
-        app.state.service = Service(settings, database, publisher, watcher, keys, afterwards, parsers)
+        app.state.service = Service(
+            settings, database, publisher, watcher, QueueView(), keys, afterwards, parsers
+        )
         app.state.health = Health(database, settings)
         afterwards.start()
         publisher.start()

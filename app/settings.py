@@ -116,7 +116,7 @@ class Settings(BaseSettings):
 
     webhook_allow_private: bool = Field(
         default=False,
-        description="For development on one machine: webhooks may go to private addresses, by http to loopback.",
+        description="For development: webhooks may go to private addresses, and by http to loopback.",
     )
 
     log_format: Literal["text", "json"] = Field(
@@ -146,8 +146,8 @@ class Settings(BaseSettings):
         self._refuse_default_password()
         if self.webhook_allow_private and not is_loopback(self.host):
             raise UnsafeSettings(
-                f"host {self.host} is reachable from other machines and MORPHID_WEBHOOK_ALLOW_PRIVATE would let "
-                "them send into this network. Leave it out: it is for development on one machine."
+                f"host {self.host} is reachable from other machines and MORPHID_WEBHOOK_ALLOW_PRIVATE would "
+                "let them send into this network. Leave it out: it is for development on one machine."
             )
         broker_host = urlsplit(self.broker_url).hostname or ""
         if self.uses_sqlite and broker_host and not is_loopback(broker_host):

@@ -139,13 +139,13 @@ class Attempt(Patient):
                 self._note(step)
                 if self._hand_out():
                     return Ending.HANDED_OUT
+            if self._checkpoint is None:
+                raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
+            self._save_unsaved()
+            outcome = work.outcome(self._checkpoint)
         except WorkInterrupted:
             self._vigil.heed()
             return self._stopped()
-        if self._checkpoint is None:
-            raise RuntimeError(f"operation {self._claim.operation!r} ended without a step")
-        self._save_unsaved()
-        outcome = work.outcome(self._checkpoint)
         self._vigil.heed()
         return self._finish(JobStatus.SUCCEEDED, outcome=outcome)
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from app.database import Database, Session
-from app.documents import Document
 from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.chunks import ChunkClaim, claim_chunk, must_be_taken_over, take_over
 from app.jobs.records import Claim
@@ -18,7 +17,7 @@ from worker.attempt import Attempt, Ending
 from worker.chunk import ChunkFlight
 from worker.lease import Vigil
 from worker.numerics import Kernels
-from worker.operations import Begin, find_operation
+from worker.operations import Begin, Document, find_operation
 from worker.telling import told
 from worker.works import Works
 

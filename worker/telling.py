@@ -17,7 +17,7 @@ def told(claim: Claim | ChunkClaim) -> Iterator[None]:
     """Let every line within the block carry the job, and trace the attempt as part of the request's trace."""
     with bound(job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker):
         chunk = isinstance(claim, ChunkClaim)
-        if not isinstance(claim, ChunkClaim) and claim.attempt == 1 and claim.waited_s > 0.0:
+        if not isinstance(claim, ChunkClaim) and claim.fence == 1:  # a job handed back begins attempt 1 again
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
             f"chunk {claim.operation}" if chunk else f"attempt {claim.operation}",

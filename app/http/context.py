@@ -13,6 +13,7 @@ from app.afterwards import Afterwards
 from app.database import Database
 from app.errors import MissingScope, Unauthorized
 from app.jobs.queue import Publisher
+from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
 from app.keys.keyring import KeyRing
 from app.keys.records import Quota, Scope
@@ -36,6 +37,7 @@ class Service:
     database: Database
     publisher: Publisher
     watcher: JobWatcher
+    queue: QueueView
     keys: KeyRing
     afterwards: Afterwards
     parsers: ParserPool

@@ -141,7 +141,8 @@ class GuardedProtocol(H11Protocol):
         Closed at once, a connection that waits would lose the request that its client is just sending.
         """
         self._ending = True
-        if self.cycle is None or self.cycle.response_complete:
+        # None before the first request, whatever its annotation says
+        if self.cycle is None or self.cycle.response_complete:  # type: ignore[redundant-expr]
             self._drain_timer = self.loop.call_later(DRAIN_S, super().shutdown)
         else:
             super().shutdown()

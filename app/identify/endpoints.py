@@ -22,5 +22,5 @@ async def identify(body: IdentifyRequest, submission: SubmissionDep) -> Job:
 
 @router.validation("Check a request for identification")
 def validate_identify(body: IdentifyRequest, app: ServiceDep, caller: CallerDep) -> IdentifyValidation:
-    """Make the checks of `POST /identify` and start nothing; tell what it would cost and how long it would wait."""
+    """Make the checks of `POST /identify` and start nothing; tell the cost and how long it would wait."""
     return validated(app, caller, service.prepare, body, IdentifyValidation)

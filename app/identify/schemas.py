@@ -14,7 +14,7 @@ from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, Start, StepS
 from app.schemas.parameters import MAX_LINKS
 from app.schemas.samples import EXAMPLE_SAMPLE, Sample
-from app.schemas.search import WEEK_S, SwarmSearch
+from app.schemas.search import WEEK_S, SwarmSearch, WarmStart
 
 MAX_SAMPLES = 64
 
@@ -79,6 +79,16 @@ class Search(SwarmSearch):
     )
 
 
+class IdentifySearch(Search):
+    """How the parameters are sought, and from where."""
+
+    warm_start: WarmStart | None = Field(
+        default=None,
+        description="Begin from this model instead of the physical guess, which stays among the candidates. "
+        "The search then looks at fewer of them, unless `particles` says how many.",
+    )
+
+
 EXAMPLE_REQUEST: dict[str, Any] = {
     "aircraft": EXAMPLE_AIRCRAFT,
     "flight": EXAMPLE_FLIGHT,
@@ -105,6 +115,7 @@ class IdentifyRequest(SamplesRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_REQUEST]})
 
     model: EquivalentModel = EquivalentModel()
+    search: IdentifySearch = IdentifySearch()
     execution: SpreadExecution = SpreadExecution()
 
 

@@ -8,6 +8,7 @@ from app.errors import Fault, InvalidRequest
 from app.identify.checks import samples_request_faults, total_rows_faults
 from app.identify.cost import estimate
 from app.identify.schemas import CostEstimate, IdentifyRequest, SamplesRequest
+from app.identify.warm_start import warm_start_document
 from app.jobs.submission import Order, deadline_s
 from app.schemas.samples import InlineSample, UploadedSample
 from app.schemas.vehicle import vehicle_document
@@ -78,10 +79,12 @@ def prepare(session: Session, owner: str, request: IdentifyRequest) -> Order[Cos
         Naming every fault.
     """
     samples = checked_samples(session, owner, request)
+    warm_start = warm_start_document(session, owner, request)
+    document = samples_document(request, samples)
     links = request.model.links_per_wing
     return Order(
         operation="identify",
-        document=samples_document(request, samples),
+        document={**document, "search": {**document["search"], **warm_start}},
         summary={**samples_summary(request, samples), "links_per_wing": links},
         cost=estimate(request, links, samples),
         max_seconds=deadline_s(request.search.max_seconds, REPORT_TIME_S),
@@ -94,7 +97,7 @@ def samples_document(request: SamplesRequest, samples: list[InlineSample]) -> Do
         **vehicle_document(request.aircraft, request.flight),
         "samples": [sample.model_dump() for sample in samples],
         "model": request.model.model_dump(exclude_none=True),
-        "search": request.search.model_dump(exclude_none=True),
+        "search": request.search.model_dump(exclude_none=True, exclude={"warm_start"}),
     }
 
 

@@ -13,6 +13,8 @@ from app.documents import Document
 from app.jobs.chunk_rows import HANDED_OUT, OPEN, RUNNING, must_go_on
 from app.jobs.records import HELD, JobStatus
 from app.jobs.rows import transition
+from app.observability.counters import count
+from app.observability.job_counts import CHUNK_LEASES_LOST
 from app.tables import job_chunks, jobs
 
 ROUND_LIMIT = 500  # rows per round
@@ -40,6 +42,7 @@ def reap_chunks(session: Session, clock: ColumnElement[float], republish_after_s
     failed = tuple(dict.fromkeys(row.job_id for row in lost if _given_up(row) and _fail(session, row)))
     cancelled = tuple(row.id for row in _never_wound_down(session, clock) if _cancel(session, row))
     again = Counter(row.job_id for row in lost if row.job_id not in failed and _reopen(session, row))
+    count(session, CHUNK_LEASES_LOST, by=again.total())
     unheard = _unheard(session, clock, republish_after_s)
     again |= Counter(unheard)
     publish = tuple(again.elements())

@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database_errors import trouble_of
 from app.documents import json_bytes
 from app.errors import JobNotFound
 from app.http.context import Service
@@ -32,6 +35,11 @@ async def stream_events(service: Service, owner: str, job_id: str, after: int) -
                 return jobs.event_page(session, owner, job_id, after)
         except JobNotFound:
             return None
+        except SQLAlchemyError as error:
+            if trouble_of(error) is None:
+                raise
+            # a browser that is answered 503 never comes back; one whose stream is silent stays
+            return JobEventPage(events=[], last_seq=after, finished=False)
 
     yield RETRY
     with service.watcher.watch(job_id) as subscription:
@@ -56,7 +64,7 @@ async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: flo
 
     def show() -> Job:
         with service.database.read() as session:
-            return jobs.shown(session, get_job(session, owner, job_id))
+            return jobs.shown(session, service.queue, get_job(session, owner, job_id))
 
     if timeout_s <= 0.0:
         return await asyncio.to_thread(show)

@@ -8,14 +8,14 @@ from app.jobs import repository, store
 from app.jobs.records import Job as StoredJob
 from app.jobs.repository import JobFilter
 from app.jobs.schemas import Job, JobEvent, JobEventPage, JobPage
-from app.jobs.waiting import queue_place
+from app.jobs.waiting import QueueView
 
 EVENT_PAGE = 500
 
 
-def shown(session: Session, job: StoredJob) -> Job:
+def shown(session: Session, queue: QueueView, job: StoredJob) -> Job:
     """Show a job, while it is queued with its place in the queue."""
-    return Job.of(job, queue_place(session, job))
+    return Job.of(job, queue.place(session, job))
 
 
 def page(session: Session, owner: str, wanted: JobFilter, *, cursor: str | None, limit: int) -> JobPage:

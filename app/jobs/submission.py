@@ -27,7 +27,6 @@ from app.jobs.creation import Origin, Terms
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob
 from app.jobs.schemas import Job, Operation, QueuePlace, Validation
-from app.jobs.waiting import place_of_next
 from app.keys import quota
 from app.keys.records import Scope
 from app.keys.schemas import Quotas
@@ -216,7 +215,7 @@ def validated(
     """
     with app.database.read() as session:
         order = prepare(session, caller.owner, request)
-        place = place_of_next(session, caller.owner, order.operation, request.execution.priority)
+        place = app.queue.place_of_next(session, caller.owner, order.operation, request.execution.priority)
         used = None if caller.key_id is None else quota.usage(session, caller.key_id)
     return verdict(
         cost=order.cost,

@@ -57,6 +57,11 @@ class Upkeep:
         """Begin."""
         self._thread.start()
 
+    @property
+    def alive(self) -> bool:
+        """Whether rounds are still made."""
+        return self._thread.is_alive()
+
     def stop(self) -> None:
         """End, after the round that is being made."""
         self._stopping.set()

@@ -5,9 +5,12 @@ Counts go over indexes alone: with 10,000 queued jobs they take some millisecond
 
 from __future__ import annotations
 
+import statistics
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from sqlalchemy import Row, and_, func, select
+from sqlalchemy import and_, func, select
 
 from app.database import Session, database_time
 from app.jobs.chunk_rows import HANDED_OUT, RUNNING
@@ -15,6 +18,7 @@ from app.jobs.records import HELD, Job, JobStatus
 from app.tables import job_chunks, jobs, owners, workers
 
 ALIVE_S = 60.0  # a worker that was not seen for so long is not counted on
+FRESH_S = 1.0  # the queue is counted again after this; a job's place among its owner's jobs always is
 RECENT = 50  # finished jobs that tell how long jobs take
 
 
@@ -35,25 +39,86 @@ class QueuePlace:
 
 
 @dataclass(frozen=True, slots=True)
-class _Line:
+class Line:
     """One owner's part of the queue."""
 
-    queued: int
-    running: int
-    served_at: float
+    queued: int = 0
+    running: int = 0
+    served_at: float = 0.0
 
 
-def queue_place(session: Session, job: Job) -> QueuePlace | None:
-    """Find the place of a job; None for one that does not wait."""
-    if job.status is not JobStatus.QUEUED:
-        return None
-    ahead = _mine_ahead(session, job.owner, job.priority, job.id)
-    return _place(session, job.owner, job.operation, ahead)
+@dataclass(frozen=True, slots=True)
+class Census:
+    """The queue of a moment.
+
+    Attributes
+    ----------
+    lines : mapping
+        Of each owner with jobs that wait or run.
+    took_s : mapping
+        Mean time that recent jobs of each operation took, s; None stands for all of them.
+    slots : int
+        Jobs that the live workers can run at once; 1 when none told.
+    """
+
+    lines: Mapping[str, Line]
+    took_s: Mapping[str | None, float]
+    slots: int
 
 
-def place_of_next(session: Session, owner: str, operation: str, priority: int) -> QueuePlace:
-    """Find the place that a job would have which this owner posted now."""
-    return _place(session, owner, operation, _mine_ahead(session, owner, priority, None))
+class QueueView:
+    """The queue as one process sees it: counted once a second, however many ask.
+
+    Parameters
+    ----------
+    clock
+        Seconds that only rise.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._counted: tuple[float, Census] | None = None
+
+    def census(self, session: Session) -> Census:
+        """The queue as it is, or was less than `FRESH_S` ago."""
+        counted = self._counted
+        if counted is None or self._clock() - counted[0] >= FRESH_S:
+            counted = self._counted = (self._clock(), count_queue(session))
+        return counted[1]
+
+    def place(self, session: Session, job: Job) -> QueuePlace | None:
+        """Find the place of a job; None for one that does not wait."""
+        if job.status is not JobStatus.QUEUED:
+            return None
+        return queue_place(session, job, self.census(session))
+
+    def place_of_next(self, session: Session, owner: str, operation: str, priority: int) -> QueuePlace:
+        """Find the place that a job would have which this owner posted now."""
+        ahead = _mine_ahead(session, owner, priority, None)
+        return _place(self.census(session), owner, operation, ahead)
+
+
+def queue_place(session: Session, job: Job, census: Census) -> QueuePlace:
+    """Find the place of a queued job."""
+    return _place(census, job.owner, job.operation, _mine_ahead(session, job.owner, job.priority, job.id))
+
+
+def count_queue(session: Session) -> Census:
+    """Count what waits and runs."""
+    queued = _by_owner(session, JobStatus.QUEUED.value)
+    held = _by_owner(session, *HELD)
+    served = {row.owner: row.served_at for row in session.execute(select(owners))}
+    lines = {
+        owner: Line(queued.get(owner, 0), held.get(owner, 0), served_at)
+        for owner, served_at in served.items()
+    }
+    return Census(lines, _usual_durations(session), max(live_slots(session), 1))
+
+
+def _by_owner(session: Session, *statuses: str) -> dict[str, int]:
+    """Jobs of each owner in some states."""
+    query = select(jobs.c.owner, func.count().label("jobs")).where(jobs.c.status.in_(statuses))
+    return {row.owner: row.jobs for row in session.execute(query.group_by(jobs.c.owner))}
 
 
 def live_slots(session: Session) -> int:
@@ -74,15 +139,13 @@ def idle_slots(session: Session) -> int:
     return max(live_slots(session) - running(session), 0)
 
 
-def _place(session: Session, owner: str, operation: str, mine_ahead: int) -> QueuePlace:
-    lines = _lines(session)
-    ahead = mine_ahead + _others_ahead(lines, owner, mine_ahead)
-    took_s = _usual_duration(session, operation)
+def _place(census: Census, owner: str, operation: str, mine_ahead: int) -> QueuePlace:
+    ahead = mine_ahead + _others_ahead(census.lines, owner, mine_ahead)
+    took_s = census.took_s.get(operation, census.took_s.get(None))
     if took_s is None:
         return QueuePlace(ahead + 1, None)
-    slots = max(live_slots(session), 1)
-    ends_needed = ahead + 1 + sum(line.running for line in lines.values()) - slots
-    return QueuePlace(ahead + 1, max(ends_needed, 0) * took_s / slots)
+    ends_needed = ahead + 1 + sum(line.running for line in census.lines.values()) - census.slots
+    return QueuePlace(ahead + 1, max(ends_needed, 0) * took_s / census.slots)
 
 
 def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None) -> int:
@@ -99,30 +162,14 @@ def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None)
     return int(session.scalar(select(urgent + before)) or 0)
 
 
-def _lines(session: Session) -> dict[str, _Line]:
-    """Every owner's part of the queue."""
-
-    def counted(*statuses: str) -> dict[str, int]:
-        query = select(jobs.c.owner, func.count().label("jobs")).where(jobs.c.status.in_(statuses))
-        rows: list[Row[tuple[str, int]]] = list(session.execute(query.group_by(jobs.c.owner)))
-        return {row.owner: row.jobs for row in rows}
-
-    queued, held = counted(JobStatus.QUEUED.value), counted(*HELD)
-    served = {row.owner: row.served_at for row in session.execute(select(owners))}
-    return {
-        owner: _Line(queued.get(owner, 0), held.get(owner, 0), served.get(owner, 0.0))
-        for owner in queued.keys() | held.keys()
-    }
-
-
-def _others_ahead(lines: dict[str, _Line], owner: str, mine_ahead: int) -> int:
+def _others_ahead(lines: Mapping[str, Line], owner: str, mine_ahead: int) -> int:
     """Count the other owners' jobs that have their turn before the owner's job number `mine_ahead`.
 
     An owner's job number k (from 0) has its turn when running + k jobs of that owner have begun. In turns of
     the same number who runs more comes first, since he was not served in the turns before, then who was
     served least recently.
     """
-    mine = lines.get(owner, _Line(0, 0, 0.0))
+    mine = lines.get(owner, Line())
     turn = mine.running + mine_ahead
     ahead = 0
     for other, line in lines.items():
@@ -132,14 +179,16 @@ def _others_ahead(lines: dict[str, _Line], owner: str, mine_ahead: int) -> int:
     return ahead
 
 
-def _usual_duration(session: Session, operation: str) -> float | None:
-    """Mean time that recent jobs of the operation took, s; of all operations while there are none of it."""
-    recent = (
+def _usual_durations(session: Session) -> dict[str | None, float]:
+    """Mean times that recent jobs took, s: of each operation, and of all."""
+    recent = session.execute(
         select(jobs.c.operation, (jobs.c.finished_at - jobs.c.started_at).label("took_s"))
         .where(jobs.c.status == JobStatus.SUCCEEDED.value, jobs.c.finished_at.is_not(None))
         .order_by(jobs.c.finished_at.desc())
         .limit(RECENT)
     )
-    rows = session.execute(recent).all()
-    times = [row.took_s for row in rows if row.operation == operation] or [row.took_s for row in rows]
-    return sum(times) / len(times) if times else None
+    times: dict[str | None, list[float]] = {}
+    for row in recent:
+        for name in (row.operation, None):
+            times.setdefault(name, []).append(row.took_s)
+    return {name: statistics.fmean(values) for name, values in times.items()}

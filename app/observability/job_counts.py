@@ -19,6 +19,7 @@ FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
 BUCKETS_S = (0.5, 1.0, 2.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0, 14400.0)  # of seconds a job waits or takes
 
 ATTEMPTS = "job_attempts"
+CHUNK_LEASES_LOST = "chunk_leases_lost"  # the reaper of chunks counts these itself
 FINISHED = "jobs_finished"
 FLIGHTS = "flights"
 LEASES_LOST = "leases_lost"
@@ -46,7 +47,7 @@ def note_transition(
     rises: dict[str, int] = {}
     if event == "started":
         rises[written(ATTEMPTS, labels)] = 1
-        if row.attempt == 1:
+        if row.fence == 1:  # a job that was handed back begins its first attempt again
             rises |= _observed(WAIT_TIME, labels, row.started_at - row.created_at)
     if event == "released":
         rises[RELEASED] = 1

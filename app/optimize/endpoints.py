@@ -23,5 +23,5 @@ async def optimize(body: OptimizeRequest, submission: SubmissionDep) -> Job:
 
 @router.validation("Check a request for an optimisation")
 def validate_optimize(body: OptimizeRequest, app: ServiceDep, caller: CallerDep) -> OptimizeValidation:
-    """Make the checks of `POST /optimize` and start nothing; tell what it would cost and how long it would wait."""
+    """Make the checks of `POST /optimize` and start nothing; tell the cost and how long it would wait."""
     return validated(app, caller, service.prepare, body, OptimizeValidation)

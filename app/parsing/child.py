@@ -19,7 +19,7 @@ from samplefiles.fault import FileFault
 from samplefiles.reading import read_columns
 
 BODY = "body"  # the JSON body of a request; any other kind is a file's, from `samplefiles.reading`
-LOADED_BEFORE = {"parquet": ("pyarrow.parquet",), "matlab": ("scipy.io", "scipy.io.matlab")}
+LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("scipy.io", "scipy.io.matlab")}
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:

@@ -162,11 +162,11 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
             process.wait(max(0.1, started + limits.wall_s - time.monotonic()))
             found: dict[str, Any] = unpack(frame)
         except (BadFrame, TimeoutError, subprocess.TimeoutExpired) as error:
-            _end(process)
+            exit_code = process.poll()  # None: it lives, and is ended below
             logger.warning(
-                "a parser of %s gave no answer: %s, exit %s", kind, type(error).__name__, process.returncode
+                "a parser of %s gave no answer: %s, exit %s", kind, type(error).__name__, exit_code
             )
-            raise _Unanswered(_reason(error, process.returncode)) from None
+            raise _Unanswered(_reason(error, exit_code)) from None
         finally:
             _end(process)
     if "failed" in found:

@@ -78,18 +78,20 @@ def _form(value: Any) -> str:
     return "whole" if whole else "model"
 
 
+GivenParameters = Annotated[
+    Annotated[Parameters, Tag("model")] | Annotated[WholeResult, Tag("whole")], Discriminator(_form)
+]
+
+
 class KnownModel(Strict):
     """An equivalent model by its parameters, or by the id of an identified one.
 
     Lattice, step and start are those it was identified with where they are left out.
     """
 
-    parameters: (
-        Annotated[
-            Annotated[Parameters, Tag("model")] | Annotated[WholeResult, Tag("whole")], Discriminator(_form)
-        ]
-        | None
-    ) = Field(default=None, description="The `model` of an identification's result, or the whole result.")
+    parameters: GivenParameters | None = Field(
+        default=None, description="The `model` of an identification's result, or the whole result."
+    )
     model_id: Identifier | None = Field(
         default=None,
         description="Instead of `parameters`: an identified model, see GET /models.",

@@ -6,10 +6,27 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.schemas.fields import Strict
+from app.schemas.fields import Identifier, Strict
+from app.schemas.parameters import GivenParameters
 
 MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
 WEEK_S = 7 * 86_400.0
+
+
+class WarmStart(Strict):
+    """The model that a search begins from: of an earlier job, an identified one, or its parameters."""
+
+    job_id: Identifier | None = Field(
+        default=None,
+        description="An identification or a study of yours; the best so far of one that did not end will do.",
+        examples=["job_01k0c3v9fh8x2m4n6p8q0r2s4t"],
+    )
+    model_id: Identifier | None = Field(
+        default=None,
+        description="An identified model of yours.",
+        examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
+    )
+    parameters: GivenParameters | None = None
 
 
 class SwarmSearch(Strict):

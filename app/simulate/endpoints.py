@@ -23,5 +23,5 @@ async def simulate(body: SimulateRequest, submission: SubmissionDep) -> Job:
 
 @router.validation("Check a request for a simulation")
 def validate_simulate(body: SimulateRequest, app: ServiceDep, caller: CallerDep) -> SimulateValidation:
-    """Make the checks of `POST /simulate` and start nothing; tell what it would cost and how long it would wait."""
+    """Make the checks of `POST /simulate` and start nothing; tell the cost and how long it would wait."""
     return validated(app, caller, service.prepare, body, SimulateValidation)

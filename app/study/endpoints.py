@@ -23,5 +23,5 @@ async def study(body: StudyRequest, submission: SubmissionDep) -> Job:
 
 @router.validation("Check a request for a study")
 def validate_study(body: StudyRequest, app: ServiceDep, caller: CallerDep) -> StudyValidation:
-    """Make the checks of `POST /study` and start nothing; tell what it would cost and how long it would wait."""
+    """Make the checks of `POST /study` and start nothing; tell the cost and how long it would wait."""
     return validated(app, caller, service.prepare, body, StudyValidation)

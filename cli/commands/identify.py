@@ -26,6 +26,7 @@ def identify(
     particles: options.Particles = None,
     generations: options.Generations = None,
     max_seconds: options.MaxSeconds = None,
+    warm_start: options.WarmStart = None,
     url: options.AtUrl = None,
     api_key: options.AtUrlKey = None,
     json_out: options.JsonFile = None,
@@ -47,6 +48,8 @@ def identify(
         generations=generations,
         max_seconds=max_seconds,
     )
+    if warm_start is not None:
+        request.put_file("/search/warm_start/parameters", warm_start, "--warm-start")
     hand_over(run(request, url, api_key), show_model, json_out=json_out, plots=plots)
 
 

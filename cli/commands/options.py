@@ -53,7 +53,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")
 
 AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
 FlightFile = Annotated[Path, flight_option("--flight", help="Flight condition, JSON.")]
-Samples = Annotated[list[Path], flight_option("--sample", help="Sample flight to fit, CSV; repeat.")]
+Samples = Annotated[
+    list[Path], flight_option("--sample", help="Sample flight to fit: CSV, JSON, Parquet, MATLAB; repeat.")
+]
 HeldOut = Annotated[
     list[Path] | None, flight_option("--held-out", help="Sample flight to predict, not to fit; repeat.")
 ]
@@ -80,6 +82,9 @@ Particles = Annotated[int | None, search_option("--particles", min=2, help="Swar
 Generations = Annotated[int | None, search_option("--generations", min=1, help="Swarm generations.")]
 MaxSeconds = Annotated[
     float | None, search_option("--max-seconds", min=1.0, help="Stop searching after this long.")
+]
+WarmStart = Annotated[
+    Path | None, search_option("--warm-start", help="Begin from the model of this earlier result (JSON).")
 ]
 
 AtUrl = Annotated[str | None, answer_option("--url", help="Run at this service instead of in this process.")]

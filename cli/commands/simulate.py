@@ -43,7 +43,7 @@ def simulate(
     parameters: options.Parameters = None,
     model_id: options.ModelId = None,
     schedule: Annotated[
-        Path | None, schedule_option(help="Sweep over time: CSV with t, sweep_left, sweep_right.")
+        Path | None, schedule_option(help="Sweep over time: a file with t, sweep_left, sweep_right.")
     ] = None,
     rate: Annotated[
         float | None,

@@ -20,6 +20,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from morphcore.stopping import heed
+
 Array = NDArray[np.float64]
 Document = dict[str, Any]
 
@@ -187,7 +189,13 @@ def printable(text: str) -> str:
 def rendered(
     stem: str, figure: Figure, kinds: Sequence[Literal["svg", "png"]] = ("svg", "png")
 ) -> dict[str, bytes]:
-    """File name -> content for each kind; the same figure gives the same bytes."""
+    """File name -> content for each kind; the same figure gives the same bytes.
+
+    Raises
+    ------
+    Interrupted : the surrounding `stoppable` block is asked to stop; a picture takes a good second to draw.
+    """
+    heed()
     files: dict[str, bytes] = {}
     with _drawing:
         if "svg" in kinds:

@@ -12,9 +12,9 @@ from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
-from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
 from morphcore.steps import Step
+from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 
 __all__ = [

@@ -15,11 +15,12 @@ from morphcore.errors import InvalidInput
 from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
-from morphcore.simulate.batch import Stop, fly_batch
+from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
+from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,9 @@ from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
-from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
+from morphcore.stopping import Stop
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
 

@@ -97,7 +97,7 @@ class SearchSpace:
         """
         if batch.links != self.links:
             raise InvalidInput(
-                f"the search would begin from a model with {batch.links} links per wing and seeks {self.links}",
+                f"the search seeks {self.links} links per wing, the model to begin from has {batch.links}",
                 pointer=WARM_START,
                 hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
             )
@@ -121,7 +121,7 @@ class SearchSpace:
                     for name in self.free_aero
                 ),
             ]
-        return np.clip(np.concatenate(parts), self.lower, self.upper)
+        return np.asarray(np.clip(np.concatenate(parts), self.lower, self.upper))
 
     @property
     def _chord(self) -> float:

@@ -99,7 +99,9 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
     )
     warm_start = None
     if fields.has("warm_start"):
-        warm_start = parameters_from_document(fields.raw("warm_start"), f"{pointer}/warm_start")
+        known = fields.child("warm_start")
+        warm_start = parameters_from_document(known.raw("parameters"), f"{known.pointer}/parameters")
+        known.done()
     warm = warm_start is not None
     settings = SearchSettings(
         method="pso" if paper else method,  # type: ignore[arg-type]

@@ -24,9 +24,9 @@ from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
 from morphcore.identify.study_timing import ROUNDS, FlightTiming, flight_timing, medians
 from morphcore.models.equivalent import MOST_LINKS, physical_guess
-from morphcore.simulate.batch import Stop
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
+from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread
 
 LINKS = (1, 2, 3, 4, 5, 6)

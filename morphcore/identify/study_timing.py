@@ -15,10 +15,10 @@ import numpy as np
 
 from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.simulate.batch import Interrupted, Stop
 from morphcore.simulate.schedule import Tabulated
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
+from morphcore.stopping import Stop, heed
 
 Clock = Callable[[], float]
 
@@ -70,8 +70,7 @@ class FlightTiming:
         return tuple(self._fly(model, batch, stop) for model, batch in self.models)
 
     def _fly(self, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
-        if stop is not None and stop():
-            raise Interrupted
+        heed(stop)
         begin = self.clock()
         for case, found in shared_trims(model, batch, (self.case,), self.start):
             fly_attitudes(model, batch, case, found)

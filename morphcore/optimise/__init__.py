@@ -25,10 +25,10 @@ from morphcore.optimise.settings import (
     schedule_search,
     weights_settings,
 )
-from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.request import flown_model
 from morphcore.steps import Step
+from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 
 __all__ = [

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.optimise.settings import Weights
-from morphcore.simulate.batch import Interrupted, Stop, fly_batch
+from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import CommonPath, time_grid
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
+from morphcore.stopping import Interrupted, Stop
 from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]

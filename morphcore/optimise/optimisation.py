@@ -36,12 +36,12 @@ from morphcore.optimise.result import ScheduleResult, schedule_result
 from morphcore.optimise.search import SearchRun
 from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
 from morphcore.optimise.state import OptimisationState, Verified, decode, encode
-from morphcore.simulate.batch import Stop
 from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import STEP_S, CommonPath, common_path
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
 from morphcore.steps import Step
+from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.optimise.settings import ScheduleSearch, Weights
 from morphcore.optimise.torque_limit import TorqueLimit, Trials
-from morphcore.simulate.batch import Stop
+from morphcore.stopping import Stop
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
 
 Array = NDArray[np.float64]

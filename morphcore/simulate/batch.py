@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,18 +15,14 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, t
 from morphcore.models.kernels.layout import JOINTS
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
+from morphcore.stopping import Stop, heed
 from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]
-Stop = Callable[[], bool]
 
 CHUNK_BLOCK_STEPS = 6_000  # block steps per chunk and thread: about a fifth of a second
 LONGEST_CHUNK = 64  # steps: bounds the memory of the interpolated operators
 BLOCKS_PER_GROUP = 8  # their states stay in the second-level cache while the operator of a step is shared
-
-
-class Interrupted(Exception):
-    """The caller's ``stop`` said so between two chunks."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +110,7 @@ def fly_batch(
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
     length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
     for first in range(0, plan.grid.steps, length):
-        if stop is not None and stop():
-            raise Interrupted
+        heed(stop)
         last = min(first + length, plan.grid.steps)
         operators, strips = plan.table.between(first, last + 1)
         hinges, wind_N = plan.hinges[first : last + 1], plan.wind_N[first : last + 1]

@@ -12,11 +12,12 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constan
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
 from morphcore.models.kinematics import tip_positions
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
-from morphcore.simulate.batch import Stop, fly_batch
+from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
 from morphcore.simulate.record import FlightRecord, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
+from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
-from morphcore.simulate.batch import Interrupted, Stop
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, fly_flexible, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.record import FlightRecord, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim
+from morphcore.stopping import Stop, heed
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -54,8 +54,7 @@ def flexible_flight(
     rows: list[Array] = []
     for first in range(0, grid.steps + 1, CHUNK_STEPS):
         yield first / grid.steps, None
-        if stop is not None and stop():
-            raise Interrupted
+        heed(stop)
         with one_blas_thread():
             rows += [_row(model, state) for state in islice(states, CHUNK_STEPS)]
     history = np.stack(rows)

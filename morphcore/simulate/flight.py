@@ -17,7 +17,6 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
-from morphcore.simulate.batch import Stop
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
@@ -26,6 +25,7 @@ from morphcore.simulate.record import FlightRecord, recorded_trajectory
 from morphcore.simulate.schedule import Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
+from morphcore.stopping import Stop
 from samplefiles.csv_table import write_table
 
 Array = NDArray[np.float64]

@@ -22,7 +22,6 @@ from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
-from morphcore.simulate.batch import Stop
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
 from morphcore.simulate.plan import STEP_S
@@ -30,6 +29,7 @@ from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
+from morphcore.stopping import Stop
 from morphcore.threads import use_threads
 from samplefiles.columns import MOST_ROWS
 

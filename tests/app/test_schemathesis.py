@@ -30,6 +30,7 @@ from schemathesis.specs.openapi.checks import (
 
 from app.schemas.fields import Identifier
 from app.settings import Settings
+from tests.app.request_documents import RESULT
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.app.tenants import Tenant, client_json, new_tenant, replenish, short_requests
 
@@ -337,6 +338,9 @@ def foreign_bodies(theirs: Tenant) -> list[tuple[str, Any]]:
     model = theirs.ids["model_id"][0]
     found.append(("simulate", {**requests["simulate"], "model": {"kind": "equivalent", "model_id": model}}))
     found.append(("optimize", {**requests["optimize"], "model": {"model_id": model}}))
+    for begin in ({"model_id": model}, {"job_id": theirs.ids["job_id"][0]}):
+        document = {**requests["identify"], "model": {"links_per_wing": RESULT["model"]["links_per_wing"]}}
+        found.append(("identify", {**document, "search": {"warm_start": begin}}))
     return found
 
 
@@ -350,7 +354,7 @@ def test_every_field_that_names_a_thing_is_tried(operations: list[Operation]) ->
         for name, of in schema.get("properties", {}).items()
         if pattern in json.dumps(of)
     }
-    assert found == {"trajectory_id", "model_id"}
+    assert found == {"trajectory_id", "model_id", "job_id"}
 
 
 def test_bodies_cannot_name_anothers_things(tenants: tuple[Tenant, Tenant]) -> None:
@@ -364,11 +368,10 @@ def test_bodies_cannot_name_anothers_things(tenants: tuple[Tenant, Tenant]) -> N
             answer = ours.post(path, document)
             assert answer.status_code == 422, (path, answer.text)
             assert_nothing_leaks(answer, theirs, path)
-            made_up = json.loads(
-                json.dumps(document)
-                .replace(theirs.ids["trajectory_id"][0], "x")
-                .replace(theirs.ids["model_id"][0], "x")
-            )
+            text = json.dumps(document)
+            for identifier in (item for ids in theirs.ids.values() for item in ids):
+                text = text.replace(f'"{identifier}"', '"x"')
+            made_up = json.loads(text)
             codes = [[e["code"] for e in a.json()["errors"]] for a in (answer, ours.post(path, made_up))]
             assert codes[0] == codes[1]
         assert theirs.post(f"/validate/{name}", document).status_code == 200

@@ -61,7 +61,7 @@ class Plan:
     jobs: int = 8
     owners: int = 4
     chunks: int = 256
-    generations: int = 5
+    generations: int = 3
     flight_s: float = 8.0
     advance_s: float = 0.5
     write_s: float = 0.5e-3

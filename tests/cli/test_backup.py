@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import select
+from typer.testing import CliRunner
 
 from app.database import Database, upgrade
 from app.jobs.reaper import reap
@@ -20,6 +21,7 @@ from app.tables import jobs
 from cli import backup as copies
 from cli.backup import backup, restore
 from cli.exits import CommandError, Exit
+from cli.main import app
 
 READER = """
 import sqlite3, sys
@@ -187,7 +189,6 @@ def test_the_commands_say_what_was_copied(url: str, tmp_path: Path) -> None:
     home = Path(url.removeprefix("sqlite:///")).parent
     for command in ("backup", "restore"):
         words = ["db", command, str(tmp_path / "copy"), "--data-dir", str(home), "--json"]
-        done = subprocess.run(
-            [sys.executable, "-m", "cli.main", *words], capture_output=True, text=True, check=True
-        )
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == Exit.OK, done.output
         assert json.loads(done.stdout)["jobs"] == 1

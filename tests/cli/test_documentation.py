@@ -10,7 +10,7 @@ import typer.main
 
 from cli.main import app
 
-PAGES = ("README.md", "docs/command_line.md", "docs/library.md", "docs/service.md")
+PAGES = ("README.md", "docs/command_line.md", "docs/library.md", "docs/service.md", "docs/security.md")
 
 
 def shown_commands(text: str) -> list[str]:

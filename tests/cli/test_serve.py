@@ -13,6 +13,7 @@ from subprocess import DEVNULL
 
 import httpx
 import psutil
+import pytest
 
 from cli.broker import free_port
 from cli.exits import Exit
@@ -38,8 +39,9 @@ def test_a_taken_port_gives_a_sentence(tmp_path: Path) -> None:
     assert "Traceback" not in ended.stderr
 
 
-def test_an_open_address_is_refused(tmp_path: Path) -> None:
+def test_an_open_address_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Listening beyond this machine without keys is refused with the reason."""
+    monkeypatch.setenv("MORPHID_AUTH", "off")
     ended = serve("--host", "0.0.0.0", "--port", "0", "--data-dir", str(tmp_path))  # noqa: S104 - refused
     assert ended.returncode == Exit.USAGE
     assert "other machines" in ended.stderr

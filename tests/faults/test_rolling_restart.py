@@ -33,8 +33,8 @@ class Proxy:
 class Load(threading.Thread):
     """Posts flights and polls what it posted, on connections that it keeps, until told to stop.
 
-    Whatever is not an answer as it should be is a failure, but for a door that nobody opens: no byte was sent,
-    and any proxy tries the next one.
+    Whatever is not an answer as it should be is a failure, but for a door that nobody opens: no byte was
+    sent, and any proxy tries the next one.
     """
 
     def __init__(self, rig: Rig, proxy: Proxy) -> None:

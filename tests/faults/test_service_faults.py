@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import time
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +15,39 @@ import httpx
 import pytest
 
 from cli.service import Service
+from cli.supervisor import Supervisor
+from tests.faults.posting import percentile
 from tests.identification_request import identification
 from tests.live import LiveService
+from tests.servers import redis
 
 SEARCH = {"method": "pso", "particles": 256, "generations": 25, "seed": 2}
 SHORT = {"MORPHID_LEASE_S": "4", "MORPHID_HEARTBEAT_S": "1", "MORPHID_REAP_EVERY_S": "1"}
 PROMISED_S = 90.0
+CANCELS = 15
+EFFECTIVE_S = 2.0
+NOISE_S = 3.0  # what a busy machine adds
 
 pytestmark = pytest.mark.timeout(600)  # the first identification on a machine also compiles the kernels
 
 
 @pytest.fixture
-def short_leases(tmp_path: Path) -> Iterator[LiveService]:
-    """A service whose reaper comes within seconds."""
-    service = LiveService(tmp_path, environment=SHORT).start()
+def short_leases(pair: str, request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LiveService]:
+    """A service whose reaper comes within seconds, on each pair."""
+    if pair == "sqlite-embedded":
+        service = LiveService(tmp_path, environment=SHORT).start()
+        yield service
+        service.stop()
+        return
+    database_url = request.getfixturevalue("crashing_postgres").new_database()
+    broker = redis.plain(tmp_path / "broker")
+    supervisor = Supervisor(tmp_path / "logs", report=lambda _sentence: None)
+    supervisor.start(broker.spec)
+    urls = {"MORPHID_DATABASE_URL": database_url, "MORPHID_BROKER_URL": broker.url}
+    service = LiveService(tmp_path / "data", environment={**SHORT, **urls}).start()
     yield service
     service.stop()
+    supervisor.stop()
 
 
 @pytest.fixture
@@ -84,3 +103,40 @@ def test_a_killed_worker_with_short_leases(short_leases: LiveService) -> None:
 def test_a_killed_worker_as_shipped(shipped: LiveService) -> None:
     """With the leases that are shipped the job goes on within 90 s of the kill."""
     assert_recovery(shipped, within_s=PROMISED_S)
+
+
+def ended_s(client: httpx.Client, job_id: str) -> float:
+    """Time until a job has ended, s; its last change is looked for every 20 ms."""
+    began = time.monotonic()
+    while client.get(f"/jobs/{job_id}").json()["status"] in ("queued", "running", "cancelling"):
+        assert time.monotonic() - began < 60.0
+        time.sleep(0.02)
+    return time.monotonic() - began
+
+
+@pytest.mark.faults
+def test_cancels_of_identifications(short_leases: LiveService) -> None:
+    """A real search, cancelled at any moment of its life, ends soon with the best so far; its end, too."""
+    rng = random.Random(5)
+    document = identification("train_rate_0.8", links=2, search=SEARCH)
+    took_s, partial = [], 0
+    with httpx.Client(base_url=short_leases.url, timeout=30.0) as client:
+        first = client.post("/identify", json=document).json()["id"]
+        client.get(f"/jobs/{first}", headers={"Prefer": "wait=60"}, timeout=90.0)
+        ended_s(client, first)  # the kernels are compiled from here on
+        events = client.get(f"/jobs/{first}/events", headers={"Accept": "application/json"}).json()["events"]
+        moments = [datetime.fromisoformat(event["at"]) for event in events]
+        finishing_s = (moments[-1] - moments[-2]).total_seconds()
+        for _ in range(CANCELS):
+            job_id = client.post("/identify", json=document).json()["id"]
+            time.sleep(rng.uniform(0.0, 4.0))
+            client.post(f"/jobs/{job_id}/cancel").raise_for_status()
+            took_s.append(ended_s(client, job_id))
+            partial += client.get(f"/jobs/{job_id}/result").status_code == 200
+    took_s.sort()
+    print(
+        f"{CANCELS} cancels of identifications: p50 {percentile(took_s, 0.5):.2f} s, "
+        f"most {took_s[-1]:.2f} s; {partial} left their best so far; "
+        f"the undisturbed one drew its plots within {finishing_s:.2f} s"
+    )
+    assert took_s[-1] < EFFECTIVE_S + NOISE_S

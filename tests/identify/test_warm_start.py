@@ -1,4 +1,4 @@
-"""A search that begins from a known model: there sooner than from the physical guess, and never worse for it."""
+"""A search that begins from a known model: sooner there than from the physical guess, never worse for it."""
 
 from __future__ import annotations
 
@@ -129,10 +129,10 @@ def test_first_particles_of_a_swarm() -> None:
 
 def test_documents_say_what_to_begin_from() -> None:
     """A model or a whole result; with it the search looks at fewer candidates unless told how many."""
-    settings = search_settings({"warm_start": {"model": MODEL, "fit": []}})
+    settings = search_settings({"warm_start": {"parameters": {"model": MODEL, "fit": []}}})
     assert settings.warm_start is not None
     assert (settings.screen, settings.starts) < (search_settings({}).screen, search_settings({}).starts)
-    assert search_settings({"warm_start": MODEL, "particles": 500}).screen == 500
+    assert search_settings({"warm_start": {"parameters": MODEL}, "particles": 500}).screen == 500
     with pytest.raises(InvalidInput) as error:
-        search_settings({"warm_start": {"links_per_wing": 2}})
+        search_settings({"warm_start": {"parameters": {"links_per_wing": 2}}})
     assert error.value.pointer.startswith("/search/warm_start")

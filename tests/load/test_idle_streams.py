@@ -12,7 +12,7 @@ import httpx
 import psutil
 import pytest
 
-from app.jobs.store import claim_job, save_progress
+from app.jobs.store import claim_job, request_cancel, save_progress
 from tests.faults.rig import OWNER, Rig
 from tests.load.conftest import Tell
 from tests.load.figures import Times
@@ -26,6 +26,10 @@ MOST_RSS = 300e6  # bytes
 IDLE_S = 20.0  # longer than the signs of life are apart
 CALL_P95_MS = 200.0
 NEWS_S = 2.0
+WAITERS = 500
+WAIT_S = 60
+SETTLED_S = 10.0  # until all calls are in
+ALL_ANSWERED_S = 20.0
 
 Stream = tuple[str, asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -73,6 +77,44 @@ async def time_of_news(rig: Rig, streams: list[Stream]) -> Times:
         await asyncio.wait_for(reader.readuntil(b"event: progress"), 10.0)
         times.append(time.perf_counter() - begun)
     return Times.of(times)
+
+
+async def waited(client: httpx.AsyncClient, job_id: str) -> tuple[str, float]:
+    """Wait for a job's end; give the status that came, and when."""
+    answer = await client.get(f"/jobs/{job_id}", headers={"Prefer": f"wait={WAIT_S}"})
+    return answer.raise_for_status().json()["status"], time.perf_counter()
+
+
+def test_many_wait_for_an_end(rig: Rig, tell: Tell) -> None:
+    """500 calls with `Prefer: wait` are answered soon after their jobs ended, and let others through."""
+    ids = fill(rig.database, OWNER, WAITERS, steps=10)
+    rig.start_api()
+
+    async def measure() -> tuple[Times, Times]:
+        limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
+        async with httpx.AsyncClient(base_url=rig.url, timeout=2.0 * WAIT_S, limits=limits) as client:
+            waiting = [asyncio.create_task(waited(client, job_id)) for job_id in ids]
+            await asyncio.sleep(SETTLED_S)
+            assert not any(task.done() for task in waiting)
+            calls = await time_of_calls(rig.url, ids)
+            begun = time.perf_counter()
+            await asyncio.to_thread(cancel_all, rig, ids)
+            answers = await asyncio.gather(*waiting)
+        assert {status for status, _ in answers} == {"cancelled"}
+        return calls, Times.of(at - begun for _, at in answers)
+
+    calls, ends = asyncio.run(measure())
+    tell(f"GET /jobs/{{id}} beside {WAITERS} waiting calls: {calls}")
+    tell(f"from the first of {WAITERS} ends to the answers: {ends}")
+    assert calls.p95_ms < CALL_P95_MS
+    assert ends.worst_ms < 1e3 * ALL_ANSWERED_S
+
+
+def cancel_all(rig: Rig, ids: list[str]) -> None:
+    """End all jobs in one transaction."""
+    with rig.database.write() as session:
+        for job_id in ids:
+            request_cancel(session, OWNER, job_id)
 
 
 def test_a_thousand_idle_streams(rig: Rig, tell: Tell) -> None:

@@ -11,10 +11,10 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
 from morphcore.optimise.settings import Weights
-from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import STEP_S, common_path
 from morphcore.simulate.schedule import ConstantRate, Spline
+from morphcore.stopping import Interrupted
 from morphcore.threads import thread_count, use_threads
 from tests.identify.flights import reference_aircraft, reference_flight
 

@@ -14,10 +14,10 @@ from morphcore.errors import FlightDiverged, InvalidInput, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.flight import ModelChoice, Simulation, flight_steps, simulate
 from morphcore.simulate.schedule import ConstantRate, Hold, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphcore.stopping import Interrupted
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import physical_guess
 from morphcore.models.parameters_document import parameters_document
-from morphcore.simulate.batch import Interrupted
 from morphcore.simulate.request import attitude_variation, simulation_from_document
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.stopping import Interrupted
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
 from tests.simulate.flights import example_model
 

@@ -83,7 +83,12 @@ class Work(Protocol):
         """
 
     def outcome(self, checkpoint: bytes) -> Outcome:
-        """Give the result at the last step's checkpoint, with everything that belongs to it."""
+        """Give the result at the last step's checkpoint, with everything that belongs to it.
+
+        Raises
+        ------
+        WorkInterrupted : soon after the ``stop()`` of the steps turned true.
+        """
 
     def best_so_far(self, checkpoint: bytes) -> Outcome | None:
         """Give the result at any checkpoint, within a second: someone waits for the job to end.

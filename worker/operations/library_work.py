@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar
 
 from morphcore.errors import MorphError
-from morphcore.simulate.batch import Interrupted
+from morphcore.stopping import Interrupted, stoppable
 from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted, WorkRefused
 
 RESULT_FILE = "result.json"
@@ -57,16 +57,23 @@ class SearchWork(Generic[Result]):
     ) -> None:
         self._run = run
         self._files = files
+        self._stop: Stop = never
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
         """Search, step by step."""
+        self._stop = stop
         with library_errors():
             for step in self._run.steps(checkpoint=checkpoint, stop=stop):
                 yield shown(step)
 
     def outcome(self, checkpoint: bytes) -> Outcome:
-        """Give the result with its plots and tables."""
-        with library_errors():
+        """Give the result with its plots and tables.
+
+        Raises
+        ------
+        WorkInterrupted : the stop signal of the steps, between two flights or pictures.
+        """
+        with library_errors(), stoppable(self._stop):
             result = self._run.result(checkpoint)
             document = result.to_document()
             return Outcome(document, {**result_file(document), **self._files(result, document)})
@@ -80,6 +87,11 @@ class SearchWork(Generic[Result]):
 def shown(step: Any) -> Step:
     """Give a step of the library as the runner sees it."""
     return Step(progress={name: getattr(step, name) for name in PROGRESS}, checkpoint=step.checkpoint)
+
+
+def never() -> bool:
+    """Tell that nobody asked to stop."""
+    return False
 
 
 def result_file(document: Document) -> dict[str, bytes]:

@@ -146,7 +146,7 @@ def test_stream_replays_and_follows(any_service: RunningService) -> None:
     service.progress(claim, fraction=0.1)
 
     def work() -> None:
-        time.sleep(0.3)
+        time.sleep(1.0)  # several times the pause between signs of life, also on a busy machine
         service.progress(claim, fraction=0.6)
         service.finish(claim, "succeeded", result=RESULT)
 

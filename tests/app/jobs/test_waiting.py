@@ -9,7 +9,7 @@ from app.database import Database, database_time
 from app.jobs import store
 from app.jobs.creation import Terms
 from app.jobs.records import Job
-from app.jobs.waiting import QueuePlace, place_of_next, queue_place
+from app.jobs.waiting import FRESH_S, QueueView, count_queue, queue_place
 from app.tables import jobs, workers
 from tests.app.jobs.test_store import new_job
 from tests.app.jobs.test_turns import queue, served
@@ -19,9 +19,11 @@ def places(database: Database) -> dict[str, int]:
     """Tell the position of every queued job."""
     with database.read() as session:
         rows = session.execute(select(jobs.c.id, jobs.c.owner).where(jobs.c.status == "queued")).all()
-        found = {row.id: queue_place(session, store.get_job(session, row.owner, row.id)) for row in rows}
-    assert all(found.values())
-    return {job_id: place.position for job_id, place in found.items() if place is not None}
+        census = count_queue(session)
+        return {
+            row.id: queue_place(session, store.get_job(session, row.owner, row.id), census).position
+            for row in rows
+        }
 
 
 @pytest.mark.parametrize("taken_before", [0, 1, 3])
@@ -43,7 +45,7 @@ def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
     queue(database, many=4, few=1)
     served(database)
     with database.read() as session:
-        told = place_of_next(session, "few", "identify", 0).position
+        told = QueueView().place_of_next(session, "few", "identify", 0).position
     job = new_job(database, owner="few")
     assert places(database)[job.id] == told
 
@@ -51,9 +53,7 @@ def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
 def told_eta(database: Database, job: Job) -> float | None:
     """When the job is told to begin, s."""
     with database.read() as session:
-        place = queue_place(session, job)
-    assert isinstance(place, QueuePlace)
-    return place.eta_s
+        return queue_place(session, job, count_queue(session)).eta_s
 
 
 def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
@@ -77,3 +77,24 @@ def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
                 insert(workers).values(name=name, version="1", slots=4, busy=0, started_at=seen, seen_at=seen)
             )
     assert told_eta(database, last) == 0.0  # three of four slots are free
+
+
+def test_the_queue_is_counted_once_for_all(database: Database) -> None:
+    """Within a second many ask and one counts; what changed among one's own jobs is seen at once."""
+    now = [0.0]
+    view = QueueView(clock=lambda: now[0])
+    queue(database, a=1, b=1)
+    job = new_job(database, owner="b")
+    with database.read() as session:
+        counted = view.census(session)
+    urgent = new_job(database, owner="b", terms=Terms(priority=5))
+    with database.read() as session:
+        assert view.census(session) is counted
+        place = view.place(session, job)
+        assert place is not None
+        assert place.position == 4  # behind the other two of its owner, and behind a's
+        now[0] = FRESH_S
+        assert view.census(session).lines["b"].queued == 3
+    with database.write() as session:
+        store.request_cancel(session, "b", urgent.id)
+        assert view.place(session, store.get_job(session, "b", urgent.id)) is None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -63,6 +65,14 @@ def test_every_route_demands_a_scope_or_is_public() -> None:
                 assert "security" in operation, f"{method} {route.path} demands no key"
                 assert demanded(operation) or (method, route.path) in ANY_KEY, f"{method} {route.path}"
     assert public == PUBLIC_PATHS
+
+
+def test_the_paper_names_every_scope_and_public_path(root: Path) -> None:
+    """docs/security.md tells what the code does."""
+    text = (root / "docs/security.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `([a-z:]+)` \|", text, re.MULTILINE)) == set(EVERY_SCOPE)
+    (public,) = re.findall(r"^Public: (.*)\.\s+`GET /me`", text, re.MULTILINE)
+    assert set(re.findall(r"`([^`]+)`", public)) == {*PUBLIC_PATHS, PUBLIC_FOLDER}
 
 
 def test_every_scope_is_demanded_somewhere() -> None:

@@ -133,7 +133,12 @@ def bodies(ids: dict[str, str]) -> list[tuple[str, Document]]:
     identify, study = identify_document(), study_document()
     identify["samples"] = study["samples"] = [sample]
     equivalent = {"kind": "equivalent", "model_id": ids["model_id"]}
+    warm = {**identify_document(), "model": {"links_per_wing": RESULT["model"]["links_per_wing"]}}
     return [
+        *(
+            ("identify", {**warm, "search": {"warm_start": {name: ids[name]}}})
+            for name in ("job_id", "model_id")
+        ),
         ("identify", identify),
         ("study", study),
         ("simulate", {**simulate_document(), "model": equivalent}),
@@ -164,7 +169,7 @@ def test_every_field_with_an_id_is_in_these_tests() -> None:
     paths = published()["paths"]
     bodies = [told.get("requestBody") for found in paths.values() for told in found.values()]
     fields = id_fields(bodies)
-    assert fields == {"trajectory_id", "model_id"}
+    assert fields == {"trajectory_id", "model_id", "job_id"}
 
 
 def test_bodies_cannot_name_anothers_things(tenants: Tenants) -> None:

@@ -67,7 +67,7 @@ def test_failures_are_tried_again_on_schedule(database: Database, there: Receive
     clock = HandClock()
     hook_id = new_hook(database, there.url())
     ended_job(database)
-    clock.turn(1.0)
+    clock.turn(60.0)
     for planned in DELAYS_S:
         assert send_due(database, clock=clock) == 1
         assert [row.status for row in deliveries(database)] == ["waiting"]
@@ -93,7 +93,7 @@ def test_retry_after_is_honoured(database: Database, there: Receiver) -> None:
     clock = HandClock()
     new_hook(database, there.url())
     ended_job(database)
-    clock.turn(1.0)
+    clock.turn(60.0)
     assert send_due(database, clock=clock) == 1
     clock.turn(119.0)
     assert send_due(database, clock=clock) == 0
@@ -178,7 +178,7 @@ def test_a_claim_is_one_senders(database: Database) -> None:
     clock = HandClock()
     new_hook(database, UNREACHABLE)
     ended_job(database)
-    clock.turn(1.0)
+    clock.turn(60.0)
     with database.read() as session:
         seen = sql.due(session, 10, 4, (), clock)
     with database.write() as session:
@@ -201,7 +201,7 @@ def test_late_news_change_nothing(database: Database) -> None:
     clock = HandClock()
     new_hook(database, UNREACHABLE)
     ended_job(database)
-    clock.turn(1.0)
+    clock.turn(60.0)
     claims = []
     for _ in range(2):
         with database.write() as session:

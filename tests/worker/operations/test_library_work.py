@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pytest
 
 from morphcore.errors import InvalidInput, MorphError
-from morphcore.simulate.batch import Interrupted
+from morphcore.stopping import Interrupted, heed
 from worker.operations import Document, Stop, WorkInterrupted, WorkRefused
 from worker.operations.library_work import SearchWork, library_errors
 
@@ -106,3 +106,21 @@ def test_a_refusal_keeps_its_words() -> None:
     )
     with pytest.raises(WorkRefused, match="plain"), library_errors():
         raise MorphError("plain")
+
+
+def test_a_stop_between_two_pictures_is_heeded() -> None:
+    """Whoever cancels while plots are drawn waits for one picture, not for all of them."""
+    drawn: list[str] = []
+
+    def files(_result: Counted, _document: Document) -> dict[str, bytes]:
+        for name in ("a", "b", "c"):
+            heed()  # as every picture and every chunk of a flight does
+            drawn.append(name)
+        return {}
+
+    searched = SearchWork(Count(), files)
+    *_, last = searched.steps(None, lambda: bool(drawn))
+    with pytest.raises(WorkInterrupted):
+        searched.outcome(last.checkpoint)
+    assert drawn == ["a"]
+    assert searched.best_so_far(last.checkpoint).document == {"count": 5}
