@@ -303,4 +303,4 @@ def test_form_is_not_json(service: RunningService) -> None:
     """A body of another kind is refused by its kind."""
     answer = service.client.post("/identify", data={"aircraft": "x"})
     assert fault(answer, 415)["pointer"] == "#header/Content-Type"
-    assert fault(service.client.post("/identify", headers=JSON))["code"] == "invalid_request"
+    assert fault(service.client.post("/identify", headers=JSON), 400)["code"] == "malformed_body"
