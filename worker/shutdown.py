@@ -13,7 +13,6 @@ import tempfile
 from pathlib import Path
 
 VARIABLE = "MORPHID_STOP_FILE"
-PARENT = "MORPHID_POOL_PARENT"
 
 
 def arm() -> Path:
@@ -21,7 +20,6 @@ def arm() -> Path:
     path = Path(tempfile.gettempdir()) / f"morphid-stop-{os.getuid()}-{os.getpid()}"
     path.unlink(missing_ok=True)
     os.environ[VARIABLE] = str(path)
-    os.environ[PARENT] = str(os.getpid())
     return path
 
 
@@ -38,11 +36,6 @@ def disarm() -> None:
 
 
 def announced() -> bool:
-    """Whether the worker is asked to end, or its parent has died without a word (called in a child)."""
+    """Whether the worker is asked to end (called in a child)."""
     name = os.environ.get(VARIABLE)
-    return name is not None and (Path(name).exists() or _orphaned())
-
-
-def _orphaned() -> bool:
-    """Whether nobody feeds this child any more: its job goes back to the queue, it ends with its task."""
-    return int(os.environ.get(PARENT, os.getpid())) not in (os.getpid(), os.getppid())
+    return name is not None and Path(name).exists()

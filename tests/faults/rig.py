@@ -120,6 +120,11 @@ class Rig:
         self._held.add(name)
         self.supervisor.children[name].stop()
 
+    def leave_orphans(self, name: str) -> None:
+        """SIGKILL a child and do not clean up after it, as where no supervisor of ours runs."""
+        self._held.add(name)
+        self.kill(name)
+
     def bring_back(self, name: str) -> None:
         """Start a child that was taken away."""
         child = self.supervisor.children[name]

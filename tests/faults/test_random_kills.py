@@ -8,6 +8,7 @@ import random
 import signal
 import time
 
+import psutil
 import pytest
 
 from app.jobs.records import JobStatus
@@ -94,3 +95,17 @@ def test_a_worker_asleep_with_its_parent(rig: Rig) -> None:
             os.kill(pid, signal.SIGCONT)
     late = [rig.add(steps=10, pause_s=0.05) for _ in range(4)]
     rig.until(lambda: all(rig.job(each).finished for each in late), 60.0)
+
+
+def test_a_killed_parent_leaves_no_orphans(rig: Rig) -> None:
+    """The worker's parent killed where nobody tidies up: its children die with it, the next worker goes on."""
+    rig.start_worker()
+    job_id = rig.add(steps=40, pause_s=0.1)
+    rig.until(lambda: rig.generation(job_id) >= 5, 30.0)
+    orphans = [psutil.Process(pid) for pid in rig.pool_children()]
+    rig.leave_orphans("worker")
+    _, left = psutil.wait_procs(orphans, timeout=10.0)
+    assert left == []
+    rig.bring_back("worker")
+    rig.settle()
+    assert rig.job(job_id).attempt == 2
