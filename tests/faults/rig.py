@@ -128,6 +128,7 @@ class Rig:
     def bring_back(self, name: str) -> None:
         """Start a child that was taken away."""
         child = self.supervisor.children[name]
+        child.stop()
         child.start()
         if name == "broker":
             assert self.supervisor.wait_until(child, self.broker.answers, 10.0), child.last_words()

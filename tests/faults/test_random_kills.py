@@ -98,7 +98,7 @@ def test_a_worker_asleep_with_its_parent(rig: Rig) -> None:
 
 
 def test_a_killed_parent_leaves_no_orphans(rig: Rig) -> None:
-    """The worker's parent killed where nobody tidies up: its children die with it, the next worker goes on."""
+    """The worker's parent killed where nobody tidies up: its children die too; the next one goes on."""
     rig.start_worker()
     job_id = rig.add(steps=40, pause_s=0.1)
     rig.until(lambda: rig.generation(job_id) >= 5, 30.0)
