@@ -169,7 +169,7 @@ class Simulation:
             self.now = max(self.now, when)
             action()
         makespan_s = self.ended_at - BEGIN_S
-        busiest = max(count for tens, count in self.writes.items() if tens > 0 or makespan_s < 10.0) / 10.0
+        busiest = max(self.writes.values()) / min(10.0, makespan_s)
         spent_s = self.useful_s + self.wasted_s
         return Figures(
             makespan_s=makespan_s,
