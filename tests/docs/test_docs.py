@@ -45,3 +45,11 @@ def test_decisions_are_numbered_through() -> None:
     text = (ROOT / "DECISIONS.md").read_text(encoding="utf-8")
     numbers = [int(number) for number in re.findall(r"^(\d+)\. ", text, flags=re.MULTILINE)]
     assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("paper", PAPERS, ids=lambda path: path.name)
+def test_proofs_that_are_named_are_there(paper: Path) -> None:
+    """A test that a paper names as a proof exists."""
+    named = set(re.findall(r"`(test_[a-z0-9_]+)`", paper.read_text(encoding="utf-8")))
+    written = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name in sorted(named) if f"def {name}(" not in written] == []
