@@ -52,7 +52,10 @@ test-slow: setup  ## the long proofs
 	@$(BIN)/pytest -q -m slow --timeout 1800
 
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
-	@$(BIN)/pytest -q -s tests/faults -m "" --timeout 900
+	@# both pairs at the same time: most of it is waiting
+	@log=$$(mktemp); run="$(BIN)/pytest -q -s tests/faults -m= --timeout 900"; \
+		$$run -k "not postgres" >$$log 2>&1 & other=$$!; \
+		$$run -k postgres; one=$$?; wait $$other; two=$$?; cat $$log; rm -f $$log; exit $$((one + two))
 
 conformance: setup  ## one behaviour on SQLite and Postgres, embedded broker and Redis URL (MORPHID_TEST_*_URL)
 	@$(BIN)/pytest -q tests/conformance tests/app/jobs tests/app/test_database.py

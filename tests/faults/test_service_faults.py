@@ -24,7 +24,7 @@ from tests.servers import redis
 SEARCH = {"method": "pso", "particles": 256, "generations": 25, "seed": 2}
 SHORT = {"MORPHID_LEASE_S": "4", "MORPHID_HEARTBEAT_S": "1", "MORPHID_REAP_EVERY_S": "1"}
 PROMISED_S = 90.0
-CANCELS = 15
+CANCELS = 10
 EFFECTIVE_S = 2.0
 NOISE_S = 3.0  # what a busy machine adds
 
