@@ -13,7 +13,7 @@ from worker import numerics
 from worker.attempt import Ending
 from worker.runner import Runner
 
-IDLE_S = 0.005
+IDLE_S = 0.02
 
 
 def main(url: str, name: str, chunk_lease_s: float) -> None:
