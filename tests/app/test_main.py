@@ -115,14 +115,18 @@ def test_sigterm_ends_open_streams(tmp_path: Path) -> None:
     _wait_until_alive(url)
     job = httpx.post(f"{url}/identify", json=identify_document()).json()
     told: list[str] = []
+    listening = threading.Semaphore(0)
 
     def follow() -> None:
-        told.append(httpx.get(f"{url}/jobs/{job['id']}/events", timeout=30.0).text)
+        with httpx.stream("GET", f"{url}/jobs/{job['id']}/events", timeout=30.0) as stream:
+            listening.release()
+            told.append("".join(stream.iter_text()))
 
     followers = [threading.Thread(target=follow) for _ in range(3)]
     for follower in followers:
         follower.start()
-    time.sleep(0.5)
+    for _ in followers:
+        assert listening.acquire(timeout=20.0)
     stop = time.perf_counter()
     process.send_signal(signal.SIGTERM)
     process.wait(10.0)

@@ -12,7 +12,7 @@ import httpx
 
 from tests.app.request_documents import simulate_document
 from tests.faults.rig import Rig
-from tests.faults.walk_worker import flight_steps
+from tests.faults.walk_length import flight_steps
 
 ANSWER_S = 30.0  # a client's patience with one answer
 

@@ -14,7 +14,7 @@ from cli import serve
 from cli.broker import LOOPBACK, free_port
 from tests.app.request_documents import simulate_document
 from tests.faults.rig import Rig
-from tests.faults.walk_worker import flight_steps
+from tests.faults.walk_length import flight_steps
 
 pytestmark = pytest.mark.faults
 

@@ -17,11 +17,11 @@ from sqlalchemy.engine import Engine
 
 from tests.faults import wrong_clock
 from tests.faults.ledger import SEED
+from tests.faults.walk_length import flight_steps
 from tests.worker.conftest import Walk
 from worker import numerics, operations, tasks
 from worker.celery_app import app
 
-STEPS_PER_S = 10  # of a flight's duration: how a request at the API's door says how long a walk shall be
 PAUSE_S = 0.01
 
 
@@ -64,11 +64,6 @@ def begin(request: operations.Document, _threads: int) -> Walk:
 def begin_flight(request: operations.Document, _threads: int) -> Walk:
     """Begin a walk where the API was asked for a flight."""
     return FaultyWalk({"seed": SEED, "steps": flight_steps(request["duration_s"]), "pause_s": PAUSE_S})
-
-
-def flight_steps(duration_s: float) -> int:
-    """Steps of the walk that stands for a flight of this duration."""
-    return round(STEPS_PER_S * duration_s)
 
 
 def kernels(_threads: int) -> None:
