@@ -12,7 +12,7 @@ import pytest
 
 from app.jobs import store, turns
 from tests.app import calls
-from tests.app.calls import ANSWER_S, JSON, fault
+from tests.app.calls import JSON, fault, prompt_fault
 from tests.app.request_documents import SAMPLE_NAMES, Document, identify_document, sample_document
 from tests.app.running_service import RunningService
 
@@ -270,10 +270,8 @@ def test_too_many_rows_are_refused(service: RunningService) -> None:
     assert len(text) > service.settings.max_body_bytes
     for name in ("phi_rad", "theta_rad", "psi_rad", "sweep_left_rad"):
         document["samples"][0][name] = [0]
-    start = time.perf_counter()
-    problem = fault(post(service, document))
+    problem = prompt_fault(service, "/identify", document)
     assert (problem["code"], problem["pointer"]) == ("invalid_request", "/samples/0/time_s")
-    assert time.perf_counter() - start < ANSWER_S
 
 
 def test_rows_of_uploads_are_counted_before_they_are_read(service: RunningService) -> None:
@@ -285,18 +283,12 @@ def test_rows_of_uploads_are_counted_before_they_are_read(service: RunningServic
     uploaded = service.client.post("/trajectories", json=flight).raise_for_status().json()
     document = identify_document()
     document["samples"] = [{"trajectory_id": uploaded["id"], "name": f"s{i}"} for i in range(64)]
-    start = time.perf_counter()
-    assert fault(post(service, document))["errors"][0]["code"] == "too_many_rows"
-    assert time.perf_counter() - start < ANSWER_S
+    assert prompt_fault(service, "/identify", document)["errors"][0]["code"] == "too_many_rows"
 
 
 def test_a_million_samples_are_refused(service: RunningService) -> None:
     """A million sample objects are refused before they are built, within a second."""
-    text = '{"samples":[' + ",".join(["{}"] * 10**6) + "]}"
-    start = time.perf_counter()
-    answer = service.client.post("/identify", content=text, headers=JSON)
-    assert fault(answer, 400)["pointer"] == "/samples"
-    assert time.perf_counter() - start < ANSWER_S
+    assert prompt_fault(service, "/identify", {"samples": [{}] * 10**6}, status=400)["pointer"] == "/samples"
 
 
 def test_form_is_not_json(service: RunningService) -> None:
