@@ -33,6 +33,7 @@ from tests.servers.redis import BrokerServer
 
 OWNER = "local"
 LEASE_S, HEARTBEAT_S, REAP_EVERY_S, REPUBLISH_AFTER_S = 2.0, 0.5, 1.0, 2.0
+NOTE_EVERY_S = 1.0
 OURS = {
     "worker.celery_app:app": "tests.faults.walk_worker:app",
     "app.main:create_app": "tests.faults.walk_api:create_app",
@@ -62,6 +63,7 @@ class Rig:
         self.worker: Child | None = None
         self._held: set[str] = set()
         self._seen: set[psutil.Process] = set()
+        self._noted_at = float("-inf")
         self._environment = {
             "MORPHID_DATABASE_URL": database_url,
             "MORPHID_BROKER_URL": broker.url,
@@ -161,15 +163,23 @@ class Rig:
 
     def tend(self) -> None:
         """Do once what `morphid serve` does all the time: restart what has died."""
+        self._note_descendants()
         for name, child in self.supervisor.children.items():
             if name in self._held:
                 continue
-            if child.pid is not None:
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    self._seen.update(psutil.Process(child.pid).children(recursive=True))
             event = child.tend()
             if event is not None:
                 self.reports.append(event)
+
+    def _note_descendants(self) -> None:
+        """Remember every process of the service now and then (a look at all of them is dear)."""
+        if time.monotonic() < self._noted_at + NOTE_EVERY_S:
+            return
+        self._noted_at = time.monotonic()
+        for child in self.supervisor.children.values():
+            if child.pid is not None:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    self._seen.update(psutil.Process(child.pid).children(recursive=True))
 
     @contextmanager
     def tended(self) -> Iterator[None]:
@@ -255,6 +265,7 @@ class Rig:
 
     def close(self) -> None:
         """End everything; nothing may be left running."""
+        self._noted_at = float("-inf")
         with contextlib.suppress(psutil.Error):
             self.tend()
         self.supervisor.stop()
