@@ -36,7 +36,7 @@ def fault(answer: httpx.Response, status: int = 422) -> Document:
 def prompt_fault(service: RunningService, path: str, document: Any, status: int = 422) -> Document:
     """Post a bad request and give its problem; the best of some answers comes within a second.
 
-    One alone may be held up by whatever else this machine does, and the first of all makes the list of fields.
+    One alone may be held up by whatever else this machine does; the first of all makes the list of fields.
     """
     problem, fastest_s = {}, math.inf
     for _ in range(TRIES):
