@@ -15,6 +15,7 @@ from tests.app.running_service import RunningService
 
 JSON = {"Content-Type": "application/json"}
 ANSWER_S = 1.0  # a bad request is told so within a second
+LARGE_ANSWER_S = 5.0  # a body of megabytes is read by a process of its own, 0.5 s on a quiet machine
 TRIES = 3
 
 
@@ -33,8 +34,10 @@ def fault(answer: httpx.Response, status: int = 422) -> Document:
     return document
 
 
-def prompt_fault(service: RunningService, path: str, document: Any, status: int = 422) -> Document:
-    """Post a bad request and give its problem; the best of some answers comes within a second.
+def prompt_fault(
+    service: RunningService, path: str, document: Any, status: int = 422, *, within_s: float = ANSWER_S
+) -> Document:
+    """Post a bad request and give its problem; the best of some answers comes in time.
 
     One alone may be held up by whatever else this machine does; the first of all makes the list of fields.
     """
@@ -43,7 +46,7 @@ def prompt_fault(service: RunningService, path: str, document: Any, status: int 
         start = time.perf_counter()
         problem = fault(post(service, path, document), status)
         fastest_s = min(fastest_s, time.perf_counter() - start)
-        if fastest_s < ANSWER_S:
+        if fastest_s < within_s:
             return problem
     raise AssertionError(f"the fastest of {TRIES} answers took {fastest_s:.2f} s: {problem}")
 
