@@ -21,7 +21,7 @@ from tests.identification_request import identification
 from tests.live import LiveService
 from tests.servers import redis
 
-SEARCH = {"method": "pso", "particles": 256, "generations": 25, "seed": 2}
+SEARCH = {"method": "pso", "particles": 128, "generations": 25, "seed": 2}
 SHORT = {"MORPHID_LEASE_S": "4", "MORPHID_HEARTBEAT_S": "1", "MORPHID_REAP_EVERY_S": "1"}
 PROMISED_S = 90.0
 CANCELS = 10
