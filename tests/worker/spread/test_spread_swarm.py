@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import pytest
 from sqlalchemy import select
 
-from app.database import Database
+from app.database import Database, upgrade
 from app.jobs.reaper import reap
 from app.tables import job_chunks
 from morphcore.lanes import TOGETHER
@@ -22,11 +23,15 @@ LARGER = {"method": "pso", "particles": 40 * TOGETHER, "generations": 4, "seed":
 CHUNK_LEASE_S = 2.0
 
 
-def test_a_spread_swarm_is_the_swarm(database: Database) -> None:
+def test_a_spread_swarm_is_the_swarm(tmp_path: Path) -> None:
     """Two workers by turns (each with plans of its own) end with the document of the mode `single`.
 
-    Wall times are left out: no two runs share them.
+    Wall times are left out: no two runs share them. What the kind of database could change is under test with
+    flocks.
     """
+    url = f"sqlite:///{tmp_path / 'jobs.sqlite3'}"
+    upgrade(url)
+    database = Database(url)
     kernels = Kernels(warm_up_library, threads=1)
     kernels.wait(lambda: False, poll_s=0.01)
     runners = [Runner(database, kernels, name, lease_s=60.0, heartbeat_s=10.0) for name in ("w1", "w2")]
@@ -43,6 +48,7 @@ def test_a_spread_swarm_is_the_swarm(database: Database) -> None:
     for shown in progress:
         assert shown.pop("flights_per_s") > 0.0
     assert progress[0] == progress[1]
+    database.dispose()
 
 
 @pytest.mark.faults
