@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Double, Engine, create_engine, event, inspect, make_url, text
+from sqlalchemy import URL, Double, Engine, Table, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine import Connection
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
@@ -56,6 +56,17 @@ def _sqlite_time(_element: database_time, _compiler: SQLCompiler, **_options: An
 @compiles(database_time, "postgresql")
 def _postgres_time(_element: database_time, _compiler: SQLCompiler, **_options: Any) -> str:
     return "CAST(extract(epoch FROM clock_timestamp()) AS DOUBLE PRECISION)"
+
+
+def insert_new(session: Session, table: Table) -> Any:
+    """An INSERT that can leave existing rows alone or change them (``on_conflict_...``)."""
+    if session.dialect.name == "sqlite":
+        from sqlalchemy.dialects import sqlite
+
+        return sqlite.insert(table)
+    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
+
+    return postgresql.insert(table)
 
 
 def normal_url(url: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +41,15 @@ class ServiceError(Exception):
     status = 500
     code = "internal_error"
     title = "Something went wrong inside the service"
+    ask_again_s: ClassVar[int | None] = None  # when a repetition may succeed
 
     def __str__(self) -> str:
         return self.detail or self.title
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers that the answer must carry."""
-        return {}
+        """Headers that the answer must carry (Retry-After: RFC 9110, section 10.2.3)."""
+        return {} if self.ask_again_s is None else {"Retry-After": str(self.ask_again_s)}
 
     @property
     def members(self) -> dict[str, Any]:
@@ -349,17 +350,13 @@ class DatabaseAway(ServiceError):
     status = 503
     code = "database_unavailable"
     title = "The database does not answer"
+    ask_again_s = 2
 
     def __init__(self) -> None:
         super().__init__(
             "The database does not answer at the moment.",
             hint="Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most.",
         )
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """When to ask again, s."""
-        return {"Retry-After": "2"}
 
 
 class StorageFull(ServiceError):
@@ -368,17 +365,13 @@ class StorageFull(ServiceError):
     status = 503
     code = "storage_full"
     title = "The service's storage is full"
+    ask_again_s = 60  # people have to make room
 
     def __init__(self) -> None:
         super().__init__(
             "The database has no room left; nothing was stored.",
             hint="Delete finished jobs that are not needed, or ask the operator for more disk space.",
         )
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """When to ask again, s: people have to make room."""
-        return {"Retry-After": "60"}
 
 
 class SlowBody(ServiceError):
@@ -403,11 +396,7 @@ class ServiceBusy(ServiceError):
     status = 503
     code = "service_busy"
     title = "The service is busy"
+    ask_again_s = 5
 
     def __init__(self, detail: str = "") -> None:
         super().__init__(detail, hint="Send the request again in a few seconds.")
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """When to ask again, s."""
-        return {"Retry-After": "5"}

@@ -10,7 +10,7 @@ from enum import Enum
 from app.database import Database
 from app.jobs.chunks import Flown, flown, hand_out
 from app.jobs.records import Claim, JobStatus
-from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
+from app.jobs.store import finish_job, load_checkpoint, release_job, save_progress
 from worker.lease import StopReason, Vigil
 from worker.numerics import Kernels
 from worker.operations import (
@@ -153,15 +153,11 @@ class Attempt(Patient):
         with self._database.read() as connection:
             return load_checkpoint(connection, self._claim), flown(connection, self._claim)
 
-    def _load_request(self) -> Document:
-        with self._database.read() as connection:
-            return load_request(connection, self._job_id)
-
     def _begin(self, find_operation: Callable[[str], Begin]) -> Work:
         prepared = self._works.prepared(
             self._job_id,
             lambda: find_operation(self._claim.operation),
-            lambda: self._patiently(self._load_request),
+            self._request,
             self._kernels.threads,
         )
         self._work, self._chunks = prepared.work, prepared.chunks

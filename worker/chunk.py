@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 from app.database import Database
 from app.jobs.chunks import ChunkClaim, finish_chunk, give_back_chunk
-from app.jobs.store import load_request
 from worker.attempt import Ending, told_error
 from worker.lease import StopReason, Vigil
 from worker.numerics import Kernels
@@ -74,16 +73,12 @@ class ChunkFlight(Patient):
         prepared = self._works.prepared(
             self._job_id,
             lambda: find_operation(self._chunk.operation),
-            lambda: self._patiently(self._load_request),
+            self._request,
             self._kernels.threads,
         )
         if not isinstance(prepared.work, SpreadWork):
             raise TypeError(f"operation {self._chunk.operation!r} cannot be spread")
         return prepared.work.fly(self._chunk.task, self._vigil.should_stop)
-
-    def _load_request(self) -> Document:
-        with self._database.read() as connection:
-            return load_request(connection, self._job_id)
 
     def _stopped(self) -> Ending:
         """Leave the chunk: to the next worker, or alone if its job is ending."""

@@ -12,7 +12,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.database_errors import DatabaseTrouble, trouble_of
+from app.jobs.store import load_request
 from worker.lease import StopReason, Vigil
+from worker.operations import Document
 
 log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
@@ -57,6 +59,15 @@ class Patient:
         self._job_id = job_id
         self._clock = clock
         self._sleep = sleep
+
+    def _request(self) -> Document:
+        """The job's request."""
+
+        def load() -> Document:
+            with self._database.read() as connection:
+                return load_request(connection, self._job_id)
+
+        return self._patiently(load)
 
     def _persist(self, write: Callable[[Connection], bool]) -> None:
         """Write in a transaction of its own; wait out a job store that is away.

@@ -14,7 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.database_errors import trouble_of
-from app.jobs.reaper import reap
+from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
 from app.jobs.turns import next_unit
 from app.observability.counters import count
@@ -139,8 +139,6 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
         report = reap(connection, republish_after_s=republish_after_s)
         count(connection, REAP_ROUNDS)
     process.reaped_at = time.monotonic()
-    for kind in ("requeued", "failed", "cancelled", "expired"):
-        for job_id in getattr(report, kind):
-            log.warning("reaper: job %s %s", job_id, kind)
+    log_ends(report)
     for job_id in report.publish:
         publish(job_id)

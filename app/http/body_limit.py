@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from dataclasses import dataclass
 
@@ -11,9 +10,7 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import BodyTooLarge, ServiceBusy, ServiceError, SlowBody
-from app.http.problems import MEDIA_TYPE, problem_document
-
-LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
+from app.http.early_answer import answer_early
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +55,7 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         if _announced(scope) > self.limits.max_bytes:
-            await _refuse(_too_large(self.limits), scope, receive, send)
+            await answer_early(_too_large(self.limits), scope, receive, send)
             return
         body = _Body(self, scope, receive, send)
         try:
@@ -97,7 +94,7 @@ class _Body:
         except ServiceError as error:
             self.refused = True
             if not self.answering:
-                await _refuse(error, self.scope, self.from_client, self.to_client)
+                await answer_early(error, self.scope, self.from_client, self.to_client)
             return {"type": "http.disconnect"}  # the application gives up; nobody hears its answer
         return message
 
@@ -142,28 +139,3 @@ def _too_large(limits: BodyLimits) -> BodyTooLarge:
         f"The body has more than {limits.max_bytes} bytes.",
         hint="Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories.",
     )
-
-
-async def _refuse(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
-    content = json.dumps(problem_document(error, scope["path"])).encode()
-    headers = {
-        "Content-Type": MEDIA_TYPE,
-        "Content-Length": str(len(content)),
-        **error.headers,
-        "Connection": "close",
-    }
-    await send(
-        {
-            "type": "http.response.start",
-            "status": error.status,
-            "headers": [(name.lower().encode(), value.encode()) for name, value in headers.items()],
-        }
-    )
-    await send({"type": "http.response.body", "body": content, "more_body": True})
-    try:
-        async with asyncio.timeout(LINGER_S):
-            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
-                pass
-    except TimeoutError:
-        pass
-    await send({"type": "http.response.body", "body": b"", "more_body": False})

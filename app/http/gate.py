@@ -6,8 +6,6 @@ public list needs a valid key. What a key may do is said by each route (`app.htt
 
 from __future__ import annotations
 
-import asyncio
-import json
 import logging
 import time
 from contextlib import suppress
@@ -23,8 +21,8 @@ from app.audit import repository as audit
 from app.audit.records import Action
 from app.errors import DatabaseAway, ServiceError, TooManyRefusals, Unauthorized
 from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
+from app.http.early_answer import answer_early
 from app.http.origins import Doors, refusal
-from app.http.problems import MEDIA_TYPE, problem_document
 from app.http.request_id import current_request_id
 from app.keys.keyring import FRESH_S, Refusal
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
@@ -35,7 +33,6 @@ from app.settings import Settings
 PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
 PUBLIC_FOLDER = "/static/"
 ADDRESS_LENGTH = 64  # a proxy may pass on anything
-LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
 
 logger = logging.getLogger(__name__)
 
@@ -62,7 +59,7 @@ class Gate:
             return
         error = refusal(scope, self._doors)
         if error is not None:
-            await _answer(error, scope, receive, send)
+            await answer_early(error, scope, receive, send)
             return
         path: str = scope["path"]
         if path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDER):
@@ -77,7 +74,7 @@ class Gate:
         try:
             key, text = await self._key(scope, address)
         except ServiceError as refused:
-            await _answer(refused, scope, receive, send)
+            await answer_early(refused, scope, receive, send)
             return
         scope[CALLER] = Caller(key.owner, key.id, key.scopes, current_request_id(), address, key.quota)
         await _while_the_key_opens(self.app, text, scope, receive, send)
@@ -169,24 +166,3 @@ async def _while_the_key_opens(
     except Exception:
         if not ended:
             raise
-
-
-async def _answer(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
-    """Answer with a problem document; what the client still sends is thrown away for `LINGER_S`."""
-    body = json.dumps(problem_document(error, scope["path"])).encode()
-    headers = {
-        "content-type": MEDIA_TYPE,
-        "content-length": str(len(body)),
-        "connection": "close",
-        **error.headers,
-    }
-    start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
-    await send({"type": "http.response.start", "status": error.status, "headers": start})
-    await send({"type": "http.response.body", "body": body, "more_body": True})
-    try:
-        async with asyncio.timeout(LINGER_S):
-            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
-                pass
-    except TimeoutError:
-        pass
-    await send({"type": "http.response.body", "body": b"", "more_body": False})

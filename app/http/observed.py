@@ -6,6 +6,7 @@ import logging
 import time
 from dataclasses import dataclass
 
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.http.context import caller_of
@@ -38,7 +39,7 @@ class _Exchange:
             method=scope["method"] if scope["method"] in METHODS else "other",
             route=_route(scope),
             status=f"{status // 100}xx",
-            waited="yes" if "wait" in _header(scope, b"prefer") else "no",
+            waited="yes" if "wait" in Headers(scope=scope).get("prefer", "") else "no",
         ).observe(self.answered_s)
 
 
@@ -59,6 +60,7 @@ class Observed:
             await self.app(scope, receive, send)
             return
         exchange = _Exchange(began=time.perf_counter())
+        traceparent = Headers(scope=scope).get("traceparent", "")
 
         async def watched_send(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -67,7 +69,7 @@ class Observed:
 
         with (
             IN_FLIGHT.track_inprogress(),
-            span(scope["method"], kind="server", traceparent=_header(scope, b"traceparent")) as traced,
+            span(scope["method"], kind="server", traceparent=traceparent) as traced,
         ):
             try:
                 await self.app(scope, receive, watched_send)
@@ -121,10 +123,3 @@ def _route(scope: Scope) -> str:
     if isinstance(template, str) and template:
         return template
     return STATIC if scope["path"].startswith(STATIC + "/") else UNROUTED
-
-
-def _header(scope: Scope, wanted: bytes) -> str:
-    for name, value in scope["headers"]:
-        if name == wanted:
-            return str(value.decode("latin-1"))
-    return ""

@@ -23,7 +23,6 @@ UNFINISHED = job_chunks.c.status.in_((OPEN, RUNNING))
 # handed out: running, and in no single worker's hands
 HANDED_OUT = and_(jobs.c.status.in_(HELD), jobs.c.lease_until.is_(None), jobs.c.spread)
 
-
 REST_S = 1.0  # workers take the next chunk within milliseconds; after this nobody is at it
 
 
@@ -48,6 +47,11 @@ class Unit:
 def deadline_passed() -> ColumnElement[bool]:
     """Whether a job's time is over, by the database's clock."""
     return jobs.c.deadline_at < database_time()
+
+
+def in_time() -> ColumnElement[bool]:
+    """Whether a job's time is not over; that of one whose is ends by the reaper, or by who holds it."""
+    return or_(jobs.c.deadline_at.is_(None), jobs.c.deadline_at > database_time())
 
 
 def must_go_on() -> ColumnElement[bool]:
@@ -81,7 +85,7 @@ def next_chunk_of(session: Session, owner: str) -> Row[*tuple[Any, ...]] | None:
             job_chunks.c.status == OPEN,
             job_chunks.c.owner == owner,
             jobs.c.status == JobStatus.RUNNING.value,
-            or_(jobs.c.deadline_at.is_(None), ~deadline_passed()),
+            in_time(),
         )
         .order_by(jobs.c.priority.desc(), job_chunks.c.job_id, job_chunks.c.number)
         .limit(1)

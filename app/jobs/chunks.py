@@ -16,10 +16,17 @@ from sqlalchemy import ColumnElement, delete, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
-from app.jobs.chunk_rows import DONE, HANDED_OUT, OPEN, RUNNING, Unit, deadline_passed, must_go_on
-from app.jobs.records import HELD, Claim, JobStatus, LeaseState
+from app.jobs.chunk_rows import DONE, HANDED_OUT, OPEN, RUNNING, Unit, must_go_on
+from app.jobs.records import HELD, Claim, LeaseState
 from app.jobs.rows import transition
-from app.jobs.store import claim_from_row, held_by, replace_checkpoint, save_progress
+from app.jobs.store import (
+    LEASE_COLUMNS,
+    claim_from_row,
+    held_by,
+    lease_state,
+    replace_checkpoint,
+    save_progress,
+)
 from app.jobs.turns import note_served
 from app.tables import job_checkpoints, job_chunks, jobs
 
@@ -165,17 +172,12 @@ def _held(chunk: ChunkClaim) -> tuple[ColumnElement[bool], ...]:
 
 def look_at_chunk(session: Session, chunk: ChunkClaim) -> LeaseState:
     """Learn whether to stop, writing nothing."""
-    row = session.execute(
-        select(jobs.c.status, deadline_passed().label("deadline_passed"))
-        .join(job_chunks, jobs.c.id == job_chunks.c.job_id)
-        .where(*_held(chunk))
-    ).one_or_none()
-    if row is None or row.status not in HELD:
-        return LeaseState(held=False)
-    return LeaseState(
-        held=True,
-        cancel_requested=row.status == JobStatus.CANCELLING.value,
-        deadline_passed=bool(row.deadline_passed),
+    return lease_state(
+        session.execute(
+            select(*LEASE_COLUMNS)
+            .join(job_chunks, jobs.c.id == job_chunks.c.job_id)
+            .where(*_held(chunk), jobs.c.status.in_(HELD))
+        ).one_or_none()
     )
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from sqlalchemy import Table, insert, select
+from sqlalchemy import insert, select
 
-from app.database import Session, database_time
+from app.database import Session, database_time, insert_new
 from app.documents import Document, Sealed, finite, sealed
 from app.errors import IdempotencyConflict
 from app.identifiers import new_identifier
@@ -138,17 +137,6 @@ def create_job(
     insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
     session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     return get_job(session, owner, job_id)
-
-
-def insert_new(session: Session, table: Table) -> Any:
-    """An INSERT that can leave existing rows alone, in the database's own words."""
-    if session.dialect.name == "sqlite":
-        from sqlalchemy.dialects import sqlite
-
-        return sqlite.insert(table)
-    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
-
-    return postgresql.insert(table)
 
 
 def _take_idempotency_key(

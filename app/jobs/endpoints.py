@@ -13,6 +13,7 @@ from app.audit.records import Action
 from app.audit.service import note
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
+from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
@@ -27,7 +28,7 @@ from app.schemas.execution import Label
 
 router = APIRouter(tags=["jobs"])
 
-JobId = Annotated[str, Path(pattern=r"^[A-Za-z0-9_]{1,64}$", examples=[EXAMPLE_ID])]
+JobId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_ID])]
 FILE_KINDS: dict[str, Any] = {
     # of a JSON file any value; of the others bytes
     kind.partition(";")[0]: {
@@ -80,10 +81,8 @@ def list_jobs(
     app: ServiceDep,
     owner: OwnerDep,
     wanted: JobFilterDep,
-    cursor: Annotated[
-        str | None, Query(pattern=r"^[A-Za-z0-9_]{1,64}$", description="From `next_cursor`.")
-    ] = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: CursorQuery = None,
+    limit: LimitQuery = 50,
 ) -> Response:
     """Your jobs, newest first, a page at a time."""
     with app.database.read() as session:

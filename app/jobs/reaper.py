@@ -5,6 +5,7 @@ Any number of reapers may run at once: each change is a compare-and-set on the f
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 from sqlalchemy import ColumnElement, Row, case, literal, or_, select, update
@@ -22,6 +23,8 @@ DEADLINE_GRACE_S = (
 )
 ROUND_LIMIT = 500  # rows per round: a round stays a short transaction whatever the backlog
 PUBLISH_LIMIT = 100  # messages per round
+
+log = logging.getLogger(__name__)
 
 
 def reap(
@@ -74,6 +77,13 @@ def reap(
         expired=tuple(done["expired"]),
         publish=(*done["requeued"], *spread.publish, *unheard),
     )
+
+
+def log_ends(report: ReapReport) -> None:
+    """Tell the operator of the jobs that a round has changed."""
+    for kind in ("requeued", "failed", "cancelled", "expired"):
+        for job_id in getattr(report, kind):
+            log.warning("reaper: job %s %s", job_id, kind)
 
 
 def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> list[Row[Any]]:

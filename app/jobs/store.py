@@ -18,11 +18,11 @@ from app.documents import Document, finite, packed, unpacked
 from app.errors import JobNotFound
 from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
-from app.jobs.chunk_rows import at_rest
+from app.jobs.chunk_rows import at_rest, deadline_passed, in_time
 from app.jobs.creation import create_job
 from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
 from app.jobs.rows import get_job, job_from_row, thin_events, transition
-from app.jobs.turns import may_start, note_served
+from app.jobs.turns import note_served
 from app.models.left_models import left_model
 from app.models.repository import insert_model
 from app.tables import job_checkpoints, job_requests, job_results, jobs
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 # the database's clock judges deadlines: a worker's may be an hour wrong
-LEASE_COLUMNS = (jobs.c.status, (jobs.c.deadline_at < database_time()).label("deadline_passed"))
+LEASE_COLUMNS = (jobs.c.status, deadline_passed().label("deadline_passed"))
 
 
 def load_request(session: Session, job_id: str) -> Document:
@@ -67,7 +67,7 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
         session,
         jobs.c.id == job_id,
         jobs.c.status == JobStatus.QUEUED.value,
-        may_start(),
+        in_time(),
         event="started",
         payload={"worker": worker_name},
         status=JobStatus.RUNNING.value,
@@ -108,7 +108,7 @@ def held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
 
 def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseState:
     """The heartbeat: push the lease out and learn whether to stop."""
-    return _lease_state(
+    return lease_state(
         session.execute(
             update(jobs)
             .where(*held_by(claim))
@@ -120,10 +120,11 @@ def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseS
 
 def look_at_lease(session: Session, claim: Claim) -> LeaseState:
     """Learn whether to stop, writing nothing: cheap enough to ask several times a second."""
-    return _lease_state(session.execute(select(*LEASE_COLUMNS).where(*held_by(claim))).one_or_none())
+    return lease_state(session.execute(select(*LEASE_COLUMNS).where(*held_by(claim))).one_or_none())
 
 
-def _lease_state(row: Row[Any] | None) -> LeaseState:
+def lease_state(row: Row[Any] | None) -> LeaseState:
+    """Turn a held job's `LEASE_COLUMNS` into the answer to a heartbeat; None when it is not held any more."""
     if row is None:
         return LeaseState(held=False)
     return LeaseState(

@@ -8,7 +8,7 @@ more urgent. Each question is a few steps down an index, whatever the length of 
 
 from __future__ import annotations
 
-from sqlalchemy import CTE, Column, ColumnElement, func, or_, select, union, update
+from sqlalchemy import CTE, Column, ColumnElement, func, select, union, update
 
 from app.database import Session, database_time
 from app.jobs.chunk_rows import (
@@ -17,6 +17,7 @@ from app.jobs.chunk_rows import (
     RUNNING,
     Unit,
     UnitKind,
+    in_time,
     next_chunk_of,
     next_spread_job,
 )
@@ -47,11 +48,6 @@ def running_of(owner: ColumnElement[str]) -> ColumnElement[int]:
     return held.where(~HANDED_OUT).scalar_subquery() + flown.scalar_subquery()
 
 
-def may_start() -> ColumnElement[bool]:
-    """Whether a queued job's time is not over: one that is waits for the reaper alone."""
-    return or_(jobs.c.deadline_at.is_(None), jobs.c.deadline_at > database_time())
-
-
 def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]:
     """Owners with waiting work in the order of their turns."""
     queued, flying = waiting_owners(), _owners(job_chunks.c.owner, job_chunks.c.status == OPEN, "flying")
@@ -75,7 +71,7 @@ def next_job_of(session: Session, owner: str, *, above: int | None = None) -> st
     urgent = () if above is None else (jobs.c.priority > above,)
     return session.execute(
         select(jobs.c.id)
-        .where(QUEUED, jobs.c.owner == owner, may_start(), *urgent)
+        .where(QUEUED, jobs.c.owner == owner, in_time(), *urgent)
         .order_by(jobs.c.priority.desc(), jobs.c.id)
         .limit(1)
         .with_for_update(skip_locked=True)  # SQLite has one writer at a time and knows no such words

@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.jobs.queue import Publisher
-from app.jobs.reaper import reap
+from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
 from app.jobs.retention import Keep, forget
 from app.settings import Settings
@@ -86,9 +86,7 @@ class Upkeep:
         """Make one round of the reaper."""
         with self._database.write() as session:
             report = reap(session, republish_after_s=self._republish_after_s)
-        for kind in ("requeued", "failed", "cancelled", "expired"):
-            for job_id in getattr(report, kind):
-                log.warning("reaper: job %s %s", job_id, kind)
+        log_ends(report)
         for job_id in report.publish:
             self._publisher.publish(job_id)
         return report

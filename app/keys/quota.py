@@ -7,11 +7,10 @@ locked until the commit. Both make charges of one key wait for one another, and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from sqlalchemy import case, func, select, update
 
-from app.database import Session, database_time
+from app.database import Session, database_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
 from app.keys.records import Quota, Usage
@@ -150,13 +149,10 @@ def _stored(session: Session, key_id: str) -> int:
 
 
 def _add_flights(session: Session, key_id: str, day: int, flights: int) -> None:
-    if session.dialect.name == "sqlite":
-        from sqlalchemy.dialects.sqlite import insert
-    else:
-        from sqlalchemy.dialects.postgresql import insert  # type: ignore[assignment]  # the same words
-    statement: Any = insert(key_usage).values(key_id=key_id, day=day, flights=flights)
     session.execute(
-        statement.on_conflict_do_update(
+        insert_new(session, key_usage)
+        .values(key_id=key_id, day=day, flights=flights)
+        .on_conflict_do_update(
             index_elements=[key_usage.c.key_id, key_usage.c.day],
             set_={"flights": key_usage.c.flights + flights},
         )

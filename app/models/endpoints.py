@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path
 
 from app.audit.records import Action
 from app.audit.service import note
 from app.errors import InvalidRequest, ModelNotFound
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
+from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
 from app.models import repository, service
 from app.models.schemas import IdentifiedModel, ModelPage
 
 router = APIRouter(tags=["models"])
-
-ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 
 
 @router.get(
@@ -30,8 +29,8 @@ ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 def list_models(
     app: ServiceDep,
     owner: OwnerDep,
-    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: CursorQuery = None,
+    limit: LimitQuery = 50,
 ) -> ModelPage:
     """Your identified models, newest first."""
     with app.database.read() as session:

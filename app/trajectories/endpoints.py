@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
@@ -22,6 +22,7 @@ from app.errors import (
 )
 from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
+from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.problems import documented, escaped
 from app.keys.records import Scope
 from app.trajectories import repository, service
@@ -34,7 +35,6 @@ from app.trajectories.schemas import (
 
 router = APIRouter(tags=["trajectories"])
 
-ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 MAX_NAME_BYTES = 1024
 FORM_SCHEMA: dict[str, Any] = {
     "title": "TrajectoryFile",
@@ -153,8 +153,8 @@ def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
 def list_trajectories(
     app: ServiceDep,
     owner: OwnerDep,
-    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: CursorQuery = None,
+    limit: LimitQuery = 50,
 ) -> TrajectoryPage:
     """Your uploaded flights without their rows, newest first."""
     with app.database.read() as session:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path
 
 from app.audit.records import Action
 from app.audit.service import note
@@ -19,6 +19,7 @@ from app.errors import (
 )
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.json_body import JsonRoute
+from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
 from app.webhooks import repository, service
@@ -36,7 +37,6 @@ from app.webhooks.schemas import (
 
 router = APIRouter(tags=["webhooks"], route_class=JsonRoute, dependencies=[demands(Scope.WEBHOOKS)])
 
-ID_PATTERN = r"^[A-Za-z0-9_]{1,64}$"
 WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
 
 
@@ -129,8 +129,8 @@ def list_webhook_deliveries(
     app: ServiceDep,
     owner: OwnerDep,
     webhook_id: WebhookId,
-    cursor: Annotated[str | None, Query(pattern=ID_PATTERN, description="From `next_cursor`.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: CursorQuery = None,
+    limit: LimitQuery = 50,
 ) -> DeliveryPage:
     """Messages with the fate of their last try, newest first."""
     with app.database.read() as session:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import Row, Table, delete, insert, select
+from sqlalchemy import Row, delete, insert, select
 
-from app.database import Session, database_time
+from app.database import Session, database_time, insert_new
 from app.documents import Document
 from app.identifiers import new_identifier
 from app.jobs.records import FINISHED, moment
@@ -45,9 +45,9 @@ def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
     for hook in hooks:
         if event in hook.events:
             session.execute(
-                insert_once(session, webhook_deliveries).values(
-                    new_delivery(hook.id, event, _ended(event, row), job_id=row.id)
-                )
+                insert_new(session, webhook_deliveries)
+                .values(new_delivery(hook.id, event, _ended(event, row), job_id=row.id))
+                .on_conflict_do_nothing()
             )
 
 
@@ -65,17 +65,6 @@ def new_delivery(webhook_id: str, event: str, payload: Document, *, job_id: str 
         "next_at": database_time(),
         "created_at": database_time(),
     }
-
-
-def insert_once(session: Session, table: Table) -> Any:
-    """An INSERT that leaves alone what is there already."""
-    if session.dialect.name == "sqlite":
-        from sqlalchemy.dialects import sqlite
-
-        return sqlite.insert(table).on_conflict_do_nothing()
-    from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
-
-    return postgresql.insert(table).on_conflict_do_nothing()
 
 
 def note_test(session: Session, webhook_id: str, at: float) -> str:

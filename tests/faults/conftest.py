@@ -35,14 +35,18 @@ def pair(request: pytest.FixtureRequest) -> str:
     return name
 
 
+def opened_rig(pair: str, request: pytest.FixtureRequest, folder: Path, root: Path) -> Rig:
+    """Database and broker of a pair."""
+    if pair == "sqlite-embedded":
+        return Rig(folder, root, f"sqlite:///{folder / 'jobs.sqlite3'}", redis.embedded(folder))
+    server = request.getfixturevalue("crashing_postgres")
+    return Rig(folder, root, server.new_database(), redis.plain(folder / "broker"))
+
+
 @pytest.fixture
 def rig(pair: str, request: pytest.FixtureRequest, tmp_path: Path, root: Path) -> Iterator[Rig]:
     """Broker and job store; the test starts workers and API. At its end every promise must have been kept."""
-    if pair == "sqlite-embedded":
-        rig = Rig(tmp_path, root, f"sqlite:///{tmp_path / 'jobs.sqlite3'}", redis.embedded(tmp_path))
-    else:
-        server = request.getfixturevalue("crashing_postgres")
-        rig = Rig(tmp_path, root, server.new_database(), redis.plain(tmp_path / "broker"))
+    rig = opened_rig(pair, request, tmp_path, root)
     try:
         yield rig
         rig.settle()

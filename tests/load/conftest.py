@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.conftest import crashing_postgres
+from tests.faults.conftest import crashing_postgres, opened_rig
 from tests.faults.rig import Rig
-from tests.servers import redis
 
 __all__ = ["crashing_postgres"]
 
@@ -26,11 +25,7 @@ def pair(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def rig(pair: str, request: pytest.FixtureRequest, tmp_path: Path, root: Path) -> Iterator[Rig]:
     """Broker and job store; the test starts workers and API."""
-    if pair == "sqlite-embedded":
-        rig = Rig(tmp_path, root, f"sqlite:///{tmp_path / 'jobs.sqlite3'}", redis.embedded(tmp_path))
-    else:
-        server = request.getfixturevalue("crashing_postgres")
-        rig = Rig(tmp_path, root, server.new_database(), redis.plain(tmp_path / "broker"))
+    rig = opened_rig(pair, request, tmp_path, root)
     try:
         yield rig
     finally:

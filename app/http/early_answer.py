@@ -1,0 +1,34 @@
+"""Answers to requests that no route has seen, given while their bodies may still be on the way."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+
+from starlette.types import Receive, Scope, Send
+
+from app.errors import ServiceError
+from app.http.problems import MEDIA_TYPE, problem_document
+
+LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
+
+
+async def answer_early(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer with a problem document; what the client still sends is thrown away for `LINGER_S`."""
+    content = json.dumps(problem_document(error, scope["path"])).encode()
+    headers = {
+        "Content-Type": MEDIA_TYPE,
+        "Content-Length": str(len(content)),
+        **error.headers,
+        "Connection": "close",
+    }
+    start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+    await send({"type": "http.response.start", "status": error.status, "headers": start})
+    await send({"type": "http.response.body", "body": content, "more_body": True})
+    try:
+        async with asyncio.timeout(LINGER_S):
+            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
+                pass
+    except TimeoutError:
+        pass
+    await send({"type": "http.response.body", "body": b"", "more_body": False})
