@@ -92,6 +92,8 @@ class GuardedConfig(uvicorn.Config):
             timeout_keep_alive=KEEP_ALIVE_S,
             server_header=False,
             access_log=False,
+            # a kept connection would hand the trace of its last request to the next one
+            reset_contextvars=True,
             **others,
         )
         self.limits = limits

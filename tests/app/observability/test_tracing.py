@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,19 +22,30 @@ pytest.importorskip("opentelemetry.sdk")
 CALLER = "00-0123456789abcdef0123456789abcdef-0123456789abcdef-01"
 
 
+SPAN_END_S = 5.0  # a request's span ends a moment after its answer went out
+
+
 @pytest.fixture
-def spans() -> Iterator[Callable[[], dict[str, Any]]]:
-    """Trace in this process; gives the ended spans by name."""
+def spans() -> Iterator[Callable[[str], dict[str, Any]]]:
+    """Trace in this process; gives the ended spans by name once the one named is among them."""
     from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
     exporter = InMemorySpanExporter()
     assert tracing.start_tracing("test", "", exporter=exporter)
-    yield lambda: {span.name: span for span in exporter.get_finished_spans()}
+
+    def ended(name: str) -> dict[str, Any]:
+        deadline = time.monotonic() + SPAN_END_S
+        while name not in (found := {span.name: span for span in exporter.get_finished_spans()}):
+            assert time.monotonic() < deadline, f"no span {name!r} among {sorted(found)}"
+            time.sleep(0.01)
+        return found
+
+    yield ended
     tracing.stop_tracing()
 
 
 def test_one_trace_from_the_caller_to_the_attempt(
-    service: RunningService, spans: Callable[[], dict[str, Any]]
+    service: RunningService, spans: Callable[[str], dict[str, Any]]
 ) -> None:
     """The caller's trace goes on in the request, on the job's row, and in the worker's attempt and phases."""
     answer = service.client.post("/identify", json=identify_document(), headers={"traceparent": CALLER})
@@ -44,7 +57,7 @@ def test_one_trace_from_the_caller_to_the_attempt(
         for phase in ("swarm", "swarm", "polish"):
             phases.note(phase)
         phases.close()
-    found = spans()
+    found = spans("POST /identify")
     request = found["POST /identify"]
     assert f"{request.context.trace_id:032x}" == CALLER.split("-")[1]
     assert f"{request.parent.span_id:016x}" == CALLER.split("-")[2]
@@ -63,22 +76,33 @@ def test_one_trace_from_the_caller_to_the_attempt(
     assert found["swarm"].end_time <= found["polish"].start_time + 1_000_000  # ns; two readings of two clocks
 
 
-def test_a_server_error_is_marked(service: RunningService, spans: Callable[[], dict[str, Any]]) -> None:
+def test_a_server_error_is_marked(service: RunningService, spans: Callable[[str], dict[str, Any]]) -> None:
     """Refusals are no errors of the service's; a span of its own begins a trace of its own."""
     service.client.get("/jobs/job_none")
-    span = spans()["GET /jobs/{job_id}"]
+    span = spans("GET /jobs/{job_id}")["GET /jobs/{job_id}"]
     assert span.attributes["http.response.status_code"] == 404
     assert span.status.is_ok
     assert span.parent is None
 
 
+def test_requests_of_one_connection_share_no_trace(
+    service: RunningService, spans: Callable[[str], dict[str, Any]]
+) -> None:
+    """A kept connection whose reading was held up within a traced request hands its trace to no later one."""
+    padded = json.dumps(identify_document()).encode() + b" " * 400_000  # more than the server reads ahead
+    headers = {"traceparent": CALLER, "content-type": "application/json"}
+    assert service.client.post("/identify", content=padded, headers=headers).status_code == 202
+    service.client.get("/jobs")
+    assert spans("GET /jobs")["GET /jobs"].parent is None
+
+
 @pytest.mark.parametrize("nonsense", ["", "00-0-0-00", "ff" * 40, "00-" + "0" * 32 + "-" + "0" * 16 + "-01"])
 def test_nonsense_from_callers_begins_a_new_trace(
-    service: RunningService, spans: Callable[[], dict[str, Any]], nonsense: str
+    service: RunningService, spans: Callable[[str], dict[str, Any]], nonsense: str
 ) -> None:
     """A trace context that is none is left alone."""
     service.client.get("/jobs", headers={"traceparent": nonsense})
-    assert spans()["GET /jobs"].parent is None
+    assert spans("GET /jobs")["GET /jobs"].parent is None
 
 
 def test_off_means_off(service: RunningService) -> None:
