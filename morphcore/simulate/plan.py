@@ -25,6 +25,7 @@ STEP_S = 0.005
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
+ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: their flight rolls by less than that
 RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at its end
 
 
@@ -88,7 +89,8 @@ class FlightPlan:
     """Everything about a flight that does not depend on the parameters.
 
     angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)
-    for the kernels. wind_N : (steps + 1, 3) m/s.
+    for the kernels. wind_N : (steps + 1, 3) m/s. halved : the s surfaces are one half of a symmetric aircraft
+    whose other half does the same.
     """
 
     grid: TimeGrid
@@ -98,6 +100,11 @@ class FlightPlan:
     hinges: Array
     wind_N: Array
     table: OperatorTable
+    halved: bool = False
+
+    def flown(self, model: ChainModel) -> ChainModel:
+        """What flies this plan: the model, or one half of it."""
+        return _flown(model, halved=self.halved)
 
     @property
     def mean_accelerations(self) -> Array:
@@ -129,10 +136,18 @@ def flight_plan(
     *,
     air_velocity_N: Callable[[Array], Array] | None = None,
     node_spacing_rad: float = NODE_SPACING_RAD,
+    may_halve: bool = False,
 ) -> FlightPlan:
-    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at)."""
+    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at).
+
+    With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
+    plan is one for half of it: ``plan.flown(model)`` is what flies it, if both wings have the same
+    parameters.
+    """
     times = grid.times_s
     motions = [schedule.motion(times) for schedule in schedules]
+    if may_halve and air_velocity_N is None:
+        model, motions = _halved(model, motions)
     angles = np.stack([motion.angle for motion in motions], axis=1)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
     table = _operator_table(model, angles * _hinged(model.aircraft), node_spacing_rad)
@@ -147,12 +162,18 @@ class CommonPath:
     their links alone may share them too.
 
     low_rad, high_rad : the range. matrices, strips : as of ``OperatorTable``, at equal distances over it.
+    halved : as of ``FlightPlan``.
     """
 
     low_rad: float
     high_rad: float
     matrices: Array
     strips: Array
+    halved: bool
+
+    def flown(self, model: ChainModel) -> ChainModel:
+        """What flies the plans: the model, or one half of it."""
+        return _flown(model, halved=self.halved)
 
     def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
         """Prepare a flight in which all hinges follow one schedule.
@@ -172,13 +193,21 @@ class CommonPath:
             )
         position = share * (self.matrices.shape[0] - 1)
         table = OperatorTable(self.matrices, self.strips, position)
-        return _plan(model, grid, [motion] * len(model.aircraft.surfaces), table)
+        flown = self.flown(model)
+        return _plan(flown, grid, [motion] * len(flown.aircraft.surfaces), table)
 
 
 def common_path(
-    model: ChainModel, low_rad: float, high_rad: float, node_spacing_rad: float = NODE_SPACING_RAD
+    model: ChainModel,
+    low_rad: float,
+    high_rad: float,
+    node_spacing_rad: float = NODE_SPACING_RAD,
+    *,
+    may_halve: bool = False,
 ) -> CommonPath:
-    """Tabulate the lattice for all hinges alike between two different angles."""
+    """Tabulate the lattice for all hinges alike between two angles; ``may_halve`` as of ``flight_plan``."""
+    if may_halve and model.half is not None:
+        model = model.half
     mach = model.flight.mach or 0.0
     count = max(4, int(np.ceil((high_rad - low_rad) / node_spacing_rad)) + 1)
     rows = np.outer(np.linspace(low_rad, high_rad, count), _hinged(model.aircraft))
@@ -188,7 +217,13 @@ def common_path(
         high_rad,
         np.stack([item.matrix for item in operators]),
         np.stack([item.strips for item in operators]),
+        bool(model.lattice.images),
     )
+
+
+def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
+    half = model.half if halved else None
+    return model if half is None else half
 
 
 def _plan(
@@ -211,7 +246,24 @@ def _plan(
     )
     if wind_N is None:
         wind_N = np.tile(model.flight.wind_N, (grid.steps + 1, 1))
-    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, table)
+    halved = bool(model.lattice.images)
+    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, table, halved)
+
+
+def _halved(model: ChainModel, motions: list[HingeMotion]) -> tuple[ChainModel, list[HingeMotion]]:
+    """The half of an aircraft that does what the other one does, and its motions; all if there is none."""
+    mirror, half = model.mirror, model.half
+    if mirror is None or half is None:
+        return model, motions
+    hinged = _hinged(model.aircraft)
+    differences = [
+        np.abs(motions[own].angle - motions[image].angle).max()
+        for own, image in zip(mirror.own, mirror.image, strict=True)
+        if hinged[own]
+    ]
+    if max(differences, default=0.0) > ALIKE_RAD:
+        return model, motions
+    return half, [motions[own] for own in mirror.own]
 
 
 def hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:

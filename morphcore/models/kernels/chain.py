@@ -6,7 +6,15 @@ accelerations from root to tips. The rows are those of layout.py.
 
 from __future__ import annotations
 
-from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
+from morphcore.aero.kernels.loads import (
+    LINK0,
+    LINKS,
+    PAIRED,
+    lagged_motion,
+    lane_product,
+    link_wrench,
+    strip_inputs,
+)
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
@@ -28,7 +36,14 @@ from morphcore.models.kernels.layout import (
     link_rows_of_scratch,
     state_rows,
 )
-from morphcore.multibody.kernels.articulated import LINK_ROWS, accumulate, add_bias, add_link, solve_base
+from morphcore.multibody.kernels.articulated import (
+    LINK_ROWS,
+    accumulate,
+    accumulate_pair,
+    add_bias,
+    add_link,
+    solve_base,
+)
 from morphcore.multibody.kernels.gimbal import (
     JOINT_ROWS,
     carry_through_gimbal,
@@ -228,7 +243,10 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
             if k == 0:
                 add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
                 carry_through_hinge(lanes, hinges[s], inertia, carried)
-                accumulate(lanes, inertia, carried, base_inertia, base_force)
+                if surfaces[s, PAIRED]:
+                    accumulate_pair(lanes, inertia, carried, base_inertia, base_force)
+                else:
+                    accumulate(lanes, inertia, carried, base_inertia, base_force)
             else:
                 last_joint -= 1
                 c = 3 * last_joint

@@ -224,6 +224,28 @@ def accumulate(lanes, inertia, force, total_inertia, total_force):
 
 
 @kernel
+def accumulate_pair(lanes, inertia, force, total_inertia, total_force):
+    """Add a surface's articulated inertia and force, and those of its mirror image, to the fuselage's.
+
+    Under reflection about the x-z plane the components (wx, wz, v_y) change their sign: products of two that
+    do, or of two that do not, are doubled, the others cancel.
+    """
+    if (
+        not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+        or not_in_lanes(total_inertia, lanes)
+        or not_in_lanes(total_force, lanes)
+    ):
+        return
+    for i in (0, 2, 3, 5, 7, 9, 11, 13, 15, 17, 18, 20):
+        for l in range(len(lanes)):
+            total_inertia[i, l] += 2.0 * inertia[i, l]
+    for i in (1, 3, 5):
+        for l in range(len(lanes)):
+            total_force[i, l] += 2.0 * force[i, l]
+
+
+@kernel
 def solve_base(lanes, inertia, force, factor, acceleration):
     """Base acceleration from I a = -p, by L D L^T; ``factor`` holds 21 scratch rows."""
     if (
