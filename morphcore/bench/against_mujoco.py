@@ -66,7 +66,7 @@ def against_mujoco(bench: Bench) -> Figures:
     ours = {"single": (guess, OUTPUT_S / alone), "batch": (swarm, OUTPUT_S / together)}
     times: dict[str, list[float]] = {name: [] for name in (*able, *ours)}
     use_threads(1)
-    for _ in range(bench.effort.singles):
+    for _ in range(bench.effort.rounds):
         for name, step_s in able.items():
             flights[name].reset(step_s)
             times[name].append(bench.timed(lambda: flights[name].fly(step_s)))  # noqa: B023 - called at once

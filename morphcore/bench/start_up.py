@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -84,28 +85,33 @@ def _sample_document(sample: Trajectory) -> dict[str, Any]:
 
 
 class CompileTimes(event.Listener):
-    """Computing time of compilations by the kernel that Python called, with all that it calls."""
+    """Computing time of compilations, s.
+
+    by_entry : by the kernel that Python called, with all that it calls. own : by kernel, without what other
+    kernels took that it calls.
+    """
 
     def __init__(self) -> None:
         self.by_entry: dict[str, float] = {}
-        self._open: list[float] = []
+        self.own: dict[str, float] = {}
+        self._open: list[list[float]] = []  # begin, and what the kernels inside took
 
     def on_start(self, event: Any) -> None:  # noqa: ARG002
         """A compilation begins."""
-        self._open.append(time.process_time())
+        self._open.append([time.process_time(), 0.0])
 
     def on_end(self, event: Any) -> None:
-        """It ends; only one that no other waits for is written down."""
-        begin = self._open.pop()
-        if not self._open:
-            kernel = event.data["dispatcher"].py_func
-            lanes = f", {len(event.data['args'][0])} lanes" if _in_lanes(event.data["args"]) else ""
-            name = f"{kernel.__module__}.{kernel.__name__}{lanes}"
-            self.by_entry[name] = self.by_entry.get(name, 0.0) + time.process_time() - begin
-
-
-def _in_lanes(arguments: Any) -> bool:
-    return bool(arguments) and hasattr(arguments[0], "count")
+        """It ends; what no other waits for is an entry's."""
+        begin, inside = self._open.pop()
+        taken = time.process_time() - begin
+        kernel, arguments = event.data["dispatcher"].py_func, event.data["args"]
+        lanes = f", {len(arguments[0])} lanes" if arguments and hasattr(arguments[0], "count") else ""
+        name = f"{kernel.__module__}.{kernel.__name__}{lanes}"
+        self.own[name] = self.own.get(name, 0.0) + taken - inside
+        if self._open:
+            self._open[-1][1] += taken
+        else:
+            self.by_entry[name] = self.by_entry.get(name, 0.0) + taken
 
 
 def compile_in_this_process() -> Figures:
@@ -114,9 +120,13 @@ def compile_in_this_process() -> Figures:
     begin, wall = time.process_time(), time.perf_counter()
     with event.install_listener(COMPILING, times):
         warm_up()
-    slowest = sorted(times.by_entry.items(), key=lambda item: -item[1])
     return {
         "computing_s": time.process_time() - begin,
         "wall_s": time.perf_counter() - wall,
-        "by_kernel_s": dict(slowest),
+        "by_entry_s": _dearest_first(times.by_entry),
+        "own_s": _dearest_first(times.own),
     }
+
+
+def _dearest_first(times: Mapping[str, float]) -> dict[str, float]:
+    return dict(sorted(times.items(), key=lambda item: -item[1]))

@@ -157,7 +157,7 @@ def _compilation(figures: Figures) -> Iterator[Line]:
     found = figures["compilation"]
     value = f"{found['computing_s']:.0f} s"
     yield Line("compiling all kernels anew", value, _must(figures, "compilation/computing_s", unit=" s"))
-    for kernel, seconds in list(found["by_kernel_s"].items())[:5]:
+    for kernel, seconds in list(found["by_entry_s"].items())[:5]:
         yield Line(f"of it {kernel.removeprefix('morphcore.')}", f"{seconds:.1f} s")
 
 
