@@ -53,8 +53,10 @@ def _batch(figures: Figures) -> Iterator[Line]:
 
 def _threads(figures: Figures) -> Iterator[Line]:
     threads = figures["threads"]
-    for count, seconds in threads["fly_s"].items():
-        yield Line(f"the same swarm on {count} thread{'s' * (count != '1')}", f"{seconds:.3g} s")
+    for count, seconds in threads["generation_s"].items():
+        yield Line(
+            f"a whole generation of the swarm on {count} thread{'s' * (count != '1')}", f"{seconds:.3g} s"
+        )
     path = "threads/speed_up"
     yield Line(
         "speed-up of the threads, by the wall",
@@ -66,6 +68,7 @@ def _threads(figures: Figures) -> Iterator[Line]:
         value = f"{threads['speed_up_by_computing_time']:.2f} x"
         yield Line("by computing time, if nobody else used the cores", value, _must(figures, path, unit=" x"))
         yield Line("of it on the calling thread alone", f"{100 * threads['serial_share']:.2g} %")
+        yield Line("computing on two threads over that on one", f"{threads['work_growth']:.3g} x")
 
 
 def _kernel(figures: Figures) -> Iterator[Line]:
