@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,16 @@ def test_every_section_has_lines_and_a_wrong_name_is_told() -> None:
     with pytest.raises(InvalidInput, match="no benchmark 'speed'") as caught:
         run_benchmarks(effort=SMALLEST, sections=["speed"])
     assert "mujoco" in str(caught.value.hint)
+
+
+def test_without_mujoco_the_comparison_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is skipped with a word, in the table too, and no bound on it is judged."""
+    monkeypatch.setitem(sys.modules, "morphcore.bench.mujoco_tree", None)
+    figures = run_benchmarks(effort=SMALLEST, sections=["mujoco"])
+    assert "`oracles`" in figures["mujoco"]["skipped"]
+    (line,) = benchmark_table(figures)
+    assert line.value.startswith("skipped: MuJoCo is not installed")
+    assert figures["requirements"] == []
 
 
 @pytest.mark.parametrize(("value", "holds"), [(3000.0, True), (2999.9, False), (float("nan"), False)])
