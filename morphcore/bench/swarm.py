@@ -29,6 +29,7 @@ def benchmark_swarm(model: ChainModel, particles: int, seed: int = SWARM_SEED) -
 def flown(clock: Clock, model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim) -> float:
     """Fly a batch through a plan, attitudes recorded as in an identification; gives its time, s."""
     begin = clock()
+    model = case.plan.flown(model)
     constants = lane_constants(model, batch, case.plan.grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
     state = trimmed_state(model, batch, case.plan, found)
