@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 Air = Callable[[Array], Array]
 
 LAG_COLUMN = 10  # of a link's constants: decay and weight of the slow lag state, then of the fast one
+MOST_MOMENTS = 64  # kept; each holds a lattice operator
 SAME_TIME_S = 1e-9  # times closer than that are one
 
 
@@ -76,6 +77,8 @@ class Course:
         """Everything at one time."""
         key = round(time_s / SAME_TIME_S)
         if key not in self._known:
+            if len(self._known) == MOST_MOMENTS:
+                del self._known[next(iter(self._known))]  # the oldest: steppers look back a step at most
             self._known[key] = self._moment(time_s)
         return self._known[key]
 

@@ -35,7 +35,7 @@ def linear_euler(stages: Stages, h: float, steps: int) -> Iterator[Array]:
 
 
 def w_method(alpha: Rows, gamma: Rows, diagonal: float, weights: Sequence[float]) -> Stepper:
-    """A W-method: Rosenbrock's with any matrix for the Jacobian; Steihaug & Wolfbrandt (1979, Math. Comput. 33).
+    """A W-method: Rosenbrock's with any matrix A; Steihaug & Wolfbrandt (1979, Math. Comput. 33).
 
         k_i = F(u + h sum alpha_ij k_j) + h A (diagonal k_i + sum gamma_ij k_j),   u' = u + h sum b_i k_i
 
@@ -105,7 +105,7 @@ def generalized_alpha(radius: float, iterations: int) -> Stepper:
 
 
 def sbdf2(stages: Stages, h: float, steps: int) -> Iterator[Array]:
-    """The implicit-explicit two-step formula SBDF; Ascher, Ruuth & Wetton (1995, SIAM J. Numer. Anal. 32), section 2.
+    """The implicit-explicit two-step formula SBDF; Ascher, Ruuth & Wetton (1995, SIAM J. Numer. Anal. 32).
 
     Its explicit part reads one extrapolated state instead of extrapolating rates: one stage. ROS2 starts.
     """

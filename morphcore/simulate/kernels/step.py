@@ -7,10 +7,10 @@ before (h: the step, k: slopes in the middles of steps, A: a matrix that stands 
     k = F(t + h/2, U) + h A (9 k - 15 k1 + 6 k2) / 16
     u' = u + h k
 
-7/8 and -3/8 integrate the line through k1 and k2 over half a step, so U is right to O(h^3). The weights on A
-and their first moment leave k right to O(h^2) for *any* A, and with the midpoint rule the step is of second
-order. It belongs to the W-methods that remember the slopes of former steps (Podhaisky, Schmitt & Weiner 2002,
-Appl. Numer. Math. 42, the two-step W-methods).
+7/8 and -3/8 integrate the line through k1 and k2 over half a step, so U is right to O(h^3). The weights on
+A sum to nothing and so leave k right to O(h^2) for *any* A; with the midpoint rule the step is of second
+order. It belongs to the W-methods that remember the slopes of former steps (Podhaisky, Schmitt & Weiner
+2002, Appl. Numer. Math. 42, the two-step W-methods).
 
 Where A is exact, it acts on u + h/2 k1 + GAMMA h (k - k1). At infinite stiffness both roots of that recursion
 are -1/3 with GAMMA = 9/16, the least there is: fast joints die out; and an oscillation of whatever frequency
