@@ -40,7 +40,7 @@ Figures = dict[str, Any]
 Clock = Callable[[], float]
 
 GOAL_RAD = 1e-4
-PARTS = (1, 2, 3, 4, 6, 8, 12, 16)  # steps in the time between two rows of a sample
+PARTS = (1, 2, 3, 4, 6)  # steps in the time between two rows of a sample
 QUICK_PARTS = (1, 2, 4)
 QUICK = (SHIPPED, FORMER)
 FINE_PARTS = 40  # of the reference, which is extrapolated from these and half as many: right to 1e-9 rad

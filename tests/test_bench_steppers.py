@@ -60,10 +60,13 @@ def test_compiled_step_is_the_stepper_in_python(swinging):
 
 @pytest.mark.parametrize("name", STEPPERS)
 def test_every_candidate_converges_with_its_order(swinging, name):
-    """Halving the step divides the error by two to its order at least, to the same attitude for all."""
+    """Halving the step divides the error by two to its order at least, to the same attitude for all.
+
+    Below 1e-8 rad stands what a course's lattice, looked up linearly along the path, adds.
+    """
     fine = attitude(swinging, "ROS2, extrapolated 1-2", 0.001)
     coarse, half = (np.abs(attitude(swinging, name, step) - fine).max() for step in (0.005, 0.0025))
-    assert coarse / half > 0.85 * 2.0 ** ORDER.get(name, 2)
+    assert coarse / half > 0.85 * 2.0 ** ORDER.get(name, 2) or coarse < 1e-8
     assert coarse < 2e-3
 
 
