@@ -21,7 +21,7 @@ from morphcore.simulate.schedule import HingeMotion, Schedule
 Array = NDArray[np.float64]
 
 # holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
-STEP_S = 0.005
+STEP_S = 0.01
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
@@ -42,6 +42,18 @@ class TimeGrid:
     def times_s(self) -> Array:
         """(steps + 1,) times."""
         return np.asarray(self.start_s + self.step_s * np.arange(self.steps + 1), dtype=np.float64)
+
+    @property
+    def middles_s(self) -> Array:
+        """(steps,) times in the middles of the steps."""
+        return np.asarray(self.start_s + self.step_s * (np.arange(self.steps) + 0.5), dtype=np.float64)
+
+    @property
+    def halves_s(self) -> Array:
+        """(2 steps + 1,) times and middles, in turn."""
+        times = np.empty(2 * self.steps + 1)
+        times[::2], times[1::2] = self.times_s, self.middles_s
+        return times
 
 
 def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
@@ -85,12 +97,25 @@ class OperatorTable:
 
 
 @dataclass(frozen=True)
+class Middles:
+    """What the stages of a flight read, in the middles of its steps.
+
+    hinges : (steps, s, HINGE_ROWS) for the kernels. wind_N : (steps, 3) m/s. table : the plan's own, at the
+    positions of the middles.
+    """
+
+    hinges: Array
+    wind_N: Array
+    table: OperatorTable
+
+
+@dataclass(frozen=True)
 class FlightPlan:
     """Everything about a flight that does not depend on the parameters.
 
     angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)
-    for the kernels. wind_N : (steps + 1, 3) m/s. halved : the s surfaces are one half of a symmetric aircraft
-    whose other half does the same.
+    for the kernels. wind_N : (steps + 1, 3) m/s. middle : hinges, wind and lattices between the grid times.
+    halved : the s surfaces are one half of a symmetric aircraft whose other half does the same.
     """
 
     grid: TimeGrid
@@ -100,6 +125,7 @@ class FlightPlan:
     hinges: Array
     wind_N: Array
     table: OperatorTable
+    middle: Middles
     halved: bool = False
 
     def flown(self, model: ChainModel) -> ChainModel:
@@ -144,7 +170,7 @@ def flight_plan(
     plan is one for half of it: ``plan.flown(model)`` is what flies it, if both wings have the same
     parameters.
     """
-    times = grid.times_s
+    times = grid.halves_s
     motions = [schedule.motion(times) for schedule in schedules]
     if may_halve and air_velocity_N is None:
         model, motions = _halved(model, motions)
@@ -182,7 +208,7 @@ class CommonPath:
         ------
         InvalidInput : the schedule leaves the range.
         """
-        motion = schedule.motion(grid.times_s)
+        motion = schedule.motion(grid.halves_s)
         width = self.high_rad - self.low_rad
         share = (motion.angle - self.low_rad) / width
         if share.min() < -RANGE_SLACK or share.max() > 1.0 + RANGE_SLACK:
@@ -233,6 +259,7 @@ def _plan(
     table: OperatorTable,
     wind_N: Array | None = None,
 ) -> FlightPlan:
+    """A plan of motions, table and wind at the grid's times and middles in turn."""
     hinges = np.stack(
         [
             hinge_rows(surface, motion.angle, motion.rate)
@@ -241,13 +268,25 @@ def _plan(
         axis=1,
     )
     angles, rates, accelerations = (
-        np.stack([getattr(motion, name) for motion in motions], axis=1)
+        np.stack([getattr(motion, name)[::2] for motion in motions], axis=1)
         for name in ("angle", "rate", "acceleration")
     )
     if wind_N is None:
-        wind_N = np.tile(model.flight.wind_N, (grid.steps + 1, 1))
-    halved = bool(model.lattice.images)
-    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, table, halved)
+        wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
+    own, between = (
+        replace(table, position=table.position[part]) for part in (slice(0, None, 2), slice(1, None, 2))
+    )
+    return FlightPlan(
+        grid,
+        angles,
+        rates,
+        accelerations,
+        hinges[::2],
+        wind_N[::2],
+        own,
+        Middles(np.ascontiguousarray(hinges[1::2]), np.ascontiguousarray(wind_N[1::2]), between),
+        halved=bool(model.lattice.images),
+    )
 
 
 def _halved(model: ChainModel, motions: list[HingeMotion]) -> tuple[ChainModel, list[HingeMotion]]:
