@@ -8,6 +8,7 @@ place does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class MovingLattice:
         self.parts = lattice_parts(table, riders, core, density, mach)
         self.at = lattice_place(self.parts, riders.sections, table.corners)
         self._rings = table.rings
-        self._factors: tuple[Array, Array] | None = None
+        self._factors: Any = None  # of `lu_factor`, once asked for in this place
 
     def place(self, R_BS: Array, x_B: Array, stream_B: Array) -> None:
         """Put the lattice on its sections: R_BS (k, 3, 3) to B, x_B (k, 3) m; wake along stream_B (3,)."""
@@ -80,7 +81,7 @@ class MovingLattice:
     def section_forces(self, lagged: Array, twists: Array, wind_B: Array) -> Array:
         """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,)."""
         out = np.empty((self.at.R_BS.shape[0], 6))
-        section_forces(self.parts, self.at, lagged, twists, wind_B, out)
+        section_forces(self.parts, self.at, lagged, twists, wind_B, 0.0, out)
         return out
 
 

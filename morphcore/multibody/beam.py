@@ -209,8 +209,8 @@ def node_forces(
     """
     out = np.zeros((beams.nodes, 6))
     failed = beam_forces(
-        beams.ends, beams.rest, beams.stiffness, beams.damping, beams.mass, GAUSS, GAUSS_SERIES, poses.R, poses.x, V, A,
-        gravity_N, work.v, work.poses, work.strains, work.rates, out,
+        beams.ends, beams.rest, beams.stiffness, beams.damping, beams.mass, GAUSS, GAUSS_SERIES,
+        poses.R, poses.x, V, A, gravity_N, work.v, work.poses, work.strains, work.rates, out,
     )  # fmt: skip
     if failed >= 0:
         raise BeamTurnedTooFar(f"element {failed} is bent too far", hint="use more elements")

@@ -2,8 +2,8 @@
 
 Brüls, Cardona & Arnold (2012): velocities and positions advance with an algorithmic acceleration ``a`` that
 averages the true one, A; positions move by the exponential of the increment in body axes. Each step's
-equations hold at its end to `kernels.flexible_step.TOLERANCE`, air loads included: the lattice stands where the step's predictor
-puts it (third order off), its circulations, lag and forces follow every iteration.
+equations hold at its end to `kernels.flexible_step.TOLERANCE`, air loads included: the lattice stands where
+the step's predictor puts it (third order off), its circulations, lag and forces follow every iteration.
 """
 
 from __future__ import annotations
@@ -33,15 +33,16 @@ from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
     INVERSE_WANTED,
+    MATRIX_WANTED,
     MOST_ITERATIONS,
     RECORD,
+    STILL,
     Path,
     Rule,
     Scratch,
     State,
     Structure,
     fly_steps,
-    record,
 )
 from morphcore.simulate.kernels.roots import (
     follow_fuselage,
@@ -177,7 +178,6 @@ class FlexibleFlight:
             stiffness=beams.stiffness,
             damping=beams.damping,
             mass=beams.mass,
-            mass12=beams.mass12,
             bodies=beams.bodies,
             inertia=beams.inertia,
             gauss=GAUSS,
@@ -247,8 +247,8 @@ class Stepper:
         """Newmark's beta."""
         return 0.25 * (self.gamma + 0.5) ** 2
 
-    def coefficients(self, lag_time: Array) -> Rule:
-        """As the kernels take them; lag_time (2, r), s."""
+    def coefficients(self, lag_time: Array, still: float = STILL) -> Rule:
+        """As the kernels take them; lag_time (2, r), s; still : of the induced velocities, 0 for exact."""
         h = self.step_s
         share = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         z = h / lag_time
@@ -261,6 +261,7 @@ class Stepper:
             of_average=self.alpha_m / (1.0 - self.alpha_m),
             of_rate=share * h * self.gamma,
             of_pose=share * h * h * self.beta,
+            still=still,
             decay=np.exp(-z),
             mean=-np.expm1(-z) / z,
         )
@@ -275,7 +276,7 @@ class FlexibleRun:
 
     Attributes
     ----------
-    records : (steps + 1, RECORD + s) of the steps flown, `kernels.flexible_step.record`. row : the last one.
+    records : (steps + 1, RECORD + s) of the steps flown, `kernels.flexible_step`. row : the last one.
     """
 
     def __init__(
@@ -307,11 +308,13 @@ class FlexibleRun:
             acting=np.zeros(rings),
             inverse=np.zeros((rings, rings)),  # none yet: the first step asks for one
             small=np.zeros((2, 6, 6)),
+            pace=np.zeros(1),
             turn=np.zeros((7, 3)),
             vector=np.zeros((3, 6)),
         )
         self.records: Array = np.zeros((grid.steps + 1, RECORD + model.roots.size))
-        record(self._structure, self._state, self.records[0])
+        flight.structure(state.poses, state.V, state.A)
+        self._form_matrix()
 
     def fly_to(self, row: int) -> None:
         """Fly on to a row of the grid.
@@ -320,17 +323,25 @@ class FlexibleRun:
         ------
         FlightDiverged : the flight leaves what the model can follow.
         """
-        renewed = -1
+        inverted = -1
         while self.row < row:
             self.row, status = fly_steps(
                 self._structure, self._flight.lattice.parts, self._flight.lattice.at, self._path, self._rule,
                 self._state, self._trial, self._scratch, self.records, self.row, row,
+                self._formed == self.row,
             )  # fmt: skip
-            if status == FLOWN:
-                continue
-            if status != INVERSE_WANTED or renewed == self.row or not self._renew_inverse():
+            if status == MATRIX_WANTED:
+                self._form_matrix()
+            elif status == INVERSE_WANTED and inverted != self.row and self._renew_inverse():
+                inverted = self.row
+            elif status != FLOWN:
                 raise FlightDiverged(time_s=float(self.grid.times_s[self.row]))
-            renewed = self.row
+
+    def _form_matrix(self) -> None:
+        """Factor the iteration matrix at the last strains that were asked for."""
+        flight, rule = self._flight, self._rule
+        factor(flight.model.beams, flight.work, 1.0, rule.of_rate, rule.of_pose)
+        self._formed = self.row
 
     def _renew_inverse(self) -> bool:
         """Invert the influence where the lattice is now; False: it cannot be."""

@@ -10,7 +10,7 @@ from morphcore.jit import entry_kernel, kernel
 
 @entry_kernel
 def place_lattice(parts, place, stream_B):
-    """Put the lattice on the sections in ``place``, wake along stream_B (3,), and form its normal influence."""
+    """Put the lattice on the sections of ``place``, wake along stream_B (3,); its normal influence."""
     place_points(parts, place, stream_B)
     normal_influence(parts, place)
 
@@ -56,13 +56,14 @@ def blocked_flow(parts, place, twists, wind_B, out):
 
 
 @entry_kernel
-def section_forces(parts, place, gamma, twists, wind_B, out):
+def section_forces(parts, place, gamma, twists, wind_B, still, out):
     """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,).
 
     Each bound edge bears density * gamma * velocity x edge, half on each end corner; its middle moves with
-    the mean of its corners. Profile drag of each strip is along the velocity of its middle.
+    the mean of its corners. Profile drag of each strip is along the velocity of its middle. ``still`` : of
+    `induced_velocity`, 0 for exact.
     """
-    induced_velocity(parts, place, gamma)
+    induced_velocity(parts, place, gamma, still)
     for c in range(place.corners.shape[0]):
         k = parts.corner[c]
         rider_velocity(place.R_BS[k], twists[k], parts.corner_arm[c], place.corner_velocity[c])

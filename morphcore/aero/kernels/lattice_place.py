@@ -9,7 +9,7 @@ lets the compiler take them by vectors.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from morphcore.aero.kernels.vortex import (
     smoothed_leg_strength,
     smoothed_segment_strength,
 )
-from morphcore.jit import kernel
+from morphcore.jit import inlined, kernel
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -62,8 +62,8 @@ class LatticePlace(NamedTuple):
     R_BS, x_B : (k, 3, 3), (k, 3) of the sections. corners : (c, 3); stretched : (c, 3) by Goethert's rule.
     points : (3, r + e) control points and the edges' middles, stretched. distances : (c, r + e). normals,
     tilted : (3, r). influence : (r + 1, r) normal velocity, ring by point. row : (r + e,). strength :
-    (e + l,). induced : (3, e). corner_velocity, control_velocity, drag_velocity : (c, 3), (r, 3),
-    (3,). force : (c, 3).
+    (e + l,). induced : (3, e), of the circulations summed (r,). corner_velocity, control_velocity,
+    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3).
     """
 
     R_BS: Array
@@ -79,6 +79,7 @@ class LatticePlace(NamedTuple):
     row: Array
     strength: Array
     induced: Array
+    summed: Array
     corner_velocity: Array
     control_velocity: Array
     drag_velocity: Array
@@ -102,6 +103,7 @@ def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePl
         row=np.zeros(rings + edges),
         strength=np.zeros(parts.line_start.size),
         induced=np.zeros((3, edges)),
+        summed=np.zeros(rings),
         corner_velocity=np.zeros((corners, 3)),
         control_velocity=np.zeros((rings, 3)),
         drag_velocity=np.zeros(3),
@@ -109,7 +111,7 @@ def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePl
     )
 
 
-@kernel
+@inlined
 def place_points(parts, place, stream_B):
     """Corners, normals, points and distances of a lattice whose sections are placed; wake along stream_B."""
     rings, edges = place.normals.shape[1], place.induced.shape[1]
@@ -126,6 +128,7 @@ def place_points(parts, place, stream_B):
         place.stretched[c, 1] = y + along * u[1]
         place.stretched[c, 2] = z + along * u[2]
     for p in range(rings):
+        place.summed[p] = inf  # of another place
         control = place.control_velocity[p]  # not yet in use
         _ride(place.R_BS[parts.control[p]], place.x_B[parts.control[p]], parts.control_arm[p], control)
         along = more * (control[0] * u[0] + control[1] * u[1] + control[2] * u[2])
@@ -141,20 +144,25 @@ def place_points(parts, place, stream_B):
             place.points[i, rings + e] = 0.5 * (place.stretched[a, i] + place.stretched[b, i])
     x, y, z = place.points[0], place.points[1], place.points[2]
     for c in range(place.corners.shape[0]):
-        px, py, pz = place.stretched[c, 0], place.stretched[c, 1], place.stretched[c, 2]
-        distance = place.distances[c]
-        for p in range(rings + edges):
-            dx, dy, dz = px - x[p], py - y[p], pz - z[p]
-            distance[p] = sqrt(dx * dx + dy * dy + dz * dz)
+        _distances(
+            x, y, z, place.stretched[c, 0], place.stretched[c, 1], place.stretched[c, 2], place.distances[c]
+        )
 
 
 @kernel
+def _distances(x, y, z, px, py, pz, out):
+    for p in range(out.size):
+        dx, dy, dz = px - x[p], py - y[p], pz - z[p]
+        out[p] = sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@inlined
 def _ride(R, x, arm, out):
     for i in range(3):
         out[i] = x[i] + R[i, 0] * arm[0] + R[i, 1] * arm[1] + R[i, 2] * arm[2]
 
 
-@kernel
+@inlined
 def _normal(corners, of_ring, side, out, p):
     """Unit normal of a ring on the lifting side, across the diagonals, as `vlm.panel_normals`."""
     root_front, tip_front, root_aft, tip_aft = of_ring[0], of_ring[1], of_ring[2], of_ring[3]
@@ -170,100 +178,142 @@ def _normal(corners, of_ring, side, out, p):
 
 
 @kernel
-def _line(parts, place, line, first, count, out):
-    """Factors k of one line's velocity -k (e x a) at ``count`` points from ``first`` on."""
-    start, end = parts.line_start[line], parts.line_end[line]
-    px, py, pz = place.stretched[start, 0], place.stretched[start, 1], place.stretched[start, 2]
-    x = place.points[0, first : first + count]
-    y = place.points[1, first : first + count]
-    z = place.points[2, first : first + count]
-    from_start = place.distances[start, first : first + count]
-    core = parts.line_core[line]
-    if end < 0:
-        ex, ey, ez = place.wake[0], place.wake[1], place.wake[2]
-        if parts.smoothed:
-            for p in range(count):
-                ax, ay, az = px - x[p], py - y[p], pz - z[p]
-                cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-                along, cross2 = ax * ex + ay * ey + az * ez, cx * cx + cy * cy + cz * cz
-                out[p] = smoothed_leg_strength(from_start[p], along, cross2, core)
-        else:
-            for p in range(count):
-                ax, ay, az = px - x[p], py - y[p], pz - z[p]
-                cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-                along, cross2 = ax * ex + ay * ey + az * ez, cx * cx + cy * cy + cz * cz
-                out[p] = leg_strength(from_start[p], along, cross2, core)
-        return ex, ey, ez
-    from_end = place.distances[end, first : first + count]
-    ex, ey, ez = (
-        place.stretched[end, 0] - px,
-        place.stretched[end, 1] - py,
-        place.stretched[end, 2] - pz,
-    )
+def _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, smoothed, out):
+    """Factors k of a segment's velocity -k (e x a) at points; the law is chosen outside the loops."""
     length2 = ex * ex + ey * ey + ez * ez
-    if parts.smoothed:
-        for p in range(count):
+    if smoothed:
+        for p in range(out.size):
             ax, ay, az = px - x[p], py - y[p], pz - z[p]
             cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
             dot = ax * (ax + ex) + ay * (ay + ey) + az * (az + ez)
             cross2 = cx * cx + cy * cy + cz * cz
             out[p] = smoothed_segment_strength(from_start[p], from_end[p], dot, cross2, length2, core)
     else:
-        for p in range(count):
+        for p in range(out.size):
             ax, ay, az = px - x[p], py - y[p], pz - z[p]
             cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
             dot = ax * (ax + ex) + ay * (ay + ey) + az * (az + ez)
             cross2 = cx * cx + cy * cy + cz * cz
             out[p] = segment_strength(from_start[p], from_end[p], dot, cross2, length2, core)
-    return ex, ey, ez
 
 
 @kernel
+def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, smoothed, out):
+    """Factors k of a leg's velocity -k (u x a) at points."""
+    if smoothed:
+        for p in range(out.size):
+            ax, ay, az = px - x[p], py - y[p], pz - z[p]
+            cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
+            along, cross2 = ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz
+            out[p] = smoothed_leg_strength(from_start[p], along, cross2, core)
+    else:
+        for p in range(out.size):
+            ax, ay, az = px - x[p], py - y[p], pz - z[p]
+            cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
+            along, cross2 = ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz
+            out[p] = leg_strength(from_start[p], along, cross2, core)
+
+
+@kernel
+def _project(x, y, z, px, py, pz, ex, ey, ez, nx, ny, nz, k):
+    """k times (e x a) . n, in place of k."""
+    for p in range(k.size):
+        ax, ay, az = px - x[p], py - y[p], pz - z[p]
+        cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
+        k[p] = k[p] * (cx * nx[p] + cy * ny[p] + cz * nz[p])
+
+
+@kernel
+def _add(factor, k, out):
+    for p in range(k.size):
+        out[p] += factor * k[p]
+
+
+@kernel
+def _subtract_turned(k, y, z, py, pz, ey, ez, out):
+    """One component of k (e x a) off ``out``."""
+    for p in range(k.size):
+        out[p] -= k[p] * (ey * (pz - z[p]) - ez * (py - y[p]))
+
+
+@inlined
+def _along(parts, place, line):
+    """Start (3) and edge or direction (3) of a line."""
+    start, end = parts.line_start[line], parts.line_end[line]
+    px, py, pz = place.stretched[start, 0], place.stretched[start, 1], place.stretched[start, 2]
+    if end < 0:
+        return px, py, pz, place.wake[0], place.wake[1], place.wake[2]
+    ex, ey, ez = place.stretched[end, 0] - px, place.stretched[end, 1] - py, place.stretched[end, 2] - pz
+    return px, py, pz, ex, ey, ez
+
+
+@inlined
 def normal_influence(parts, place):
     """Fill in the normal velocity at every control point of every ring of unit circulation, wake included."""
     rings = place.normals.shape[1]
     place.influence[:] = 0.0
-    k = place.row
-    x, y, z = place.points[0], place.points[1], place.points[2]
+    k = place.row[:rings]
+    x, y, z = place.points[0, :rings], place.points[1, :rings], place.points[2, :rings]
     # the stretched velocity is w + (stretch - 1) u u.w, its normal part w . tilted
     nx, ny, nz = place.tilted[0], place.tilted[1], place.tilted[2]
     for line in range(parts.line_start.size):
-        ex, ey, ez = _line(parts, place, line, 0, rings, k)
-        start = parts.line_start[line]
-        px, py, pz = place.stretched[start, 0], place.stretched[start, 1], place.stretched[start, 2]
-        for p in range(rings):
-            ax, ay, az = px - x[p], py - y[p], pz - z[p]
-            cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-            k[p] = k[p] * (cx * nx[p] + cy * ny[p] + cz * nz[p])
-        along, against = place.influence[parts.line_plus[line]], place.influence[parts.line_minus[line]]
-        for p in range(rings):
-            along[p] -= k[p]
-        for p in range(rings):
-            against[p] += k[p]
+        px, py, pz, ex, ey, ez = _along(parts, place, line)
+        core, end = parts.line_core[line], parts.line_end[line]
+        from_start = place.distances[parts.line_start[line], :rings]
+        if end < 0:
+            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
+        else:
+            from_end = place.distances[end, :rings]
+            _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
+        _project(x, y, z, px, py, pz, ex, ey, ez, nx, ny, nz, k)
+        _add(-1.0, k, place.influence[parts.line_plus[line]])
+        _add(1.0, k, place.influence[parts.line_minus[line]])
 
 
-@kernel
-def induced_velocity(parts, place, gamma):
-    """Fill in the velocity (3, e) at the edges' middles that rings of circulation gamma (r,) induce."""
-    rings, edges = place.normals.shape[1], place.induced.shape[1]
-    place.induced[:] = 0.0
-    k = place.row
-    x, y, z = place.points[0, rings:], place.points[1, rings:], place.points[2, rings:]
-    u, v, w = place.induced[0], place.induced[1], place.induced[2]
+@inlined
+def induced_velocity(parts, place, gamma, still):
+    """Fill in the lines' net circulations and the velocity (3, e) that they induce at the edges' middles.
+
+    gamma : (r,) of the rings. The velocity stays as it is where no circulation has moved by more than
+    ``still`` of the largest since it was summed in this place.
+    """
+    rings = place.normals.shape[1]
+    largest, moved = 0.0, 0.0
+    for q in range(rings):
+        largest = max(largest, abs(gamma[q]))
+        moved = max(moved, abs(gamma[q] - place.summed[q]))
     for line in range(parts.line_start.size):
         plus, minus = parts.line_plus[line], parts.line_minus[line]
         strength = (gamma[plus] if plus < rings else 0.0) - (gamma[minus] if minus < rings else 0.0)
         place.strength[line] = strength
-        ex, ey, ez = _line(parts, place, line, rings, edges, k)
-        start = parts.line_start[line]
-        px, py, pz = place.stretched[start, 0], place.stretched[start, 1], place.stretched[start, 2]
+    if not moved <= still * largest:
+        _sum_induced(parts, place, gamma)
+
+
+@inlined
+def _sum_induced(parts, place, gamma):
+    """Sum the velocity (3, e) at the edges' middles line by line."""
+    rings, edges = place.normals.shape[1], place.induced.shape[1]
+    for q in range(rings):
+        place.summed[q] = gamma[q]
+    place.induced[:] = 0.0
+    k = place.row[:edges]
+    x, y, z = place.points[0, rings:], place.points[1, rings:], place.points[2, rings:]
+    u, v, w = place.induced[0], place.induced[1], place.induced[2]
+    for line in range(parts.line_start.size):
+        strength = place.strength[line]
+        px, py, pz, ex, ey, ez = _along(parts, place, line)
+        core, end = parts.line_core[line], parts.line_end[line]
+        from_start = place.distances[parts.line_start[line], rings:]
+        if end < 0:
+            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
+        else:
+            from_end = place.distances[end, rings:]
+            _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
         ex, ey, ez = strength * ex, strength * ey, strength * ez
-        for p in range(edges):
-            u[p] -= k[p] * (ey * (pz - z[p]) - ez * (py - y[p]))
-        for p in range(edges):
-            v[p] -= k[p] * (ez * (px - x[p]) - ex * (pz - z[p]))
-        for p in range(edges):
-            w[p] -= k[p] * (ex * (py - y[p]) - ey * (px - x[p]))
+        _subtract_turned(k, y, z, py, pz, ey, ez, u)
+        _subtract_turned(k, z, x, pz, px, ez, ex, v)
+        _subtract_turned(k, x, y, px, py, ex, ey, w)
     more = parts.stretch - 1.0
     if more > 0.0:
         for p in range(edges):
@@ -278,7 +328,7 @@ def refine(influence, inverse, right, residual, tolerance, most, gamma):
     """Improve gamma (r,) until ``influence`` (r + 1, r), ring by point, times it gives right (r,).
 
     With the inverse (r, r) of a like matrix, point by ring: what is left goes down by the part by which both
-    differ. Returns whether it became smaller than ``tolerance`` times the largest of right in ``most`` passes.
+    differ. Returns whether that came below ``tolerance`` times the largest of right in ``most`` passes.
     """
     rings = right.size
     scale = 0.0

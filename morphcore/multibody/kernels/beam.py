@@ -66,8 +66,8 @@ def beam_forces(
     """Add to out (n, 6) the forces that internal strain, inertia and weight ask of the nodes, in node axes.
 
     In motion without other loads they vanish. ``gauss``, ``series`` : the Gauss points and their
-    `helix.helix_series`. ``strains`` and ``rates`` (e, 6) return d and its rate; ``v`` (VECTOR_SCRATCH, 6) and
-    ``poses`` (2, 4, 3) are scratch. Returns the number of the first element that turned by more than
+    `helix.helix_series`. ``strains`` and ``rates`` (e, 6) return d and its rate; ``v`` (VECTOR_SCRATCH, 6)
+    and ``poses`` (2, 4, 3) are scratch. Returns the number of the first element that turned by more than
     `se3.LARGEST_ANGLE`, else -1.
 
     Weight is inertia against free fall: translation with the acceleration of gravity is rigid, and rigid
@@ -202,8 +202,8 @@ def place_sections(ends, fractions, series, elements, strains, R, x, v, poses, R
     """Poses of sections for strains as given, and the maps between their twists and the nodes'.
 
     Section k lies at ``fractions[k]`` of ``elements[k]``, with its `helix.helix_series` in series[k]. R_out
-    (k, 3, 3), x_out (k, 3); blocks (k, 2, 3, 3) of `helix.helix_map`. An element below zero, -1 - node, stands
-    for that node itself.
+    (k, 3, 3), x_out (k, 3); blocks (k, 2, 3, 3) of `helix.helix_map`. An element below zero, -1 - node,
+    stands for that node itself.
     """
     for k in range(elements.size):
         element = elements[k]

@@ -2,10 +2,13 @@
 
 Generalised-alpha on SE(3) as `simulate.flexible` describes it. A step starts from the acceleration carried on
 straight from the last two, places the lattice and the sections' maps there (third order off), and iterates on
-the whole equations of its end, air loads included, with the structure's factored matrix: the air enters it
-not, and it is formed anew only when the iteration slows down. The circulations follow by refinement with the
-inverse of an earlier influence matrix, to `REFINED`; a step that does not get there hands back its matrix for
-a new inverse and is flown again.
+the whole equations of its end, air loads included, with the structure's factored matrix, the air's part left
+out; a step in which the iteration slows down asks for a new matrix and is flown again. The circulations
+follow by refinement with the inverse of an earlier influence matrix, to `REFINED`; a step that does not get
+there hands back its matrix for a new inverse and is flown again.
+
+The parts of a step are pasted into the one kernel: compiled apart, each would be optimised once more with all
+that it calls.
 """
 
 from __future__ import annotations
@@ -19,13 +22,11 @@ from numpy.typing import NDArray
 from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, section_forces
 from morphcore.aero.kernels.lattice_place import refine
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
-from morphcore.jit import entry_kernel, kernel
+from morphcore.jit import entry_kernel, inlined
 from morphcore.multibody.kernels.beam import (
     beam_forces,
-    beam_tangents,
     body_forces,
     condense,
-    eliminate,
     invert,
     multiply,
     place_sections,
@@ -45,11 +46,12 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
-SLOW = 0.1  # of the last iteration's change: then the matrix is formed anew
+SLOW = 0.1  # of the last iteration's change: then the matrix may be too old
 MOST_ITERATIONS = 50
 REFINED = 1e-12  # what is left of the flow through the panels, of its largest before
+STILL = 1e-7  # of the largest circulation: smaller changes within a step leave the induced velocities
 MOST_PASSES = 8  # of refinement; beyond, the inverse is renewed
-FLOWN, INVERSE_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3
+FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
 RECORD = 18  # numbers of a record before the tips: R_NB row by row, twist, position of the fuselage
 
 
@@ -61,7 +63,6 @@ class Structure(NamedTuple):
     stiffness: Array
     damping: Array
     mass: Array
-    mass12: Array
     bodies: IntArray
     inertia: Array
     gauss: Array
@@ -97,7 +98,7 @@ class Path(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Coefficients of the stepper; decay, mean : (2, r) of the lag's exact step."""
+    """Coefficients of the stepper; decay, mean : (2, r) of the lag's exact step; still : `STILL`."""
 
     step_s: float
     gamma: float
@@ -107,12 +108,13 @@ class Rule(NamedTuple):
     of_average: float
     of_rate: float
     of_pose: float
+    still: float
     decay: Array
     mean: Array
 
 
 class State(NamedTuple):
-    """State arrays that move in time; A_before : (n, 6) twist rates one step earlier. Else `FlexibleState`."""
+    """State arrays that move in time, as `FlexibleState`; A_before : (n, 6) twist rates one step earlier."""
 
     R: Array
     x: Array
@@ -137,29 +139,31 @@ class Scratch(NamedTuple):
     acting: Array
     inverse: Array
     small: Array
+    pace: Array
     turn: Array
     vector: Array
 
 
 @entry_kernel
-def fly_steps(structure, parts, place, path, rule, state, trial, scratch, records, first, last):
+def fly_steps(structure, parts, place, path, rule, state, trial, scratch, records, first, last, fresh):
     """Fly from row ``first`` to row ``last`` of the path; states move in place.
 
-    ``trial`` is a State of scratch. records (k, RECORD + tips) gets a row for every step flown. Returns the
-    row reached and what stopped the flight there.
+    ``trial`` is a State of scratch. records (k, RECORD + tips) gets a row for every time. ``fresh`` : the
+    matrix was formed in the first step itself. Returns the row reached and what stopped the flight there.
     """
-    status, fresh = FLOWN, True
-    for row in range(first + 1, last + 1):
-        status = _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh)
+    row = first
+    while True:
+        _record(structure, state, records[row])
+        if row == last:
+            return row, FLOWN
+        status = _step(structure, parts, place, path, rule, state, trial, scratch, row + 1, fresh)
         if status != FLOWN:
-            return row - 1, status
-        fresh = False
-        record(structure, state, records[row])
-    return last, status
+            return row, status
+        row, fresh = row + 1, False
 
 
-@entry_kernel
-def record(structure, state, out):
+@inlined
+def _record(structure, state, out):
     """Attitude, twist and position of the fuselage and the tips' z in B from their roots."""
     for i in range(3):
         for j in range(3):
@@ -175,7 +179,7 @@ def record(structure, state, out):
         out[RECORD + s] = total
 
 
-@kernel
+@inlined
 def _moved(structure, path, rule, state, trial, scratch, row):
     """Where the trial's twist rates lead at the end of a step; the roots' part of them is set."""
     h = rule.step_s
@@ -207,7 +211,7 @@ def _moved(structure, path, rule, state, trial, scratch, row):
     )
 
 
-@kernel
+@inlined
 def _place(structure, parts, place, trial, scratch, wind_B):
     """Put sections and lattice where the trial is."""
     place_sections(
@@ -240,40 +244,7 @@ def _place(structure, parts, place, trial, scratch, wind_B):
     place_lattice(parts, place, stream_B)
 
 
-@kernel
-def _factor(structure, rule):
-    """Factor the structure's iteration matrix at its last strains."""
-    beam_tangents(
-        structure.rest,
-        structure.stiffness,
-        structure.damping,
-        structure.mass12,
-        structure.strains,
-        structure.rates,
-        1.0,
-        rule.of_rate,
-        rule.of_pose,
-        structure.v,
-        structure.m,
-        structure.tangents,
-    )
-    structure.diagonals[:] = 0.0
-    for k in range(structure.bodies.size):
-        node = structure.bodies[k]
-        for i in range(6):
-            for j in range(6):
-                structure.diagonals[node, i, j] += structure.inertia[k, i, j]
-    eliminate(
-        structure.ends,
-        structure.tangents,
-        structure.diagonals,
-        structure.inverses,
-        structure.couplings,
-        structure.m,
-    )
-
-
-@kernel
+@inlined
 def _tie_roots(structure, path, small, row):
     """small[0] = the inverse of what fuselage and all chains weigh at the reference point."""
     for i in range(6):
@@ -291,7 +262,7 @@ def _tie_roots(structure, path, small, row):
     invert(small[1], small[0])
 
 
-@kernel
+@inlined
 def _solve(structure, path, small, right, vector, row):
     """Solution of the factored matrix, the roots tied to the fuselage, in place of ``right`` (n, 6)."""
     condense(structure.ends, structure.tangents, structure.inverses, structure.v, right)
@@ -304,9 +275,13 @@ def _solve(structure, path, small, right, vector, row):
     substitute(structure.ends, structure.couplings, right)
 
 
-@kernel
-def _step(structure, parts, place, path, rule, state, trial, scratch, row, form):
-    """One step to ``row``, with a new factored matrix if ``form``; returns a status, FLOWN if it was made."""
+@inlined
+def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh):
+    """One step to ``row``; returns a status, FLOWN if it was made.
+
+    A matrix is given up when the iteration slows to twice the pace that one ``fresh`` in its step has: what
+    the air does to it, no new matrix would mend.
+    """
     nodes, rings = state.A.shape[0], state.circulation.size
     wind_B, right = scratch.vector[0], scratch.right
     for n in range(nodes):
@@ -315,8 +290,12 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
     for q in range(rings):
         trial.circulation[q] = state.circulation[q]
     tied, last, arrived = False, math.inf, False
+    status = LOST
     for iteration in range(MOST_ITERATIONS):
         _moved(structure, path, rule, state, trial, scratch, row)
+        if arrived:
+            status = FLOWN
+            break
         right[:] = 0.0
         failed = beam_forces(
             structure.ends,
@@ -338,7 +317,8 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
             right,
         )
         if failed >= 0:
-            return BENT_TOO_FAR
+            status = BENT_TOO_FAR
+            break
         body_forces(
             structure.bodies,
             structure.inertia,
@@ -368,7 +348,8 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
             MOST_PASSES,
             trial.circulation,
         ):
-            return INVERSE_WANTED
+            status = INVERSE_WANTED
+            break
         for q in range(rings):
             before, after = state.circulation[q], trial.circulation[q]
             total = (1.0 - JONES_A1 - JONES_A2) * after
@@ -378,7 +359,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
                 trial.lag[k, q] = lag
                 total += (JONES_A1 if k == 0 else JONES_A2) * lag
             scratch.acting[q] = total
-        section_forces(parts, place, scratch.acting, scratch.twists, wind_B, scratch.forces)
+        section_forces(parts, place, scratch.acting, scratch.twists, wind_B, rule.still, scratch.forces)
         subtract_forces(
             structure.ends, structure.section_element, structure.section_blocks, scratch.forces, right
         )
@@ -387,9 +368,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
         for n in range(nodes):
             for i in range(6):
                 right[n, i] = -right[n, i]
-        if form:
-            _factor(structure, rule)
-        if form or not tied:
+        if not tied:
             _tie_roots(structure, path, scratch.small, row)
             tied = True
         _solve(structure, path, scratch.small, right, scratch.vector[2:], row)
@@ -401,19 +380,20 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, form)
                 largest = size if not size <= largest else largest  # NaN wins
         largest *= rule.step_s
         if not largest < math.inf:
-            return LOST
-        arrived = largest < TOLERANCE
-        if arrived:
             break
-        form, last = largest > SLOW * last, largest
-    if not arrived:
-        return LOST
-    _moved(structure, path, rule, state, trial, scratch, row)
-    _accept(state, trial)
-    return FLOWN
+        arrived = largest < TOLERANCE
+        pace, last = largest / last, largest
+        if fresh:
+            scratch.pace[0] = max(scratch.pace[0], pace) if iteration > 1 else pace
+        elif pace > max(SLOW, 2.0 * scratch.pace[0]) and not arrived:
+            status = MATRIX_WANTED
+            break
+    if status == FLOWN:
+        _accept(state, trial)
+    return status
 
 
-@kernel
+@inlined
 def _accept(state, trial):
     """Make the trial the state."""
     for n in range(state.A.shape[0]):
