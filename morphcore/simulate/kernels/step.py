@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from morphcore.jit import kernel
+from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.chain import accelerations, base_rates, clear
 from morphcore.models.kernels.layout import (
@@ -40,6 +40,16 @@ from morphcore.multibody.kernels.articulated import LINK_ROWS
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
+# Joint rows are taken three at a time, a gimbal's: a lane loop as short as one row's arithmetic is unrolled by
+# the compiler before it could become vector instructions. Rows that need no lanes are taken as one long vector.
+
+
+@inlined
+def spring(k, c, q, v, g):
+    """Force -k (q + g v) - c v of a joint and the diagonal g c + g^2 k that the implicit step adds."""
+    return -k * (q + g * v) - c * v, g * (c + g * k)
+
+
 @kernel
 def joint_forces(lanes, stiffness, damping, q, v, step, tau, added):
     """First stage: tau = -K (q + gamma h v) - C v and the added diagonal gamma h C + (gamma h)^2 K."""
@@ -53,11 +63,20 @@ def joint_forces(lanes, stiffness, damping, q, v, step, tau, added):
     if not_in_lanes(tau, lanes) or not_in_lanes(added, lanes):
         return
     g = GAMMA * step
-    for i in range(q.shape[0]):
+    for i in range(0, q.shape[0], 3):
+        k, c, p, w = stiffness[i : i + 3], damping[i : i + 3], q[i : i + 3], v[i : i + 3]
+        t, a = tau[i : i + 3], added[i : i + 3]
         for l in range(len(lanes)):
-            k, c = stiffness[i, l], damping[i, l]
-            added[i, l] = g * (c + g * k)
-            tau[i, l] = -k * (q[i, l] + g * v[i, l]) - c * v[i, l]
+            t[0, l], a[0, l] = spring(k[0, l], c[0, l], p[0, l], w[0, l], g)
+            t[1, l], a[1, l] = spring(k[1, l], c[1, l], p[1, l], w[1, l], g)
+            t[2, l], a[2, l] = spring(k[2, l], c[2, l], p[2, l], w[2, l], g)
+
+
+@inlined
+def second_spring(k, c, q, v, rate, acceleration, g):
+    """What ``spring`` gives for the second stage's y = k2 + 2 k1 (see the module's head)."""
+    added = g * (c + g * k)
+    return -k * (q + g * (v - 2.0 * rate)) - c * v + 2.0 * added * acceleration, added
 
 
 @kernel
@@ -78,32 +97,27 @@ def second_joint_forces(lanes, stiffness, damping, q, v, angle_rate, acceleratio
     ):
         return
     g = GAMMA * step
-    for i in range(q.shape[0]):
+    for i in range(0, q.shape[0], 3):
+        k, c, p, w = stiffness[i : i + 3], damping[i : i + 3], q[i : i + 3], v[i : i + 3]
+        r, b = angle_rate[i : i + 3], acceleration[i : i + 3]
+        t, a = tau[i : i + 3], added[i : i + 3]
         for l in range(len(lanes)):
-            k, c = stiffness[i, l], damping[i, l]
-            added[i, l] = g * (c + g * k)
-            remainder = v[i, l] - 2.0 * angle_rate[i, l]
-            tau[i, l] = -k * (q[i, l] + g * remainder) - c * v[i, l] + 2.0 * added[i, l] * acceleration[i, l]
+            t[0, l], a[0, l] = second_spring(k[0, l], c[0, l], p[0, l], w[0, l], r[0, l], b[0, l], g)
+            t[1, l], a[1, l] = second_spring(k[1, l], c[1, l], p[1, l], w[1, l], r[1, l], b[1, l], g)
+            t[2, l], a[2, l] = second_spring(k[2, l], c[2, l], p[2, l], w[2, l], r[2, l], b[2, l], g)
 
 
 @kernel
-def joint_rates(lanes, v, acceleration, step, first, second, angle_rate, velocity_rate):
+def joint_rates(lanes, v, acceleration, step, first, second, angle_rate, velocity_rate):  # noqa: ARG001
     """Rates of a stage's joint angles and velocities, less twice k1's (``first``, ``second``)."""
-    if (
-        not_in_lanes(v, lanes)
-        or not_in_lanes(acceleration, lanes)
-        or not_in_lanes(first, lanes)
-        or not_in_lanes(second, lanes)
-    ):
-        return
-    if not_in_lanes(angle_rate, lanes) or not_in_lanes(velocity_rate, lanes):
-        return
     g = GAMMA * step
-    for i in range(v.shape[0]):
-        for l in range(len(lanes)):
-            rate = acceleration[i, l] - 2.0 * second[i, l]
-            velocity_rate[i, l] = rate
-            angle_rate[i, l] = v[i, l] - 2.0 * first[i, l] + g * rate
+    speeds, own = v.reshape(-1), acceleration.reshape(-1)
+    angle1, speed1 = first.reshape(-1), second.reshape(-1)
+    angle2, speed2 = angle_rate.reshape(-1), velocity_rate.reshape(-1)
+    for i in range(speeds.size):
+        rate = own[i] - 2.0 * speed1[i]
+        speed2[i] = rate
+        angle2[i] = speeds[i] - 2.0 * angle1[i] + g * rate
 
 
 @kernel
@@ -129,23 +143,29 @@ def lag_advance(lanes, link, twist, slow, fast, previous):
 
 
 @kernel
-def advance(lanes, state, first, step, out):
+def advance(state, first, step, out):
     """out = state + h k1."""
-    if not_in_lanes(state, lanes) or not_in_lanes(first, lanes) or not_in_lanes(out, lanes):
-        return
-    for i in range(state.shape[0]):
-        for l in range(len(lanes)):
-            out[i, l] = state[i, l] + step * first[i, l]
+    before, rate, after = state.reshape(-1), first.reshape(-1), out.reshape(-1)
+    for i in range(before.size):
+        after[i] = before[i] + step * rate[i]
+
+
+@kernel
+def copy(rows, out):
+    """out = rows."""
+    source, target = rows.reshape(-1), out.reshape(-1)
+    for i in range(source.size):
+        target[i] = source[i]
 
 
 @kernel
 def finish(lanes, state, first, second, step):
     """state += h (3/2 k1 + 1/2 k2), with the attitude quaternion made unit again."""
-    if not_in_lanes(state, lanes) or not_in_lanes(first, lanes) or not_in_lanes(second, lanes):
+    if not_in_lanes(state, lanes):
         return
-    for i in range(state.shape[0]):
-        for l in range(len(lanes)):
-            state[i, l] += step * (1.5 * first[i, l] + 0.5 * second[i, l])
+    after, rate1, rate2 = state.reshape(-1), first.reshape(-1), second.reshape(-1)
+    for i in range(after.size):
+        after[i] += step * (1.5 * rate1[i] + 0.5 * rate2[i])
     for l in range(len(lanes)):
         a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
         scale = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
@@ -218,7 +238,7 @@ def step_block(
         surfaces, ranges, shared, strips[0], hinges[0], hinge_accelerations, operators[0], wind[0], constants,
         state, second, step, first, scratch, inputs, outputs,
     )  # fmt: skip
-    advance(lanes, state[:s_slow], first[:s_slow], step, middle[:s_slow])
+    advance(state[:s_slow], first[:s_slow], step, middle[:s_slow])
     for link in range(links):
         slow, fast, previous = s_slow + 3 * link, s_fast + 3 * link, s_previous + 3 * link
         lag_advance(
@@ -226,7 +246,7 @@ def step_block(
             scratch[S_FREE + 6 * link : S_FREE + 6 * link + 6],
             state[slow : slow + 3], state[fast : fast + 3], state[previous : previous + 3],
         )  # fmt: skip
-    advance(lanes, state[s_slow:], state[s_slow:], 0.0, middle[s_slow:])
+    copy(state[s_slow:], middle[s_slow:])
     second_joint_forces(
         lanes,
         stiffness,
