@@ -293,7 +293,9 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
         is_touched = weight > 0.0
         touched[:, mine, 0] = np.argmax(is_touched, axis=1)
         touched[:, mine, 1] = part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)
-    links[:, :, 10:] = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
+    weights = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
+    weights[..., ::2] **= 0.5  # the step carries the lag states by halves
+    links[:, :, 10:] = weights
     values = np.zeros((particles, LINKS_C))
     values[:, AERO_C : AERO_C + AERO_ROWS] = np.stack([batch.lift_factor, batch.centre_shift], axis=1)
     rows = np.concatenate([values, links.reshape(particles, -1), *stiffness, *damping, *overlap], axis=1)

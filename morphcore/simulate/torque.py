@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 LAG_DECAYS = (
     10,
     12,
-)  # columns of a link's constants: decay of the slow and of the fast lag, each before its weight
+)  # rows of a link's constants: decay of the slow and the fast lag, each before its weight
 CHUNK = 64  # instants: bounds the memory of the interpolated operators
 
 
@@ -58,12 +58,11 @@ def closing_half_a_step(model: ChainModel, rows: Array) -> Array:
     """A block's constants (rows, width) whose lag weights are those of half the step they were laid out for.
 
     The lag states of a state stem from the stage in the middle of the step before (see kernels/step.py). With
-    decay e and weight w = 1 - (1 - e) T / h of a step, those of its half are sqrt(e) and
-    1 - 2 (1 - w) / (1 + sqrt(e)).
+    the decay e of half a step and the weight w = 1 - (1 - e^2) T / h of a whole one, that of a half is
+    1 - 2 (1 - w) / (1 + e).
     """
     halved = rows.copy()
     for link in range(model.links):
         for decay in (LINKS_C + LINK_ROWS * link + column for column in LAG_DECAYS):
-            halved[decay] = np.sqrt(rows[decay])
-            halved[decay + 1] = 1.0 - 2.0 * (1.0 - rows[decay + 1]) / (1.0 + halved[decay])
+            halved[decay + 1] = 1.0 - 2.0 * (1.0 - rows[decay + 1]) / (1.0 + rows[decay])
     return halved

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import math
 
-from morphcore.jit import kernel
+from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.chain import accelerations, base_rates, clear
 from morphcore.models.kernels.layout import (
@@ -51,24 +51,36 @@ LAST, BEFORE = 7.0 / 8.0, -3.0 / 8.0  # the predictor's weights of the slopes k1
 SLOPES = 3  # slots of a block's memory: step n writes its slope to slot n modulo 3
 
 
+# A lane loop as short as one row's arithmetic is unrolled by the compiler before it could become vector
+# instructions. So rows are taken three at a time, or as one long vector.
+
+
 @kernel
-def predict(lanes, state, last, before, step, out):
+def predict(state, last, before, step, out):
     """out = u + h (7/8 k1 - 3/8 k2)."""
-    if not_in_lanes(state, lanes) or not_in_lanes(last, lanes) or not_in_lanes(before, lanes):
-        return
-    if not_in_lanes(out, lanes):
-        return
-    for i in range(state.shape[0]):
-        for l in range(len(lanes)):
-            out[i, l] = state[i, l] + step * (LAST * last[i, l] + BEFORE * before[i, l])
+    begin, slope1, slope2, middle = state.reshape(-1), last.reshape(-1), before.reshape(-1), out.reshape(-1)
+    for i in range(begin.size):
+        middle[i] = begin[i] + step * (LAST * slope1[i] + BEFORE * slope2[i])
+
+
+@inlined
+def remembered(slope1, slope2, step):
+    """The part w = -h (15 k1 - 6 k2) / 16 of what A acts on."""
+    return -step * ((GAMMA - BEFORE) * slope1 + BEFORE * slope2)
+
+
+@inlined
+def spring(k, c, angle, rate, g):
+    """Force -k (angle + g rate) - c rate, and the diagonal g c + g^2 k that the implicit step adds."""
+    return -k * (angle + g * rate) - c * rate, g * (c + g * k)
 
 
 @kernel
 def joint_forces(lanes, stiffness, damping, q, v, last, before, last_rate, before_rate, step, tau, added):
     """Joint forces and added diagonal of a stage at predicted angles and rates q, v.
 
-    With g = GAMMA h and w = - h (15 k1 - 6 k2) / 16, of angles (``last``, ``before``) and of rates, the
-    implicit equations are (M + g C + g^2 K) a = f - K (q + w_q + g (v + w_v)) - C (v + w_v).
+    With g = GAMMA h and w of angles (``last``, ``before``) and of rates as in ``remembered``, the implicit
+    equations are (M + g C + g^2 K) a = f - K (q + w_q + g (v + w_v)) - C (v + w_v).
     """
     if (
         not_in_lanes(stiffness, lanes)
@@ -87,13 +99,24 @@ def joint_forces(lanes, stiffness, damping, q, v, last, before, last_rate, befor
     if not_in_lanes(tau, lanes) or not_in_lanes(added, lanes):
         return
     g = GAMMA * step
-    for i in range(q.shape[0]):
+    for i in range(0, q.shape[0], 3):
+        k, c, t, a = stiffness[i : i + 3], damping[i : i + 3], tau[i : i + 3], added[i : i + 3]
+        x, x1, x2 = q[i : i + 3], last[i : i + 3], before[i : i + 3]
+        y, y1, y2 = v[i : i + 3], last_rate[i : i + 3], before_rate[i : i + 3]
         for l in range(len(lanes)):
-            k, c = stiffness[i, l], damping[i, l]
-            angle = q[i, l] - step * ((GAMMA - BEFORE) * last[i, l] + BEFORE * before[i, l])
-            rate = v[i, l] - step * ((GAMMA - BEFORE) * last_rate[i, l] + BEFORE * before_rate[i, l])
-            added[i, l] = g * (c + g * k)
-            tau[i, l] = -k * (angle + g * rate) - c * rate
+            flap, torsion, lag = (
+                x[0, l] + remembered(x1[0, l], x2[0, l], step),
+                x[1, l] + remembered(x1[1, l], x2[1, l], step),
+                x[2, l] + remembered(x1[2, l], x2[2, l], step),
+            )
+            flap_rate, torsion_rate, lag_rate = (
+                y[0, l] + remembered(y1[0, l], y2[0, l], step),
+                y[1, l] + remembered(y1[1, l], y2[1, l], step),
+                y[2, l] + remembered(y1[2, l], y2[2, l], step),
+            )
+            t[0, l], a[0, l] = spring(k[0, l], c[0, l], flap, flap_rate, g)
+            t[1, l], a[1, l] = spring(k[1, l], c[1, l], torsion, torsion_rate, g)
+            t[2, l], a[2, l] = spring(k[2, l], c[2, l], lag, lag_rate, g)
 
 
 @kernel
@@ -109,29 +132,42 @@ def joint_slopes(lanes, v, acceleration, last_rate, before_rate, step, angle_slo
     if not_in_lanes(angle_slope, lanes) or not_in_lanes(rate_slope, lanes):
         return
     g = GAMMA * step
-    for i in range(v.shape[0]):
+    for i in range(0, v.shape[0], 3):
+        y, y1, y2 = v[i : i + 3], last_rate[i : i + 3], before_rate[i : i + 3]
+        a, angle, rate = acceleration[i : i + 3], angle_slope[i : i + 3], rate_slope[i : i + 3]
         for l in range(len(lanes)):
-            a = acceleration[i, l]
-            rate = v[i, l] - step * ((GAMMA - BEFORE) * last_rate[i, l] + BEFORE * before_rate[i, l])
-            rate_slope[i, l] = a
-            angle_slope[i, l] = rate + g * a
+            flap, torsion, lag = a[0, l], a[1, l], a[2, l]
+            angle[0, l] = y[0, l] + remembered(y1[0, l], y2[0, l], step) + g * flap
+            angle[1, l] = y[1, l] + remembered(y1[1, l], y2[1, l], step) + g * torsion
+            angle[2, l] = y[2, l] + remembered(y1[2, l], y2[2, l], step) + g * lag
+            rate[0, l], rate[1, l], rate[2, l] = flap, torsion, lag
+
+
+@inlined
+def carried(lag_state, motion, decay):
+    """A lag state half a step on, for a motion that stays."""
+    return motion + decay * (lag_state - motion)
 
 
 @kernel
-def lag_to_stage(lanes, link, slow, fast, previous, stage_slow, stage_fast):
-    """Carry a link's lag states over the half step up to a stage, for a motion that stays.
-
-    The link's constants hold the decay of a whole step.
-    """
+def lag_to_stage(lanes, link, slow, fast, previous, stage_slow, stage_fast, stage_previous):
+    """Carry a link's lag states over the half step up to a stage, for a motion that stays."""
     if not_in_lanes(link, lanes) or not_in_lanes(slow, lanes) or not_in_lanes(fast, lanes):
         return
     if not_in_lanes(previous, lanes) or not_in_lanes(stage_slow, lanes) or not_in_lanes(stage_fast, lanes):
         return
-    for i in range(3):
-        for l in range(len(lanes)):
-            motion = previous[i, l]
-            stage_slow[i, l] = motion + math.sqrt(link[10, l]) * (slow[i, l] - motion)
-            stage_fast[i, l] = motion + math.sqrt(link[12, l]) * (fast[i, l] - motion)
+    if not_in_lanes(stage_previous, lanes):
+        return
+    for l in range(len(lanes)):
+        slow_decay, fast_decay = link[10, l], link[12, l]
+        z, x, y = previous[0, l], previous[1, l], previous[2, l]
+        stage_previous[0, l], stage_previous[1, l], stage_previous[2, l] = z, x, y
+        stage_slow[0, l] = carried(slow[0, l], z, slow_decay)
+        stage_slow[1, l] = carried(slow[1, l], x, slow_decay)
+        stage_slow[2, l] = carried(slow[2, l], y, slow_decay)
+        stage_fast[0, l] = carried(fast[0, l], z, fast_decay)
+        stage_fast[1, l] = carried(fast[1, l], x, fast_decay)
+        stage_fast[2, l] = carried(fast[2, l], y, fast_decay)
 
 
 @kernel
@@ -146,36 +182,35 @@ def lag_from_stage(lanes, link, twist, stage_slow, stage_fast, slow, fast, previ
         return
     if not_in_lanes(slow, lanes) or not_in_lanes(fast, lanes) or not_in_lanes(previous, lanes):
         return
-    for i in range(3):
-        source = twist[(5, 0, 1)[i]]
-        for l in range(len(lanes)):
-            motion = source[l]
-            change = motion - previous[i, l]
-            slow_end = stage_slow[i, l] + link[11, l] * change
-            fast_end = stage_fast[i, l] + link[13, l] * change
-            slow[i, l] = motion + math.sqrt(link[10, l]) * (slow_end - motion)
-            fast[i, l] = motion + math.sqrt(link[12, l]) * (fast_end - motion)
-            previous[i, l] = motion
+    for l in range(len(lanes)):
+        slow_decay, slow_weight, fast_decay, fast_weight = link[10, l], link[11, l], link[12, l], link[13, l]
+        z, x, y = twist[5, l], twist[0, l], twist[1, l]
+        dz, dx, dy = z - previous[0, l], x - previous[1, l], y - previous[2, l]
+        slow[0, l] = carried(stage_slow[0, l] + slow_weight * dz, z, slow_decay)
+        slow[1, l] = carried(stage_slow[1, l] + slow_weight * dx, x, slow_decay)
+        slow[2, l] = carried(stage_slow[2, l] + slow_weight * dy, y, slow_decay)
+        fast[0, l] = carried(stage_fast[0, l] + fast_weight * dz, z, fast_decay)
+        fast[1, l] = carried(stage_fast[1, l] + fast_weight * dx, x, fast_decay)
+        fast[2, l] = carried(stage_fast[2, l] + fast_weight * dy, y, fast_decay)
+        previous[0, l], previous[1, l], previous[2, l] = z, x, y
 
 
 @kernel
-def copy(lanes, source, out):
+def copy(source, out):
     """out = source."""
-    if not_in_lanes(source, lanes) or not_in_lanes(out, lanes):
-        return
-    for i in range(source.shape[0]):
-        for l in range(len(lanes)):
-            out[i, l] = source[i, l]
+    rows, target = source.reshape(-1), out.reshape(-1)
+    for i in range(rows.size):
+        target[i] = rows[i]
 
 
 @kernel
 def finish(lanes, state, slope, step):
     """state += h k, with the attitude quaternion made unit again."""
-    if not_in_lanes(state, lanes) or not_in_lanes(slope, lanes):
+    if not_in_lanes(state, lanes):
         return
-    for i in range(state.shape[0]):
-        for l in range(len(lanes)):
-            state[i, l] += step * slope[i, l]
+    rows, rates = state.reshape(-1), slope.reshape(-1)
+    for i in range(rows.size):
+        rows[i] += step * rates[i]
     for l in range(len(lanes)):
         a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
         scale = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
@@ -235,15 +270,14 @@ def middle_slope(
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
     _, _, s_slow, s_fast, s_previous, _ = state_rows(links, coordinates)
-    predict(lanes, state[:s_slow], last, before, step, middle[:s_slow])
+    predict(state[:s_slow], last, before, step, middle[:s_slow])
     for link in range(links):
         slow, fast, previous = s_slow + 3 * link, s_fast + 3 * link, s_previous + 3 * link
         lag_to_stage(
             lanes, constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * (link + 1)],
             state[slow : slow + 3], state[fast : fast + 3], state[previous : previous + 3],
-            middle[slow : slow + 3], middle[fast : fast + 3],
+            middle[slow : slow + 3], middle[fast : fast + 3], middle[previous : previous + 3],
         )  # fmt: skip
-    copy(lanes, state[s_previous:], middle[s_previous:])
     stage(
         lanes,
         surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, middle,
@@ -277,8 +311,8 @@ def step_block(
             surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state,
             last, before, step, slope, middle, scratch, inputs, outputs,
         )  # fmt: skip
-        copy(lanes, slope, last)
-        copy(lanes, slope, before)
+        copy(slope, last)
+        copy(slope, before)
     middle_slope(
         lanes,
         surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, last,
