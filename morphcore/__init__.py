@@ -12,7 +12,7 @@ from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.warming import warm_up
+from morphcore.warming import warm_up, warm_up_further
 
 __all__ = [
     "Aircraft",
@@ -30,4 +30,5 @@ __all__ = [
     "simulate",
     "study",
     "warm_up",
+    "warm_up_further",
 ]

@@ -26,9 +26,16 @@ FAST_MATH = {"nsz"}
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
 
-    It is cached as part of the entries that call it.
+    It is cached as part of the entries that call it, and has no door for Python, which would take a seventh of
+    the time to compile them all; tests make one (tests/kernels.py).
     """
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True)(function)
+    return numba.njit(
+        error_model="numpy",
+        fastmath=FAST_MATH,
+        nogil=True,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )(function)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -37,5 +44,5 @@ def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a short scalar function that is pasted into the kernels that call it."""
+    """Compile a function that is pasted into the kernels that call it: short scalar ones, parts of a step."""
     return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, inline="always")(function)

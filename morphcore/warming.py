@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from morphcore.geometry.aircraft import aircraft_from_document, flight_from_document
+from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
@@ -23,20 +23,45 @@ _WING = {
 }
 
 
-def warm_up(threads: int | None = None) -> None:
-    """Fly one tiny flight of two links a wing and one of beams: every kernel of a job is then compiled.
+_SMALL = LatticeSettings(chordwise=1, spanwise=4)
+_SIDES = (("right", 0.1), ("left", -0.1))
 
-    Call it in the process that computes (never in the parent of forked workers), once.
+
+def warm_up(threads: int | None = None) -> None:
+    """Fly one and two models of two links a wing over tiny flights: what identifications need is compiled.
+
+    Call it in the process that computes (never in the parent of forked workers), once. The kernels of hinge
+    torques and beams, which few jobs need, are left to `warm_up_further`.
     """
     if threads is not None:
         use_threads(threads)
-    sides = (("right", 0.1), ("left", -0.1))
+    aircraft, flight, sample = _tiny()
+    model = chain_model(aircraft, flight, 2, _SMALL)
+    cases = sample_cases(model, [sample])
+    guess = physical_guess(model)
+    costs(model, guess, cases, "trim")  # one lane, then blocks of them
+    costs(model, guess.select(np.zeros(2, dtype=np.int64)), cases, "trim")
+
+
+def warm_up_further() -> None:
+    """Fly with hinge torques and with beams, so that the kernels of all other jobs are compiled too."""
+    aircraft, flight, sample = _tiny()
+    model = chain_model(aircraft, flight, 2, _SMALL)
+    held = flight_plan(model, [Hold()] * len(_SIDES), time_grid(sample.time_s))
+    states = np.zeros((held.grid.steps + 1, model.state_rows))
+    states[:, 0] = 1.0  # an attitude needs a unit quaternion
+    hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
+    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=_SMALL, step_s=0.01)
+
+
+def _tiny() -> tuple[Aircraft, Flight, Trajectory]:
+    """A small aircraft and a flight of three rows."""
     aircraft = aircraft_from_document(
         {
             "fuselage": {"length_m": 1.0, "width_m": 0.2, "height_m": 0.2, "density_kg_m3": 100.0},
             "surfaces": [
                 {"name": side, "side": side, **_WING, "hinge": {"position_m": [0.0, y, 0.0], "axis": "z"}}
-                for side, y in sides
+                for side, y in _SIDES
             ],
         }
     )
@@ -44,12 +69,4 @@ def warm_up(threads: int | None = None) -> None:
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
     sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
-    small = LatticeSettings(chordwise=1, spanwise=4)
-    model = chain_model(aircraft, flight, 2, small)
-    guess = physical_guess(model)
-    costs(model, guess, sample_cases(model, [sample]), "trim")
-    held = flight_plan(model, [Hold()] * len(sides), time_grid(time_s))
-    states = np.zeros((held.grid.steps + 1, model.state_rows))
-    states[:, 0] = 1.0  # an attitude needs a unit quaternion
-    hinge_torques(model, held, lane_constants(model, guess, held.grid.step_s), states)
-    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=small, step_s=0.01)
+    return aircraft, flight, sample

@@ -10,12 +10,12 @@ from morphcore.aero.kernels.lattice_place import induced_velocity, refine
 from morphcore.aero.moving_lattice import MovingLattice
 from morphcore.aero.vlm import edge_midpoints, influence, panel_normals
 from morphcore.geometry.lattice import LatticeSettings, VortexCore
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 from morphcore.models.flexible import flexible_model
 from tests.models.chains import example_aircraft, example_flight
 
 
-@kernel
+@entry_kernel
 def _induced(parts, place, gamma, still):  # pasted into kernels only
     induced_velocity(parts, place, gamma, still)
 

@@ -10,28 +10,28 @@ from morphcore.aero.kernels.vortex import (
     smoothed_leg_velocity,
     smoothed_segment_velocity,
 )
-from morphcore.jit import kernel
+from morphcore.jit import entry_kernel
 
 LAWS = ("line", "smoothed")
 TINY_CORE = 1e-9  # of a metre: no core at the distances of these tests
 
 
-@kernel
+@entry_kernel
 def _segment(a, e, core4):  # the inlined laws are called from kernels only
     return segment_velocity(a[0], a[1], a[2], e[0], e[1], e[2], core4)
 
 
-@kernel
+@entry_kernel
 def _leg(a, u, core4):
     return leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core4)
 
 
-@kernel
+@entry_kernel
 def _smoothed_segment(a, e, core2):
     return smoothed_segment_velocity(a[0], a[1], a[2], e[0], e[1], e[2], core2)
 
 
-@kernel
+@entry_kernel
 def _smoothed_leg(a, u, core2):
     return smoothed_leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core2)
 

@@ -7,14 +7,11 @@ import pytest
 from scipy.linalg import expm, solve
 
 from morphcore.frames import skew
-from morphcore.multibody.kernels.helix import (
-    TERMS,
-    helix_coefficients,
-    helix_map,
-    helix_series,
-    helix_twist,
-    subtract_helix_force,
-)
+from morphcore.multibody.kernels import helix as helix_kernels
+from morphcore.multibody.kernels.helix import TERMS
+from tests.kernels import doors
+
+helix = doors(helix_kernels)
 
 RNG = np.random.default_rng(17)
 
@@ -45,19 +42,19 @@ def test_the_map_is_that_of_the_helix(angle: float, s: float) -> None:
     d_rate = solve(tangent(d), V_b - expm(-bracket(d)) @ V_a)
     expected = expm(-s * bracket(d)) @ V_a + s * tangent(s * d) @ d_rate
     blocks, found = np.empty((2, 3, 3)), np.empty(6)
-    helix_map(d, s, helix_series(s)[0], blocks)
-    helix_twist(V_a, V_b, blocks, found)
+    helix.helix_map(d, s, helix.helix_series(s)[0], blocks)
+    helix.helix_twist(V_a, V_b, blocks, found)
     np.testing.assert_allclose(found, expected, atol=2e-12)
     # power does not depend on where it is counted
     force, inner, outer = RNG.normal(size=6), np.zeros(6), np.zeros(6)
-    subtract_helix_force(force, blocks, inner, outer)
+    helix.subtract_helix_force(force, blocks, inner, outer)
     assert -(inner @ V_a + outer @ V_b) == pytest.approx(force @ found, rel=1e-12)
 
 
 def test_coefficients_have_their_derivatives() -> None:
     """First and second derivatives by z are those of central differences."""
-    series, z, h = helix_series(0.3)[0], -1.1, 1e-3
-    at = [helix_coefficients(series, z + k * h, TERMS) for k in (-1, 0, 1)]
+    series, z, h = helix.helix_series(0.3)[0], -1.1, 1e-3
+    at = [helix.helix_coefficients(series, z + k * h, TERMS) for k in (-1, 0, 1)]
     for i in range(2):
         slope = (at[2][i] - at[0][i]) / (2.0 * h)
         curvature = (at[2][i] - 2.0 * at[1][i] + at[0][i]) / h**2

@@ -8,8 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore import frames
-from morphcore.multibody.kernels import spatial
+from morphcore.multibody.kernels import spatial as spatial_kernels
+from tests.kernels import doors
 from tests.multibody.trees import random_inertia
+
+spatial = doors(spatial_kernels)
 
 SEEDS = st.integers(0, 2**32 - 1)
 LAWS = settings(max_examples=30, deadline=None)  # no deadline: the first example compiles
