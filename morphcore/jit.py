@@ -21,28 +21,31 @@ from typing import Any
 import numba
 
 FAST_MATH = {"nsz"}
+WITHOUT_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    """Compile with the flags above and some more."""
+    decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
+        error_model="numpy", fastmath=FAST_MATH, nogil=True, **options
+    )
+    return decorate(function)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
 
-    It is cached as part of the entries that call it, and has no door for Python, which would take a seventh of
-    the time to compile them all; tests make one (tests/kernels.py).
+    It is cached as part of the entries that call it, and has no door for Python: doors would take a seventh
+    of the time to compile them all. Tests make their own (tests/kernels.py).
     """
-    return numba.njit(
-        error_model="numpy",
-        fastmath=FAST_MATH,
-        nogil=True,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-    )(function)
+    return compiled(function, **WITHOUT_DOORS)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that Python calls; cached."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, cache=True)(function)
+    return compiled(function, cache=True)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that is pasted into the kernels that call it: short scalar ones, parts of a step."""
-    return numba.njit(error_model="numpy", fastmath=FAST_MATH, nogil=True, inline="always")(function)
+    return compiled(function, inline="always")

@@ -12,7 +12,11 @@ from numba.core.dispatcher import Dispatcher
 
 def door(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """A kernel as Python can call it."""
-    return numba.njit(lambda *arguments: kernel(*arguments))
+
+    def enter(*arguments: Any) -> Any:
+        return kernel(*arguments)
+
+    return numba.njit(enter)
 
 
 def doors(module: ModuleType) -> SimpleNamespace:

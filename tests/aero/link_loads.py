@@ -12,12 +12,15 @@ from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_nor
 from morphcore.geometry.lattice import surface_pose
 from morphcore.lanes import ALONE, lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants, to_lanes
-from morphcore.models.kernels.chain import accelerations
+from morphcore.models.kernels.chain import accelerations as accelerations_kernel
 from morphcore.models.kernels.layout import S_FREE
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.plan import FlightPlan
+from tests.kernels import door
 
 Array = NDArray[np.float64]
+
+accelerations = door(accelerations_kernel)
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from morphcore.aero.kernels.lattice_place import induced_velocity, refine
+from morphcore.aero.kernels.lattice_place import induced_velocity
+from morphcore.aero.kernels.lattice_place import refine as refine_kernel
 from morphcore.aero.moving_lattice import MovingLattice
 from morphcore.aero.vlm import edge_midpoints, influence, panel_normals
 from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.jit import entry_kernel
 from morphcore.models.flexible import flexible_model
+from tests.kernels import door
 from tests.models.chains import example_aircraft, example_flight
+
+refine = door(refine_kernel)
 
 
 @entry_kernel

@@ -25,8 +25,7 @@ SCHEDULES = (
 )
 
 
-@pytest.fixture(scope="module")
-def flights():
+def morph_flights(step_s):
     """Two links a wing over nine tenths of a second."""
     model = chain_model(reference_aircraft(), reference_flight(), 2)
     return MorphFlights(
@@ -36,8 +35,14 @@ def flights():
         sample_times(0.6, 0.3),
         initial_rad=0.0,
         start="trim",
-        step_s=STEP_S,
+        step_s=step_s,
     )
+
+
+@pytest.fixture(scope="module")
+def flights():
+    """Flights at the step that ships."""
+    return morph_flights(STEP_S)
 
 
 def test_departures_are_those_of_the_simulator(flights):
@@ -63,13 +68,18 @@ def test_departures_are_those_of_the_simulator(flights):
 def test_a_flight_begins_in_trim_however_the_morph_begins(flights):
     """A morph that accelerates at once and the same after a rest of ten rows fly alike, ten rows apart.
 
-    While nothing moves, trim holds; its Newton iteration leaves 1e-9 rad.
+    While nothing moves, trim holds; its Newton iteration leaves 1e-9 rad. A morph that begins with the flight
+    meets a step that remembers no slopes yet: that costs 1e-6 rad, and a quarter of it with half the step.
     """
     at_once = SCHEDULES[0]
     later = Spline(at_once.knot_time_s + 0.1, at_once.knot_angle_rad)
-    first, second = flights.fly([at_once, later], torque=False).departure
     assert at_once.motion(0.01).acceleration > 1.0
-    np.testing.assert_allclose(second[10:], first[:-10], atol=1e-8)
+    apart = []
+    for each in (flights, morph_flights(0.5 * STEP_S)):
+        first, second = each.fly([at_once, later], torque=False).departure
+        apart.append(np.abs(second[10:] - first[:-10]).max())
+    assert apart[0] < 1e-6
+    assert apart[1] < apart[0] / 3.0
 
 
 def test_weights_count_each_angle():
@@ -139,7 +149,7 @@ def test_a_diverged_flight_is_charged(flights):
     finally:
         flights.constants.rows[:] = wild
     assert lost.diverged.all()
-    assert lost.departure.max() == DIVERGED_ANGLE
+    assert (lost.departure[:, -1] == DIVERGED_ANGLE).all()
     assert np.isfinite(lost.variation).all()
 
 

@@ -14,6 +14,7 @@ from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import physical_guess
 from morphcore.models.parameters_document import parameters_document
+from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.request import attitude_variation, simulation_from_document
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
@@ -90,7 +91,7 @@ def test_the_document_has_the_names_of_the_api() -> None:
     cost = document["cost"]
     assert cost["real_time_factor"] == pytest.approx(0.5 / cost["wall_s"])
     assert document["model"]["lattice"]["chordwise"] == 1
-    assert document["model"]["step_s"] == 0.005
+    assert document["model"]["step_s"] == STEP_S
 
 
 def test_the_variation_does_not_hang_on_the_rows() -> None:
