@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -40,3 +41,14 @@ def heed(stop: Stop | None = None) -> None:
     surrounding = _surrounding.get()
     if (stop is not None and stop()) or (surrounding is not None and surrounding()):
         raise Interrupted
+
+
+def one_at_a_time(stop: Stop | None = None) -> Stop:
+    """What `heed` asks here, as one question for several threads, which ask it in turn."""
+    lock, surrounding = threading.Lock(), _surrounding.get()
+
+    def ask() -> bool:
+        with lock:
+            return (stop is not None and stop()) or (surrounding is not None and surrounding())
+
+    return ask

@@ -8,6 +8,7 @@ do both.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -22,8 +23,22 @@ class _Setting:
     threads = 0
 
 
+class _Here(threading.local):
+    """Whether this thread is one of the pool's."""
+
+    pooled = False
+
+
+_here = _Here()
+
+
 def thread_count() -> int:
-    """Threads that kernels use: as ``use_threads`` said, else NUMBA_NUM_THREADS, else the usable cores."""
+    """Threads that kernels use: as ``use_threads`` said, else NUMBA_NUM_THREADS, else the usable cores.
+
+    One inside work that runs in threads already: a pool whose threads wait for the pool would wait forever.
+    """
+    if _here.pooled:
+        return 1
     if _Setting.threads == 0:
         _Setting.threads = int(os.environ.get("NUMBA_NUM_THREADS", "0")) or usable_cores()
     return _Setting.threads
@@ -64,7 +79,11 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 @cache
 def _pool(process: int, threads: int) -> ThreadPoolExecutor:  # noqa: ARG001 - a forked child needs a pool of its own
-    return ThreadPoolExecutor(threads, thread_name_prefix="morphcore")
+    return ThreadPoolExecutor(threads, thread_name_prefix="morphcore", initializer=_enter_pool)
+
+
+def _enter_pool() -> None:
+    _here.pooled = True
 
 
 @cache

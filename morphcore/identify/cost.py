@@ -5,7 +5,7 @@ J = sum over samples and times of w (dphi^2 + dtheta^2 + dpsi^2), the difference
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
-from morphcore.stopping import Stop
+from morphcore.stopping import Stop, one_at_a_time
+from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]
 
 DIVERGED_ANGLE = 3.0  # rad of error charged for every angle of a row that a diverged flight never reached
+LARGEST_SLAB = 256  # parameter sets that one thread flies at a time
 ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
 
 
@@ -151,15 +154,16 @@ def costs(
     cases: Sequence[SampleCase],
     start: StartMode,
     stop: Stop | None = None,
-    slab: int = 512,
 ) -> Array:
     """(p,) J over all samples; parameter sets in slabs, so that memory does not grow with the swarm."""
     total = np.zeros(batch.particles)
-    for low in range(0, batch.particles, slab):
-        part = slice(low, low + slab)
+
+    def fly(part: slice, stop: Stop) -> None:
         chosen = batch.select(part)
         for case, found in shared_trims(model, chosen, cases, start):
             total[part] += evaluate(model, chosen, case, found, stop).cost
+
+    _in_slabs(batch.particles, fly, stop)
     return total
 
 
@@ -171,13 +175,25 @@ def residuals(
     stop: Stop | None = None,
 ) -> Array:
     """(p, m) all weighted errors of all samples in one row per parameter set."""
-    return np.concatenate(
-        [
-            evaluate(model, batch, case, found, stop).errors.reshape(batch.particles, -1)
-            for case, found in shared_trims(model, batch, cases, start)
-        ],
-        axis=1,
-    )
+    ends = np.cumsum([3 * case.sample.time_s.size for case in cases])
+    errors = np.empty((batch.particles, ends[-1]))
+
+    def fly(part: slice, stop: Stop) -> None:
+        chosen = batch.select(part)
+        for end, (case, found) in zip(ends, shared_trims(model, chosen, cases, start), strict=True):
+            own = evaluate(model, chosen, case, found, stop).errors
+            errors[part, end - 3 * case.sample.time_s.size : end] = own.reshape(chosen.particles, -1)
+
+    _in_slabs(batch.particles, fly, stop)
+    return errors
+
+
+def _in_slabs(particles: int, fly: Callable[[slice, Stop], None], stop: Stop | None) -> None:
+    """Fly all parameter sets in slabs of whole blocks, in threads: trims, flights and errors of each."""
+    each = -(-particles // thread_count())
+    size = min(-(-each // TOGETHER) * TOGETHER, LARGEST_SLAB)
+    asked = one_at_a_time(stop)
+    in_threads(lambda k: fly(slice(k * size, (k + 1) * size), asked), -(-particles // size))
 
 
 def _interpolated(rows: Array, grid_s: Array, times_s: Array) -> Array:

@@ -6,7 +6,6 @@ the angle; a schedule alone tells them apart. They fly side by side in threads.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +20,7 @@ from morphcore.simulate.plan import CommonPath, time_grid
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
-from morphcore.stopping import Interrupted, Stop
+from morphcore.stopping import Interrupted, Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]
@@ -104,7 +103,7 @@ class MorphFlights:
         ``stop`` is asked between rounds of one flight for each thread, of long flights within them too, by
         one thread at a time; True raises Interrupted.
         """
-        within = _one_at_a_time(stop) if stop is not None and self.grid.steps > LONG_FLIGHT else None
+        within = one_at_a_time(stop) if stop is not None and self.grid.steps > LONG_FLIGHT else None
         flown: list[tuple[Array, Array]] = [(np.zeros(0), np.zeros(0))] * len(schedules)
 
         def one(number: int) -> None:
@@ -134,14 +133,3 @@ class MorphFlights:
         if not torque:
             return attitude, np.zeros(0)
         return attitude, hinge_torques(self.model, plan, self.constants, states).ravel()
-
-
-def _one_at_a_time(stop: Stop) -> Stop:
-    """The same question, for several threads."""
-    lock = threading.Lock()
-
-    def guarded() -> bool:
-        with lock:
-            return stop()
-
-    return guarded

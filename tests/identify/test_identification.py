@@ -28,6 +28,7 @@ from morphcore.identify.parameters import search_space
 from morphcore.identify.state import decode
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.swarm import SwarmSettings
+from morphcore.threads import thread_count
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
@@ -123,7 +124,7 @@ def test_stop_interrupts_between_chunks() -> None:
     run, done = quick(), []
     with pytest.raises(Interrupted):
         done.extend(run.steps(stop=stop))
-    assert asked == 9
+    assert 9 <= asked < 9 + thread_count()  # each thread ends at its own next chunk
 
 
 def test_time_budget_ends_the_search_with_its_best() -> None:
