@@ -19,6 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core.registry import CPUDispatcher
 
 FAST_MATH = {"nsz"}
 WITHOUT_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -32,13 +33,24 @@ def compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]
     return decorate(function)
 
 
+class WithoutDoor(CPUDispatcher):
+    """A compiled function that compiled functions call. Python has no way in and is told so."""
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse."""
+        raise TypeError(f"{self.py_func.__name__} is called by kernels only (see tests/kernels.py)")
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
 
     It is cached as part of the entries that call it, and has no door for Python: doors would take a seventh
     of the time to compile them all. Tests make their own (tests/kernels.py).
     """
-    return compiled(function, **WITHOUT_DOORS)
+    found = compiled(function, **WITHOUT_DOORS)
+    if isinstance(found, CPUDispatcher):  # else compilation is switched off
+        found.__class__ = WithoutDoor
+    return found
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -85,13 +85,17 @@ class Kernels:
 
     Parameters
     ----------
-    warm_up : compiles or loads them (threads -> None).
+    warm_up : compiles or loads those that most jobs need (threads -> None).
     threads : numeric threads of one job.
+    further : compiles or loads the others, once jobs may run.
     """
 
-    def __init__(self, warm_up: Callable[[int], object], threads: int) -> None:
+    def __init__(
+        self, warm_up: Callable[[int], object], threads: int, further: Callable[[], object] | None = None
+    ) -> None:
         self.threads = threads
         self._warm_up = warm_up
+        self._further = further
         self._done = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -107,7 +111,7 @@ class Kernels:
         return self._done.is_set()
 
     def wait(self, stop: Callable[[], bool], *, poll_s: float = 0.2) -> bool:
-        """Wait for the end of the warm-up: two threads must not run parallel kernels at once.
+        """Wait for the end of the warm-up; whoever needs a further kernel compiles it where it is called.
 
         Returns
         -------
@@ -127,10 +131,22 @@ class Kernels:
             log.exception("the numeric kernels could not be made ready")
         finally:
             self._done.set()
+        if self._further is not None:
+            try:
+                self._further()
+            except Exception:
+                log.exception("the further numeric kernels could not be made ready")
 
 
 def warm_up_library(threads: int) -> None:
-    """Compile or load the kernels of morphcore for one tiny flight."""
+    """Compile or load the kernels of morphcore that identifications need."""
     import morphcore
 
     morphcore.warm_up(threads)
+
+
+def warm_up_library_further() -> None:
+    """Compile or load its other kernels."""
+    import morphcore
+
+    morphcore.warm_up_further()

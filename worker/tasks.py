@@ -41,7 +41,7 @@ class Process:
         self.settings = load_settings()
         self.reaped_at = float("-inf")
         self.database = Database(self.settings.database_url)
-        self.kernels = numerics.Kernels(numerics.warm_up_library, threads)
+        self.kernels = numerics.Kernels(numerics.warm_up_library, threads, numerics.warm_up_library_further)
         self.runner = Runner(
             database=self.database,
             kernels=self.kernels,

@@ -12,7 +12,7 @@ from morphcore.bench.fresh_process import in_fresh_process
 from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
 from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, request_of
 from morphcore.identify import identification_from_document
-from morphcore.jit import kernel
+from morphcore.jit import compiled, kernel
 
 ALLOWED_S = 0.5
 
@@ -31,7 +31,7 @@ def test_compilations_are_written_down_once_each() -> None:
     def inner(x: Any) -> Any:
         return 2.0 * x
 
-    @kernel
+    @compiled
     def outer(x: Any) -> Any:
         return inner(x) + inner(x + 1.0)
 

@@ -76,6 +76,25 @@ def test_a_failing_warm_up_does_not_block() -> None:
     assert Kernels(broken, threads=1).wait(lambda: False)
 
 
+def test_further_kernels_follow_once_jobs_may_run() -> None:
+    """Jobs do not wait for the kernels that few of them need, nor for trouble with them."""
+    order: list[str] = []
+    waiting, came = threading.Event(), threading.Event()
+
+    def further() -> None:
+        assert waiting.wait(10.0)
+        order.append("further")
+        came.set()
+        raise RuntimeError("no beams today")
+
+    kernels = Kernels(lambda _threads: order.append("first"), 1, further)
+    assert kernels.wait(lambda: False, poll_s=0.01)
+    assert order == ["first"]
+    waiting.set()
+    assert came.wait(10.0)
+    assert kernels.ready
+
+
 def test_the_parent_process_loads_no_compiler(root: Path) -> None:
     """The pool's parent imports the whole worker without numba: its forks stay sound."""
     program = "import sys, worker.celery_app, worker.tasks; sys.exit('numba' in sys.modules)"
