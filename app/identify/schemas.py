@@ -19,7 +19,7 @@ from app.schemas.search import WEEK_S, SwarmSearch, WarmStart
 MAX_SAMPLES = 64
 
 Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
-Method = Literal["hybrid", "pso", "least_squares"]
+Method = Literal["hybrid", "least_squares", "cma", "pso"]
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
     Field(min_length=2, max_length=2, description="[low, high], low below high."),

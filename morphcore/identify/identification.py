@@ -9,8 +9,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from morphcore.errors import InvalidInput
+from morphcore.evolution import Evolution, EvolutionState, first_evolution
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
 from morphcore.identify.generation import GenerationTask
@@ -32,9 +34,17 @@ Clock = Callable[[], float]
 SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical guess, in search coordinates
 # A weak prior on the polish: being off the physical guess by one unit costs as much as one error of this
 # size. It settles the directions that the samples cannot see and is far below what they can.
-PRIOR_RAD = 1e-4
-# the field of starts narrows as the polish goes on: iteration -> starts kept (as a share of the first field)
-NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
+PRIOR_RAD = 3e-5
+# hopeless starts are dropped as the polish goes on: iterations -> starts kept (as a share of the first field)
+NARROWING = ((3, 1.0), (6, 0.5))
+# phases in which a generation of costs is asked for and told
+ASKED: tuple[Phase, ...] = ("swarm", "evolution")
+FOLLOWING: dict[str, Phase] = {
+    "pso": "swarm",
+    "cma": "evolution",
+    "hybrid": "screen",
+    "least_squares": "polish",
+}
 
 
 class Identification:
@@ -126,9 +136,9 @@ class Identification:
     # a generation asked for and told, so that others may fly it
 
     def generation_task(self, checkpoint: bytes) -> GenerationTask | None:
-        """What the step after a checkpoint flies; None where that step is no generation of a swarm."""
+        """What the step after a checkpoint flies; None where that step is no generation of costs."""
         state = decode(checkpoint)
-        return self._task(state) if state.phase == "swarm" else None
+        return self._task(state) if state.phase in ASKED else None
 
     def task_costs(self, points: Array, stop: Stop | None = None) -> Array:
         """Costs (p,) of search points (p, d), rad^2: of any part of a task, whoever flies the rest."""
@@ -145,7 +155,7 @@ class Identification:
         ValueError : there is no such task, or it has another number of points.
         """
         state = decode(checkpoint)
-        if state.phase != "swarm" or cost.shape != self._task(state).points.shape[:1]:
+        if state.phase not in ASKED or cost.shape != self._task(state).points.shape[:1]:
             raise ValueError(f"costs {cost.shape} do not answer the task after {state.phase}")
         with one_blas_thread():
             return self._step(self._timed(self._moved(state, cost), wall_s))
@@ -155,21 +165,24 @@ class Identification:
     def _baseline(self, stop: Stop | None) -> SearchState:
         """Fly what is known before: from here on there is a best so far."""
         cost = self._costs(self.known, stop)
-        following: Phase = "swarm" if self.search.method == "pso" else "screen"
-        phase: Phase = following if self.space.dimension else "done"
+        phase = FOLLOWING[self.search.method] if self.space.dimension else "done"
         best = int(np.argmin(cost))
-        flights = cost.size * len(self.training)
-        state = SearchState(phase, self.known[best], float(cost[best]), flights=flights)
+        state = SearchState(
+            phase,
+            self.known[best],
+            float(cost[best]),
+            flights=cost.size * len(self.training),
+            polish=first_polish(self.known, cost) if phase == "polish" else None,
+        )
         return _recorded(state, "baseline", 0)
 
     def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
-        step = {"screen": self._screen, "swarm": self._generation, "polish": self._polish}[state.phase]
+        step = {"screen": self._screen, "polish": self._polish}.get(state.phase, self._generation)
         return step(state, stop)
 
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly candidates around what is known and choose the polish's starts among them."""
-        rng = np.random.default_rng(self.search.seed)
-        spread = rng.normal(0.0, SCREEN_SPREAD, (self.search.screen, self.space.dimension))
+        spread = SCREEN_SPREAD * _even_normals(self.search.screen, self.space.dimension, self.search.seed)
         points = np.clip(self.known[0] + spread, self.space.lower, self.space.upper)
         known = self.known[: self.search.screen]
         points[: len(known)] = known
@@ -218,7 +231,7 @@ class Identification:
         return _recorded(moved, "polish", flown)
 
     def _generation(self, state: SearchState, stop: Stop | None) -> SearchState:
-        """Fly one generation of the swarm and move it."""
+        """Fly one generation and move it."""
         return self._moved(state, self._costs(self._task(state).points, stop))
 
     def _swarm(self, state: SearchState) -> SwarmState:
@@ -226,26 +239,48 @@ class Identification:
         known = (self.known - self.space.lower) / width
         return state.swarm or first_swarm(self.search.swarm, known, self.search.seed)
 
+    @cached_property
+    def _evolution(self) -> Evolution:
+        width = self.space.upper - self.space.lower
+        return Evolution(self.search.evolution, (self.known[0] - self.space.lower) / width, self.search.seed)
+
+    def _evolved(self, state: SearchState) -> EvolutionState:
+        return state.evolution or first_evolution(self.search.evolution)
+
     def _task(self, state: SearchState) -> GenerationTask:
-        swarm, space = self._swarm(state), self.space
-        return GenerationTask(swarm.generation, space.lower + (space.upper - space.lower) * swarm.position)
+        """The points of the next generation: of the swarm, or of the evolution strategy."""
+        space = self.space
+        if state.phase == "swarm":
+            swarm = self._swarm(state)
+            generation, unit = swarm.generation, swarm.position
+        else:
+            evolved = self._evolved(state)
+            generation, unit = evolved.generation, self._evolution.points(evolved)
+        return GenerationTask(generation, space.lower + (space.upper - space.lower) * unit)
 
     def _moved(self, state: SearchState, cost: Array) -> SearchState:
-        """Move the swarm, given the costs of its present positions."""
-        settings, space = self.search.swarm, self.space
-        moved = next_swarm(self._swarm(state), settings, cost)
-        least = float(moved.best_cost.min())
-        better = least < state.best_cost
+        """Move the swarm or the evolution strategy, given the costs of its present points."""
+        points = self._task(state).points
+        least = int(np.argmin(cost))
+        better = cost[least] < state.best_cost
         found = replace(
             state,
-            phase="swarm" if moved.generation < settings.generations else "done",
-            best=space.lower + (space.upper - space.lower) * moved.leader if better else state.best,
-            best_cost=min(least, state.best_cost),
-            generation=moved.generation,
+            best=points[least] if better else state.best,
+            best_cost=min(float(cost[least]), state.best_cost),
+            generation=state.generation + 1,
             flights=state.flights + cost.size * len(self.training),
-            swarm=moved,
         )
-        return _recorded(found, "swarm", cost.size, mean_cost=float(cost.mean()))
+        if state.phase == "swarm":
+            moved = next_swarm(self._swarm(state), self.search.swarm, cost)
+            over = moved.generation >= self.search.swarm.generations
+            found = replace(found, swarm=moved)
+        else:
+            evolved = self._evolution.moved(self._evolved(state), cost)
+            over = evolved.generation >= self.search.evolution.generations
+            over = over or self._evolution.converged(evolved)
+            found = replace(found, evolution=evolved)
+        row = _recorded(found, state.phase, cost.size, mean_cost=float(cost.mean()))
+        return replace(row, phase="done") if over else row
 
     def _timed(self, state: SearchState, elapsed_s: float) -> SearchState:
         """Count the time of a step; when the search has used up its own, that step is the last."""
@@ -265,7 +300,11 @@ class Identification:
 
     def _step(self, state: SearchState) -> Step:
         last = state.history[-1]
-        total = self.search.swarm.generations if self.search.method == "pso" else 2 + self.search.iterations
+        total = {
+            "pso": self.search.swarm.generations,
+            "cma": self.search.evolution.generations,
+            "least_squares": 1 + self.search.iterations,
+        }.get(self.search.method, 2 + self.search.iterations)
         fraction = 1.0 if state.phase == "done" else min(state.generation / total, 0.99)
         return Step(
             phase=str(last["phase"]),
@@ -276,6 +315,12 @@ class Identification:
             message=f"{last['phase']}: J = {state.best_cost:.3g} rad^2 after {state.flights} flights",
             checkpoint=encode(state),
         )
+
+
+def _even_normals(count: int, d: int, seed: int) -> Array:
+    """(count, d) normal numbers spread more evenly than independent draws: a scrambled Sobol sequence."""
+    draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
+    return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])
 
 
 def _recorded(state: SearchState, phase: str, particles: int, **more: float) -> SearchState:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from morphcore.errors import InvalidInput
+from morphcore.evolution import FEWEST, EvolutionSettings
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
@@ -16,19 +17,18 @@ from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
 from morphcore.swarm import SwarmSettings
 
-Method = Literal["hybrid", "pso", "least_squares"]
+Method = Literal["hybrid", "least_squares", "cma", "pso"]
 
-METHODS: tuple[Method, ...] = ("hybrid", "pso", "least_squares")
+METHODS: tuple[Method, ...] = ("hybrid", "least_squares", "cma", "pso")
 LARGEST_SEED = 2**53 - 1
 PAPER_PARTICLES = 2500
-# starts of the multi-start polish; one start at four links got stuck ten times higher than the best of
-# several
-DEFAULT_STARTS = 8
+# starts of the hybrid's polish, the physical guess among them
+DEFAULT_STARTS = 4
 DEFAULT_ITERATIONS = 40
-DEFAULT_SCREEN = 192  # candidates flown to find them
+DEFAULT_SCREEN = 64  # candidates flown to find them
 # from a known model there is less to find: its surroundings, and the physical guess in case it is a bad one
 WARM_STARTS = 3
-WARM_SCREEN = 48
+WARM_SCREEN = 32
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,10 @@ class ModelSettings:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How they are sought: ``swarm`` rules "pso"; the other methods polish ``starts`` candidates.
+    """How they are sought: ``swarm`` rules "pso", ``evolution`` "cma".
+
+    "least_squares" descends from what is known beforehand (the physical guess, ``warm_start``) in up to
+    ``iterations``; "hybrid" first flies ``screen`` candidates around it and descends from ``starts``.
 
     ``warm_start`` : a model (one particle) to begin from instead of the physical guess, which stays among the
     candidates.
@@ -56,6 +59,7 @@ class SearchSettings:
     seed: int = 1
     max_seconds: float | None = None
     swarm: SwarmSettings = field(default_factory=SwarmSettings)
+    evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
     screen: int = DEFAULT_SCREEN
     starts: int = DEFAULT_STARTS
     iterations: int = DEFAULT_ITERATIONS
@@ -97,6 +101,7 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
         c2=fields.number("c2", default=default.c2, least=0.0, most=4.0),
         inertia=fields.number("inertia", default=default.inertia, least=0.0, most=1.5),
     )
+    evolution = _evolution_settings(fields) if method == "cma" and not paper else EvolutionSettings()
     warm_start = None
     if fields.has("warm_start"):
         known = fields.child("warm_start")
@@ -108,6 +113,7 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
         seed=fields.whole("seed", default=1, least=0, most=LARGEST_SEED),
         max_seconds=fields.optional_number("max_seconds", above=0.0),
         swarm=swarm,
+        evolution=evolution,
         screen=swarm.particles if fields.has("particles") else WARM_SCREEN if warm else DEFAULT_SCREEN,
         starts=WARM_STARTS if warm else DEFAULT_STARTS,
         iterations=swarm.generations if fields.has("generations") else DEFAULT_ITERATIONS,
@@ -115,6 +121,14 @@ def search_settings(document: dict[str, Any], pointer: str = "/search") -> Searc
     )
     fields.done()
     return settings
+
+
+def _evolution_settings(fields: Fields) -> EvolutionSettings:
+    default = EvolutionSettings()
+    return EvolutionSettings(
+        particles=fields.whole("particles", default=default.particles, least=FEWEST, most=100_000),
+        generations=fields.whole("generations", default=default.generations, least=1, most=100_000),
+    )
 
 
 def _pair(fields: Fields, name: str) -> tuple[float, float]:

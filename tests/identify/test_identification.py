@@ -15,6 +15,7 @@ import pytest
 
 from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
+from morphcore.evolution import EvolutionSettings
 from morphcore.identify import (
     Identification,
     Interrupted,
@@ -41,6 +42,7 @@ from tests.identify.flights import (
 TWO = ModelSettings(links_per_wing=2)
 QUICK = SearchSettings(seed=3, screen=32, starts=3, iterations=6)
 SWARM = SearchSettings(method="pso", seed=3, swarm=SwarmSettings(particles=16, generations=4))
+EVOLUTION = SearchSettings(method="cma", seed=3, evolution=EvolutionSettings(particles=16, generations=4))
 
 
 def quick(search: SearchSettings = QUICK, **options: Any) -> Identification:
@@ -86,7 +88,7 @@ def test_finds_the_parameters_that_flew_the_sample() -> None:
     np.testing.assert_allclose(found.lift_factor, batch.lift_factor, rtol=0.03)
 
 
-@pytest.mark.parametrize("search", [QUICK, SWARM, replace(QUICK, method="least_squares")])
+@pytest.mark.parametrize("search", [QUICK, SWARM, EVOLUTION, replace(QUICK, method="least_squares")])
 def test_resumes_from_any_step_to_the_identical_result(search: SearchSettings) -> None:
     """A search cut off after any step and begun again from its bytes ends as the undisturbed one."""
     steps = list(quick(search).steps())
