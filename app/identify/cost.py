@@ -8,11 +8,13 @@ from app.identify.schemas import CostEstimate, SamplesRequest, Search, SoughtMod
 from app.schemas.samples import InlineSample
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
-SWARM_PARTICLES = {"pso": 256, "hybrid": 128}
+SWARM_PARTICLES = {"pso": 200, "cma": 32}
 PAPER_PARTICLES = 2500
-SWARM_GENERATIONS = {"pso": 200, "hybrid": 20}
-POLISH_STARTS = 4
-POLISH_ITERATIONS = 25
+SWARM_GENERATIONS = {"pso": 100, "cma": 200}
+DESCENT_ITERATIONS = 20
+DESCENT_TRIALS = (
+    24  # trial steps of an iteration; its Jacobian flies a parameter set a parameter and one more
+)
 REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
 REFERENCE_LINKS = 3
 
@@ -26,15 +28,11 @@ def parameter_count(model: SoughtModel, links: int) -> int:
 
 def _parameter_sets(search: Search, parameters: int) -> int:
     """Count the parameter sets that a search flies through every training sample."""
-    sets = 0
-    if search.method in SWARM_PARTICLES:
-        particles = search.particles or (
-            PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[search.method]
-        )
-        sets += particles * (search.generations or SWARM_GENERATIONS[search.method])
-    if search.method != "pso":
-        sets += POLISH_STARTS * POLISH_ITERATIONS * (parameters + 1)
-    return sets
+    if search.method not in SWARM_PARTICLES and search.preset != "paper":
+        return DESCENT_ITERATIONS * (parameters + 1 + DESCENT_TRIALS)
+    method = "pso" if search.preset == "paper" else search.method
+    particles = search.particles or (PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[method])
+    return particles * (search.generations or SWARM_GENERATIONS[method])
 
 
 def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample]) -> CostEstimate:

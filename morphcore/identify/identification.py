@@ -13,6 +13,7 @@ from scipy.stats import qmc
 
 from morphcore.errors import InvalidInput
 from morphcore.evolution import Evolution, EvolutionState, first_evolution
+from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
 from morphcore.identify.generation import GenerationTask
@@ -42,9 +43,13 @@ ASKED: tuple[Phase, ...] = ("swarm", "evolution")
 FOLLOWING: dict[str, Phase] = {
     "pso": "swarm",
     "cma": "evolution",
-    "hybrid": "screen",
+    "hybrid": "polish",
     "least_squares": "polish",
 }
+# "hybrid" looks elsewhere where the descent from the physical guess leaves errors above 1 % of the motion
+# (rms, so squared here): it may have ended in a wrong valley. Where it does not, J was the same from every
+# start tried, and the flights of a screen would be wasted.
+GOOD_FIT = 1e-4
 
 
 class Identification:
@@ -180,25 +185,30 @@ class Identification:
         step = {"screen": self._screen, "polish": self._polish}.get(state.phase, self._generation)
         return step(state, stop)
 
+    @cached_property
+    def _good(self) -> float:
+        """J with which a descent has ended well, rad^2: a share of the motion in the samples."""
+        return GOOD_FIT * sum(
+            float(np.sum((case.weight * wrap_angle(case.sample.euler - case.sample.euler[0])) ** 2))
+            for case in self.training
+        )
+
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly candidates around what is known and choose the polish's starts among them."""
         spread = SCREEN_SPREAD * _even_normals(self.search.screen, self.space.dimension, self.search.seed)
         points = np.clip(self.known[0] + spread, self.space.lower, self.space.upper)
-        known = self.known[: self.search.screen]
-        points[: len(known)] = known
         cost = self._costs(points, stop)
-        order = np.argsort(cost, kind="stable")
-        chosen = np.unique(np.append(order[: self.search.starts - len(known)], range(len(known))))
-        best = int(order[0])
-        found = SearchState(
-            "polish",
-            points[best],
-            float(cost[best]),
-            state.generation + 1,
-            state.flights + cost.size * len(self.training),
-            state.wall_s,
-            state.history,
+        chosen = np.argsort(cost, kind="stable")[: self.search.starts]
+        better = cost[chosen[0]] < state.best_cost
+        found = replace(
+            state,
+            phase="polish",
+            best=points[chosen[0]] if better else state.best,
+            best_cost=float(cost[chosen[0]]) if better else state.best_cost,
+            generation=state.generation + 1,
+            flights=state.flights + cost.size * len(self.training),
             polish=first_polish(points[chosen], cost[chosen]),
+            screened=True,
         )
         return _recorded(found, "screen", cost.size)
 
@@ -216,19 +226,27 @@ class Identification:
             return np.concatenate([self._residuals(points, stop), prior], axis=1)
 
         after = next_polish(before, self.space.lower, self.space.upper, errors, keep)
-        if after is before:
-            return replace(state, phase="done")
-        best = after.point[after.best]
+        if after is before:  # none of the starts kept moves any more
+            return replace(state, phase=self._after_descent(state))
+        point = after.point[after.best]
+        cost = float(after.cost[after.best] - PRIOR_RAD**2 * np.sum((point - self.space.guess) ** 2))
+        better = cost < state.best_cost
+        over = after.iteration >= self.search.iterations or not np.any(after.active)
         moved = replace(
             state,
-            phase="polish" if after.iteration < self.search.iterations else "done",
-            best=best,
-            best_cost=float(after.cost[after.best] - PRIOR_RAD**2 * np.sum((best - self.space.guess) ** 2)),
+            best=point if better else state.best,
+            best_cost=cost if better else state.best_cost,
             generation=state.generation + 1,
             flights=state.flights + flown * len(self.training),
             polish=after,
         )
+        if over:
+            moved = replace(moved, phase=self._after_descent(moved))
         return _recorded(moved, "polish", flown)
+
+    def _after_descent(self, state: SearchState) -> Phase:
+        looks = self.search.method == "hybrid" and not state.screened
+        return "screen" if looks and state.best_cost > self._good else "done"
 
     def _generation(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly one generation and move it."""
@@ -304,7 +322,8 @@ class Identification:
             "pso": self.search.swarm.generations,
             "cma": self.search.evolution.generations,
             "least_squares": 1 + self.search.iterations,
-        }.get(self.search.method, 2 + self.search.iterations)
+            "hybrid": 2 + 2 * self.search.iterations,
+        }[self.search.method]
         fraction = 1.0 if state.phase == "done" else min(state.generation / total, 0.99)
         return Step(
             phase=str(last["phase"]),

@@ -22,7 +22,7 @@ Method = Literal["hybrid", "least_squares", "cma", "pso"]
 METHODS: tuple[Method, ...] = ("hybrid", "least_squares", "cma", "pso")
 LARGEST_SEED = 2**53 - 1
 PAPER_PARTICLES = 2500
-# starts of the hybrid's polish, the physical guess among them
+# starts of the hybrid's second polish
 DEFAULT_STARTS = 4
 DEFAULT_ITERATIONS = 40
 DEFAULT_SCREEN = 64  # candidates flown to find them
@@ -49,7 +49,8 @@ class SearchSettings:
     """How they are sought: ``swarm`` rules "pso", ``evolution`` "cma".
 
     "least_squares" descends from what is known beforehand (the physical guess, ``warm_start``) in up to
-    ``iterations``; "hybrid" first flies ``screen`` candidates around it and descends from ``starts``.
+    ``iterations``; "hybrid" does the same and, where that ends in a poor fit, flies ``screen`` candidates and
+    descends from the best ``starts`` of them.
 
     ``warm_start`` : a model (one particle) to begin from instead of the physical guess, which stays among the
     candidates.

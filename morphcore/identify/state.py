@@ -24,7 +24,7 @@ class SearchState:
     """A search between two steps.
 
     phase : what comes next. best : (d,) search point with the least J so far. history : one row per
-    generation.
+    generation. screened : whether candidates away from the physical guess were flown.
     """
 
     phase: Phase
@@ -37,6 +37,7 @@ class SearchState:
     swarm: SwarmState | None = field(default=None, repr=False)
     polish: PolishState | None = field(default=None, repr=False)
     evolution: EvolutionState | None = field(default=None, repr=False)
+    screened: bool = False
 
 
 def encode(state: SearchState) -> bytes:

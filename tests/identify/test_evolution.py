@@ -1,4 +1,4 @@
-"""CMA-ES as a search: it arrives, goes on from its bytes, keeps the box and leaves numpy's generator alone."""
+"""CMA-ES as a search: it arrives, resumes, keeps the box and leaves numpy's generator alone."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SEARCH = SearchSettings(method="cma", seed=5, evolution=SMALL)
 
 
 def ellipsoid(points: Array) -> Array:
-    """A stretched bowl whose least point is at 0.8 in the first coordinate and outside of the box in the last."""
+    """A stretched bowl whose least point is inside of the box but for the last coordinate."""
     centre = np.full(points.shape[1], 0.8)
     centre[-1] = 1.2
     return np.asarray(((points - centre) ** 2 * 10 ** np.linspace(0, 3, points.shape[1])).sum(axis=1))
@@ -59,7 +59,7 @@ def test_reaches_the_least_point_of_the_box_and_never_leaves_it(d: int) -> None:
 
 
 def test_goes_on_from_what_it_was_told() -> None:
-    """Another strategy, told the same costs, asks for the same points; so does one that went astray between."""
+    """Another strategy, told the same costs, asks for the same points; so does one told otherwise between."""
     settings = EvolutionSettings(particles=12, generations=9)
     first, other = (Evolution(settings, np.full(6, 0.4), 3) for _ in range(2))
     state, _ = searched(first, settings)

@@ -99,6 +99,29 @@ def test_resumes_from_any_step_to_the_identical_result(search: SearchSettings) -
         assert without_times(resumed.result(ended.checkpoint).to_document()) == whole
 
 
+def test_looks_elsewhere_only_where_the_guess_leads_to_a_poor_fit() -> None:
+    """Two links descend from the physical guess to a good fit: no candidate is flown, whatever the seed.
+
+    One link cannot fit a flexible wing: "hybrid" looks for another valley, "least_squares" does not, and what
+    was found before is kept.
+    """
+    phases = [[row["phase"] for row in decode(last(quick()).checkpoint).history]]
+    ends = {}
+    for method in ("least_squares", "hybrid"):
+        run = Identification(
+            reference_aircraft(),
+            reference_flight(),
+            [shortened(example("rate_0.8"), 120)],
+            ModelSettings(links_per_wing=1),
+            replace(QUICK, method=method),  # type: ignore[arg-type]
+        )
+        step = last(run)
+        phases.append([row["phase"] for row in decode(step.checkpoint).history])
+        ends[method] = step.best_cost
+    assert ["screen" in listed for listed in phases] == [False, False, True]
+    assert ends["hybrid"] <= ends["least_squares"]
+
+
 def test_every_step_has_a_result() -> None:
     """From the first step on there is a best so far; it never gets dearer, and the fraction rises to one."""
     run = quick()
