@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from morphcore import bench
-from morphcore.bench import Effort, benchmark_swarm, benchmark_table, run_benchmarks
+from morphcore.bench import SECTIONS, Effort, benchmark_swarm, benchmark_table, run_benchmarks, setting
+from morphcore.bench.requirements import judged
+from morphcore.bench.table import LINES
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import load_aircraft, load_flight
 from morphcore.geometry.lattice import LatticeSettings
@@ -18,13 +20,18 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.threads import thread_count
 
 SMALLEST = Effort(particles=17, rounds=1, singles=1, links=(1, 2), refinement=2)
+TIMED = ("batch", "single_flight", "growth_with_links", "step_error", "lattice")
 
 
 def test_figures_follow_from_the_times() -> None:
     """With a clock that ticks one second a look, every time is known, and so is every factor made of them."""
     threads = thread_count()
     ticks = itertools.count()
-    figures = run_benchmarks(effort=SMALLEST, clock=lambda: float(next(ticks)))
+
+    def tick() -> float:
+        return float(next(ticks))
+
+    figures = run_benchmarks(effort=SMALLEST, sections=TIMED, clock=tick, computing=tick)
     assert thread_count() == threads, "the caller's threads are as before"
     json.dumps(figures, allow_nan=False)
     flights_s, batch = figures["settings"]["flight_s"], figures["batch"]
@@ -43,9 +50,41 @@ def test_figures_follow_from_the_times() -> None:
     }
     assert 1e-9 < figures["step_error"]["worst_rad"] < 1e-4
     assert figures["step_error"]["worst_rad"] == max(figures["step_error"]["rad"].values())
-    table = dict(benchmark_table(figures))
-    assert table["one lattice operator"] == "1e+03 ms"
-    assert any(key.endswith("real time per core") for key in table)
+    table = {line.what: line for line in benchmark_table(figures)}
+    assert table["one lattice operator"].value == "1e+03 ms"
+    (speed,) = [line for what, line in table.items() if what.endswith("real time per core")]
+    assert speed.must == ">= 3,000 x  FALLS SHORT"  # 17 flights in three seconds
+    holds = {each["figure"]: each["holds"] for each in figures["requirements"]}
+    assert holds["batch/real_time_factor_per_core"] is False
+    assert holds["step_error/worst_rad"] is True
+    assert not any(name.startswith("mujoco") for name in holds), "what was not measured is not judged"
+
+
+def test_every_section_has_lines_and_a_wrong_name_is_told() -> None:
+    """No section is measured that the table would swallow; a name that is none is refused with the list."""
+    shown = {name for name, lines in LINES.items() if lines is not None}
+    given = (set(SECTIONS) | {"threads"}) - shown
+    assert not given
+    with pytest.raises(InvalidInput, match="no benchmark 'speed'") as caught:
+        run_benchmarks(effort=SMALLEST, sections=["speed"])
+    assert "mujoco" in str(caught.value.hint)
+
+
+def test_without_mujoco_the_comparison_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is skipped with a word, in the table too, and no bound on it is judged."""
+    monkeypatch.setitem(sys.modules, "morphcore.bench.mujoco_tree", None)
+    figures = run_benchmarks(effort=SMALLEST, sections=["mujoco"])
+    assert "`oracles`" in figures["mujoco"]["skipped"]
+    (line,) = benchmark_table(figures)
+    assert line.value.startswith("skipped: MuJoCo is not installed")
+    assert figures["requirements"] == []
+
+
+@pytest.mark.parametrize(("value", "holds"), [(3000.0, True), (2999.9, False), (float("nan"), False)])
+def test_a_bound_is_held_or_not(value: float, holds: bool) -> None:  # noqa: FBT001
+    """A figure on its bound holds; one that is no number does not."""
+    (found,) = judged({"batch": {"real_time_factor_per_core": value}})
+    assert found["holds"] is holds
 
 
 def test_swarm_is_the_same_every_time(examples: Path) -> None:
@@ -68,7 +107,8 @@ def test_flights_may_lie_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """An installation without examples says what it needs; so does a folder that does not hold them."""
     with pytest.raises(InvalidInput, match=r"aircraft\.json does not exist"):
         run_benchmarks(effort=SMALLEST, samples_dir=tmp_path)
-    monkeypatch.setattr(bench, "__file__", str(tmp_path / "site-packages" / "morphcore" / "bench.py"))
+    installed = tmp_path / "site-packages" / "morphcore" / "bench" / "setting.py"
+    monkeypatch.setattr(setting, "__file__", str(installed))
     with pytest.raises(InvalidInput, match="not beside this installation") as caught:
         run_benchmarks(effort=SMALLEST)
     assert caught.value.pointer == "/samples_dir"

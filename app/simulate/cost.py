@@ -7,7 +7,7 @@ import math
 from app.simulate.schemas import FlightCost, SimulateRequest
 
 # nominal figures, to an order of magnitude, of a flight alone on one core
-DEFAULT_STEP_S = {"rigid": 0.005, "equivalent": 0.005, "flexible": 0.001}
+DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}
 STEP_CORE_S = {"rigid": 5e-5, "equivalent": 1e-4, "flexible": 2e-3}
 START_CORE_S = 1.0  # trim, the lattice along the morph, tables and plots
 

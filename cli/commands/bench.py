@@ -14,13 +14,16 @@ from cli.screen import print_json, reports_errors, stdout
 
 @reports_errors
 def bench(
-    quick: Annotated[bool, typer.Option("--quick", help="Half a minute instead of some.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A minute or two instead of several.")] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Measure this alone, such as batch, mujoco, memory; repeat.")
+    ] = None,
     samples: Annotated[
         Path | None, typer.Option(help="Folder with aircraft.json, flight.json and the example flights.")
     ] = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Measure this machine: speed of the batch, of the lattice, of the identification."""
+    """Measure this machine: speed, operations, memory and start, each beside what it must be."""
     from worker import numerics
 
     numerics.prepare_environment(numerics.usable_cores())
@@ -28,11 +31,11 @@ def bench(
     from morphcore.errors import MorphError
 
     try:
-        figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples)
+        figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples, sections=only or None)
     except MorphError as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
     if as_json:
         print_json(figures)
         return
-    for what, value in benchmark_table(figures):
-        stdout().print(f"{what:<60} {value}", markup=False)
+    for what, value, must in benchmark_table(figures):
+        stdout().print(f"{what:<78} {value:<26} {must}".rstrip(), markup=False, soft_wrap=True)

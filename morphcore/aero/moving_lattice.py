@@ -8,19 +8,16 @@ place does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from morphcore.aero.kernels.lattice_forces import (
-    add_rider_forces,
-    corner_forces,
-    normal_influence,
-    rider_velocities,
-)
+from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, section_forces
+from morphcore.aero.kernels.lattice_place import LatticeParts, lattice_place
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
-from morphcore.aero.vlm import RingTable, edge_midpoints, influence, panel_normals
+from morphcore.aero.vlm import RingTable, prandtl_glauert
 from morphcore.geometry.lattice import VortexCore
 
 Array = NDArray[np.float64]
@@ -48,62 +45,76 @@ class Riders:
 
 
 class MovingLattice:
-    """A lattice on its sections; keeps the influence of its last place.
+    """A lattice on its sections; keeps the normal influence of its last place.
 
     Parameters
     ----------
     table, riders, core : the lattice. density : kg/m^3. mach : of the free stream.
+
+    Raises
+    ------
+    UnsupportedRegime : the Mach number is beyond 0.7.
     """
 
     def __init__(
         self, table: RingTable, riders: Riders, core: VortexCore, density: float, mach: float
     ) -> None:
-        self.table, self.riders = table, riders
-        self._core, self._density, self._mach = core, density, mach
-        self._matrix: Array = np.empty((table.rings, table.rings))
-        self._local: Array = np.empty((3, table.edges))
-        self._corner_velocity: Array = np.empty((table.corners, 3))
-        self._control_velocity: Array = np.empty((table.rings, 3))
-        self._drag_velocity: Array = np.empty((riders.drag.size, 3))
-        self._force: Array = np.empty((table.corners, 3))
+        self.parts = lattice_parts(table, riders, core, density, mach)
+        self.at = lattice_place(self.parts, riders.sections, table.corners)
+        self._rings = table.rings
+        self._factors: Any = None  # of `lu_factor`, once asked for in this place
 
     def place(self, R_BS: Array, x_B: Array, stream_B: Array) -> None:
         """Put the lattice on its sections: R_BS (k, 3, 3) to B, x_B (k, 3) m; wake along stream_B (3,)."""
-        riders, table = self.riders, self.table
-        self._R_BS = R_BS
-        self._corners = _placed(R_BS, x_B, riders.corner, riders.corner_arm)
-        controls = _placed(R_BS, x_B, riders.control, riders.control_arm)
-        points = np.concatenate([controls, edge_midpoints(self._corners, table)])
-        self._velocity = influence(points, self._corners, table, stream_B, self._core, self._mach)
-        self._normals = panel_normals(self._corners, table)
-        normal_influence(self._normals, self._velocity, self._matrix)
-        self._factors = lu_factor(self._matrix, check_finite=False)
+        self.at.R_BS[:], self.at.x_B[:] = R_BS, x_B
+        place_lattice(self.parts, self.at, stream_B)
+        self._factors = None
 
     def circulation(self, twists: Array, wind_B: Array) -> Array:
         """Circulations (r,), m^2/s, without lag, for twists (k, 6) of the sections in their own axes."""
-        riders = self.riders
-        rider_velocities(riders.control, riders.control_arm, self._R_BS, twists, self._control_velocity)
-        flow = wind_B - self._control_velocity
-        return np.asarray(lu_solve(self._factors, -np.sum(self._normals * flow, axis=1), check_finite=False))
+        right = np.empty(self._rings)
+        blocked_flow(self.parts, self.at, twists, wind_B, right)
+        if self._factors is None:
+            self._factors = lu_factor(self.at.influence[: self._rings].T, check_finite=False)
+        return np.asarray(lu_solve(self._factors, right, check_finite=False))
 
     def section_forces(self, lagged: Array, twists: Array, wind_B: Array) -> Array:
         """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,)."""
-        riders, table = self.riders, self.table
-        out = np.zeros((self._R_BS.shape[0], 6))
-        rider_velocities(riders.corner, riders.corner_arm, self._R_BS, twists, self._corner_velocity)
-        corner_forces(
-            self._velocity, table.rings, lagged, wind_B, self._corner_velocity, self._corners,
-            table.edge_start, table.edge_end, table.edge_plus, table.edge_minus, self._density,
-            self._local, self._force,
-        )  # fmt: skip
-        add_rider_forces(riders.corner, riders.corner_arm, self._R_BS, self._force, out)
-        # profile drag of each strip, along the velocity of its middle
-        rider_velocities(riders.drag, riders.drag_arm, self._R_BS, twists, self._drag_velocity)
-        flow = wind_B - self._drag_velocity
-        speed = np.sqrt(np.sum(flow**2, axis=1))
-        drag = 0.5 * self._density * (riders.drag_area * speed)[:, None] * flow
-        add_rider_forces(riders.drag, riders.drag_arm, self._R_BS, drag, out)
+        out = np.empty((self.at.R_BS.shape[0], 6))
+        section_forces(self.parts, self.at, lagged, twists, wind_B, 0.0, out)
         return out
+
+
+def lattice_parts(
+    table: RingTable, riders: Riders, core: VortexCore, density: float, mach: float
+) -> LatticeParts:
+    """What of a riding lattice never changes, as its kernels take it."""
+    radius = table.core_radius_m(core)
+    ring = (
+        np.concatenate([table.edge_plus, table.leg_plus]),
+        np.concatenate([table.edge_minus, table.leg_minus]),
+    )
+    plus, minus = (np.where(rings < 0, table.rings, rings) for rings in ring)
+    of_line = radius[np.concatenate([table.edge_surface, table.leg_surface])]
+    return LatticeParts(
+        line_start=np.concatenate([table.edge_start, table.leg_start]),
+        line_end=np.concatenate([table.edge_end, np.full(table.leg_start.size, -1)]),
+        line_plus=plus,
+        line_minus=minus,
+        line_core=of_line ** (2 if core.law == "smoothed" else 4),
+        ring_corner=table.ring_corner.copy(),
+        panel_side=np.array(table.panel_side, dtype=np.float64),
+        corner=riders.corner,
+        corner_arm=riders.corner_arm,
+        control=riders.control,
+        control_arm=riders.control_arm,
+        drag=riders.drag,
+        drag_arm=riders.drag_arm,
+        drag_area=riders.drag_area,
+        smoothed=core.law == "smoothed",
+        stretch=1.0 / prandtl_glauert(mach),
+        density=float(density),
+    )
 
 
 def acting_circulation(circulation: Array, lag: Array) -> Array:
@@ -119,7 +130,3 @@ def followed(lag: Array, before: Array, after: Array, lag_time: Array, step_s: f
     z = step_s / lag_time
     decay, mean = np.exp(-z), -np.expm1(-z) / z
     return np.asarray(decay * lag + (mean - decay) * before + (1.0 - mean) * after)
-
-
-def _placed(R_BS: Array, x_B: Array, section: IntArray, arm: Array) -> Array:
-    return np.asarray(x_B[section] + np.einsum("mij,mj->mi", R_BS[section], arm))

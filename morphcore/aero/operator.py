@@ -36,23 +36,35 @@ from morphcore.geometry.lattice import (
     surface_lattice,
     surface_pose,
 )
+from morphcore.geometry.surface import Surface
 
 Array = NDArray[np.float64]
 
 ROW_MULTIPLE, COLUMN_MULTIPLE = 8, 4  # the lane product runs over tiles of this size
+ACROSS = np.array([1.0, -1.0, 1.0])  # reflection about the x-z plane
 BODY_AFT = (-1.0, 0.0, 0.0)  # direction of the frozen wake in B: the free stream at zero incidence
 
 
 @dataclass(frozen=True)
 class AircraftLattice:
-    """The undeformed lattices of all surfaces, what was asked of them, and their numbering."""
+    """The undeformed lattices of all surfaces, what was asked of them, and their numbering.
+
+    images : mirror images of the surfaces, where these are one half of a symmetric aircraft: they induce
+        velocities and have no outputs of their own. table : rings of the surfaces, then of the images.
+    """
 
     aircraft: Aircraft
     settings: LatticeSettings
     lattices: tuple[SurfaceLattice, ...]
+    images: tuple[Surface, ...]
     table: RingTable
     strip0: tuple[int, ...]
     strips: int
+
+    @property
+    def rings(self) -> int:
+        """Rings of the surfaces, without their images."""
+        return sum(lattice.rings for lattice in self.lattices)
 
     @property
     def operator_shape(self) -> tuple[int, int]:
@@ -76,13 +88,22 @@ class LatticeOperator:
     strips: Array
 
 
-def aircraft_lattice(aircraft: Aircraft, settings: LatticeSettings = DEFAULT_LATTICE) -> AircraftLattice:
-    """Lattices of the same settings on every surface."""
+def aircraft_lattice(
+    aircraft: Aircraft, settings: LatticeSettings = DEFAULT_LATTICE, images: Sequence[Surface] = ()
+) -> AircraftLattice:
+    """Lattices of the same settings on every surface; ``images`` of all of them or none."""
     panels = (settings.chordwise, settings.spanwise)
     lattices = tuple(surface_lattice(surface, *panels) for surface in aircraft.surfaces)
+    reflected = tuple(surface_lattice(surface, *panels) for surface in images)
     strip0 = tuple(int(n) for n in np.cumsum([0] + [lattice.spanwise for lattice in lattices[:-1]]))
     return AircraftLattice(
-        aircraft, settings, lattices, ring_table(lattices), strip0, sum(x.spanwise for x in lattices)
+        aircraft,
+        settings,
+        lattices,
+        tuple(images),
+        ring_table(lattices + reflected),
+        strip0,
+        sum(lattice.spanwise for lattice in lattices),
     )
 
 
@@ -104,6 +125,7 @@ def lattice_operator(
         fronts.append((0.5 * (ring[:-1, :-1] + ring[:-1, 1:])).reshape(-1, 3))
         sides.append((0.5 * (ring[:-1] + ring[1:])).reshape(-1, 3))
         normals.append(R_BW[:, 2])
+    corners += [ring * ACROSS for ring in corners if lattice.images]
     groups = (controls, fronts, sides)
     points = np.concatenate([part for group in groups for part in group])
     velocity = influence(
@@ -117,7 +139,9 @@ def lattice_operator(
         ]
     )
     induced = np.einsum("pa,arp->pr", normal, velocity)  # normal velocity, (points, rings)
-    rings = lattice.table.rings
+    rings = lattice.rings
+    if lattice.images:  # an image's circulation is its original's
+        induced = induced[:, :rings] + induced[:, rings:]
     circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
     downwash = induced[rings:] @ circulation
     return _reduced(lattice, circulation, downwash)
@@ -125,7 +149,7 @@ def lattice_operator(
 
 def _boundary(lattice: AircraftLattice) -> Array:
     """Normal velocity at the control points (rings, inputs) from D0 and D1 of every strip."""
-    out = np.zeros((lattice.table.rings, 2 * lattice.strips))
+    out = np.zeros((lattice.rings, 2 * lattice.strips))
     ring = 0
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
@@ -146,7 +170,7 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
     uniform = circulation[:, ::2].sum(axis=1)  # every strip at the same incidence
     inputs = circulation.shape[1]
     ring = 0
-    side0 = lattice.table.rings
+    side0 = lattice.rings
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
     ):

@@ -150,7 +150,7 @@ def influence(
     """
     u_B = np.asarray(wake_direction_B, dtype=np.float64)
     u_B = u_B / np.sqrt(u_B @ u_B)
-    stretch = 1.0 / _beta(mach)
+    stretch = 1.0 / prandtl_glauert(mach)
     points = np.array(points_B, dtype=np.float64).reshape(-1, 3)
     corners = np.array(corners_B, dtype=np.float64).reshape(-1, 3)
     if corners.shape[0] != table.corners:
@@ -249,7 +249,13 @@ def edge_forces(
     return EdgeForces(points_B, force_B, panel_force_B, panel_moment_B)
 
 
-def _beta(mach: float) -> float:
+def prandtl_glauert(mach: float) -> float:
+    """beta = sqrt(1 - mach^2).
+
+    Raises
+    ------
+    UnsupportedRegime : the Mach number is beyond 0.7.
+    """
     if not 0.0 <= mach <= MACH_LIMIT:
         raise UnsupportedRegime(
             f"Mach {mach:.2f} is outside 0..{MACH_LIMIT}, where linear compressibility holds",

@@ -79,8 +79,10 @@ def sample_cases(
     samples: Sequence[Trajectory],
     longest_step_s: float = STEP_S,
     pointer: str = "/samples",
+    *,
+    separate_wings: bool = False,
 ) -> tuple[SampleCase, ...]:
-    """Plans for all samples."""
+    """Plans for all samples, for models whose wings share their parameters or have ``separate_wings``."""
     return tuple(
         SampleCase(
             sample,
@@ -88,6 +90,7 @@ def sample_cases(
                 model,
                 sample_schedules(model.aircraft, sample, f"{pointer}/{i}"),
                 time_grid(sample.time_s, longest_step_s),
+                may_halve=not separate_wings,
             ),
         )
         for i, sample in enumerate(samples)
@@ -102,7 +105,7 @@ def shared_trims(
     for case in cases:
         key = tuple(np.round(np.concatenate([case.plan.angles[0], case.plan.wind_N[0]]), 9))
         if key not in known:
-            known[key] = trim(model, batch, case.plan, start=start)
+            known[key] = trim(case.plan.flown(model), batch, case.plan, start=start)
         yield case, known[key]
 
 
@@ -111,6 +114,7 @@ def fly_attitudes(
 ) -> Array:
     """Euler angles (p, k, 3) at the sample's times; NaN from where a flight diverged, or untrimmed."""
     plan, sample = case.plan, case.sample
+    model = plan.flown(model)
     constants = lane_constants(model, batch, plan.grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
     state = trimmed_state(model, batch, plan, found, psi=float(sample.psi[0]))

@@ -105,7 +105,12 @@ class Identification:
     @cached_property
     def cases(self) -> tuple[SampleCase, ...]:
         """All samples with their plans."""
-        return sample_cases(self.model, self.samples, self.settings.step_s)
+        return sample_cases(
+            self.model,
+            self.samples,
+            self.settings.step_s,
+            separate_wings=self.settings.separate_wings,
+        )
 
     @cached_property
     def training(self) -> tuple[SampleCase, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,8 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
+from morphcore.geometry.mirror import Mirror, mirror_of
+from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
 from morphcore.models.kernels.layout import (
     AERO_C,
@@ -57,6 +61,11 @@ class ParameterBatch:
         return int(self.division.shape[0])
 
     @property
+    def wing_sets(self) -> int:
+        """Sets of wing parameters, w."""
+        return int(self.division.shape[1])
+
+    @property
     def links(self) -> int:
         """Links per flexible surface."""
         return int(self.division.shape[2])
@@ -70,7 +79,8 @@ class ParameterBatch:
 class ChainModel:
     """Topology and lattice of an equivalent (or rigid) model: all that its parameter sets share.
 
-    surfaces : (s, 5) first link, links, first strip, strips, first overlap pair of each surface.
+    surfaces : (s, 6) first link, links, first strip, strips, first overlap pair of each surface, and whether
+        it stands for its mirror image too.
     """
 
     aircraft: Aircraft
@@ -78,6 +88,24 @@ class ChainModel:
     lattice: AircraftLattice
     links_per_wing: int
     surfaces: IntArray
+
+    @cached_property
+    def mirror(self) -> Mirror | None:
+        """Which surfaces are each other's images; None if the aircraft is not symmetric, or half of one."""
+        return None if self.lattice.images else mirror_of(self.aircraft, self.flight)
+
+    @cached_property
+    def half(self) -> ChainModel | None:
+        """One half of a symmetric aircraft, which stands for both where they move alike, at half the cost.
+
+        The fuselage is whole. Of a pair of surfaces the one that is named first is kept.
+        """
+        if self.mirror is None:
+            return None
+        every = self.aircraft.surfaces
+        own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
+        images = tuple(every[k] for k in self.mirror.image)
+        return _chain_model(own, self.flight, self.links_per_wing, self.lattice.settings, images)
 
     @property
     def links(self) -> int:
@@ -132,11 +160,21 @@ def chain_model(
             pointer="/model/links_per_wing",
             hint=f"give a whole number in 1..{MOST_LINKS}",
         )
-    lattices = aircraft_lattice(aircraft, lattice)
+    return _chain_model(aircraft, flight, links_per_wing, lattice)
+
+
+def _chain_model(
+    aircraft: Aircraft,
+    flight: Flight,
+    links_per_wing: int,
+    lattice: LatticeSettings,
+    images: Sequence[Surface] = (),
+) -> ChainModel:
+    lattices = aircraft_lattice(aircraft, lattice, images)
     rows, link, pair = [], 0, 0
     for surface, part, strip0 in zip(aircraft.surfaces, lattices.lattices, lattices.strip0, strict=True):
         count = links_per_wing if surface.flexible else 1
-        rows.append([link, count, strip0, part.spanwise, pair])
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images))])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
@@ -217,7 +255,14 @@ def lag_weights(lag_s: Array, step_s: float) -> Array:
 
 
 def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> LaneConstants:
-    """Lay a batch of parameters out for the kernels and for steps of ``step_s``."""
+    """Lay a batch of parameters out for the kernels and for steps of ``step_s``.
+
+    Raises
+    ------
+    ValueError : half an aircraft cannot have wings of different parameters.
+    """
+    if model.lattice.images and batch.wing_sets > 1:
+        raise ValueError("wings with parameters of their own need the whole aircraft")
     particles = batch.particles
     links = np.zeros((particles, model.links, LINK_ROWS))
     stiffness, damping, overlap = [], [], []
@@ -248,7 +293,9 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
         is_touched = weight > 0.0
         touched[:, mine, 0] = np.argmax(is_touched, axis=1)
         touched[:, mine, 1] = part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)
-    links[:, :, 10:] = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
+    weights = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
+    weights[..., ::2] **= 0.5  # the step carries the lag states by halves
+    links[:, :, 10:] = weights
     values = np.zeros((particles, LINKS_C))
     values[:, AERO_C : AERO_C + AERO_ROWS] = np.stack([batch.lift_factor, batch.centre_shift], axis=1)
     rows = np.concatenate([values, links.reshape(particles, -1), *stiffness, *damping, *overlap], axis=1)

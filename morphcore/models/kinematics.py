@@ -12,6 +12,31 @@ from morphcore.multibody.kernels.hinge import H_ORIGIN
 Array = NDArray[np.float64]
 
 
+# flap and lag of a gimbal turn the other way in the mirror image, torsion does not
+REFLECTED_GIMBAL = np.array([-1.0, 1.0, -1.0])
+
+
+def whole_joints(model: ChainModel, q_joint: Array) -> Array:
+    """Joint coordinates (k, coordinates) of a symmetric aircraft from those of its half, rad."""
+    mirror, half = model.mirror, model.half
+    assert mirror is not None  # noqa: S101 - who has joints of a half has a half
+    assert half is not None  # noqa: S101
+    out = np.empty((q_joint.shape[0], model.joints, 3))
+    own = q_joint.reshape(q_joint.shape[0], half.joints, 3)
+    first_own, first = _first_joints(half), _first_joints(model)
+    for number, (mine, image) in enumerate(zip(mirror.own, mirror.image, strict=True)):
+        count = int(half.surfaces[number, 1]) - 1
+        angles = own[:, first_own[number] : first_own[number] + count]
+        out[:, first[mine] : first[mine] + count] = angles
+        out[:, first[image] : first[image] + count] = REFLECTED_GIMBAL * angles
+    return out.reshape(q_joint.shape[0], -1)
+
+
+def _first_joints(model: ChainModel) -> NDArray[np.int64]:
+    """(s,) number of each surface's first gimbal."""
+    return np.asarray(model.surfaces[:, 0] - np.arange(model.surfaces.shape[0]))
+
+
 def gimbal_rotation(angles: Array) -> Array:
     """Rotation (..., 3, 3) link to parent of gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(lag)."""
     (s1, s2, s3), (c1, c2, c3) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)

@@ -8,7 +8,7 @@ N, and x (n, 3) in N; twists and their rates (n, 6) [omega; v] in node axes. For
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +19,17 @@ from morphcore.frames import skew
 from morphcore.multibody.kernels.beam import (
     MATRIX_SCRATCH,
     VECTOR_SCRATCH,
-    add_section_forces,
     beam_forces,
     beam_tangents,
     body_forces,
     condense,
     eliminate,
-    section_motion,
+    place_sections,
+    section_twists,
     substitute,
+    subtract_forces,
 )
+from morphcore.multibody.kernels.helix import helix_series
 from morphcore.multibody.kernels.poses import move_poses
 
 Array = NDArray[np.float64]
@@ -36,6 +38,7 @@ IntArray = NDArray[np.int64]
 # Gauss points of an element's inertia: the helix is of second degree, its kinetic energy of fourth
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS, GAUSS_WEIGHTS = 0.5 * (1.0 + _POINTS), 0.5 * _WEIGHTS
+GAUSS_SERIES = helix_series(GAUSS)
 MOST_ITERATIONS = 60
 STATIC_TOLERANCE = 1e-11  # rad and m, of the last Newton step
 
@@ -170,11 +173,10 @@ def make_beams(
         inertia=np.array(inertia, dtype=np.float64).reshape(-1, 6, 6),
         nodes=nodes if nodes is not None else int(end_nodes.max(initial=-1)) + 1,
     )
-    _integrate_mass(beams)
     for value in vars(beams).values():
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
-    return beams
+    return replace(beams, mass12=_consistent_mass(beams))
 
 
 def element_flexibility(along: Array, section_stiffness: Sequence[Array]) -> Array:
@@ -207,8 +209,8 @@ def node_forces(
     """
     out = np.zeros((beams.nodes, 6))
     failed = beam_forces(
-        beams.ends, beams.rest, beams.stiffness, beams.damping, beams.mass, GAUSS, poses.R, poses.x, V, A,
-        gravity_N, work.v, work.poses, work.strains, work.rates, out,
+        beams.ends, beams.rest, beams.stiffness, beams.damping, beams.mass, GAUSS, GAUSS_SERIES,
+        poses.R, poses.x, V, A, gravity_N, work.v, work.poses, work.strains, work.rates, out,
     )  # fmt: skip
     if failed >= 0:
         raise BeamTurnedTooFar(f"element {failed} is bent too far", hint="use more elements")
@@ -216,28 +218,56 @@ def node_forces(
     return out
 
 
+class Sections:
+    """Sections of some beams, with the maps between their twists and the nodes' at their last place.
+
+    Parameters
+    ----------
+    elements, fractions : (k,) element and place in it, 0..1; element -1 - i stands for node i itself.
+    """
+
+    def __init__(self, beams: Beams, elements: IntArray, fractions: Array) -> None:
+        self.beams, self.elements, self.fractions = beams, elements, fractions
+        self.series: Array = helix_series(fractions)
+        self.blocks: Array = np.zeros((elements.size, 2, 3, 3))
+
+    def place(self, work: BeamWorkspace, poses: NodePoses) -> NodePoses:
+        """Poses of the sections for the strains of the last `node_forces`."""
+        count = self.elements.size
+        found = NodePoses(np.empty((count, 3, 3)), np.empty((count, 3)))
+        place_sections(
+            self.beams.ends, self.fractions, self.series, self.elements, work.strains, poses.R, poses.x,
+            work.v, work.poses, found.R, found.x, self.blocks,
+        )  # fmt: skip
+        return found
+
+    def twists(self, V: Array) -> Array:
+        """Twists (k, 6) in the sections' axes for the nodes' twists V (n, 6)."""
+        out = np.empty((self.elements.size, 6))
+        section_twists(self.beams.ends, self.elements, self.blocks, V, out)
+        return out
+
+    def subtract(self, forces: Array, out: Array) -> None:
+        """Subtract from out (n, 6) the nodes' share of force vectors (k, 6) on sections, in section axes."""
+        subtract_forces(self.beams.ends, self.elements, self.blocks, forces, out)
+
+
 def sections_of(
     beams: Beams, work: BeamWorkspace, poses: NodePoses, V: Array, elements: IntArray, fractions: Array
 ) -> tuple[NodePoses, Array]:
-    """Poses and twists (k, 6) of sections, for the strains of the last `node_forces`.
-
-    elements, fractions : (k,) element and place in it, 0..1; element -1 - i stands for node i itself.
-    """
-    count = elements.size
-    found = NodePoses(np.empty((count, 3, 3)), np.empty((count, 3)))
-    twists = np.empty((count, 6))
-    section_motion(
-        beams.ends, fractions, elements, poses.R, poses.x, V, work.strains, work.rates, work.v, work.poses,
-        found.R, found.x, twists,
-    )  # fmt: skip
-    return found, twists
+    """Poses and twists (k, 6) of `Sections`, for the strains of the last `node_forces`."""
+    sections = Sections(beams, elements, fractions)
+    return sections.place(work, poses), sections.twists(V)
 
 
 def subtract_section_forces(
     beams: Beams, work: BeamWorkspace, elements: IntArray, fractions: Array, forces: Array, out: Array
 ) -> None:
-    """Subtract from out (n, 6) the nodes' share of force vectors (k, 6) on sections, in section axes."""
-    add_section_forces(beams.ends, fractions, elements, work.strains, forces, work.v, work.poses, out)
+    """Subtract from out (n, 6) the nodes' share of force vectors (k, 6) on `Sections`, in section axes."""
+    sections = Sections(beams, elements, fractions)
+    at_origin = NodePoses(np.zeros((beams.nodes, 3, 3)), np.zeros((beams.nodes, 3)))
+    sections.place(work, at_origin)  # the maps depend on the strains alone
+    sections.subtract(forces, out)
 
 
 def factor(
@@ -351,12 +381,14 @@ def clamped_modes(beams: Beams, count: int) -> tuple[Array, Array]:
     return np.sqrt(omega2[:count]) / (2.0 * np.pi), shapes.reshape(count, beams.nodes, 6)
 
 
-def _integrate_mass(beams: Beams) -> None:
-    """Fill in ``mass12``: the kernel's own forces for unit accelerations of each element alone, at rest."""
+def _consistent_mass(beams: Beams) -> Array:
+    """``mass12``: the kernel's own forces for unit accelerations of each element alone, at rest."""
     R, x = np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3))
     zero, unit, none = np.zeros((2, 6)), np.zeros((2, 6)), np.zeros(3)
     v, scratch = np.zeros((VECTOR_SCRATCH, 6)), np.zeros((2, 4, 3))
     ends, strain = np.array([[0, 1]]), np.zeros((1, 6))
+    ends.setflags(write=False)  # as all of Beams: one type, compiled once
+    found = np.zeros((beams.elements, 12, 12))
     for e in range(beams.elements):
         R[1], x[1] = np.eye(3), 0.0
         move_poses(np.stack([np.zeros(6), beams.rest[e]]), R, x, np.empty((7, 3)))
@@ -366,6 +398,9 @@ def _integrate_mass(beams: Beams) -> None:
             out = np.zeros((2, 6))
             beam_forces(
                 ends, beams.rest[e : e + 1], beams.stiffness[e : e + 1], beams.damping[e : e + 1],
-                beams.mass[e : e + 1], GAUSS, R, x, zero, unit, none, v, scratch, strain, strain.copy(), out,
+                beams.mass[e : e + 1], GAUSS, GAUSS_SERIES, R, x, zero, unit, none, v, scratch, strain,
+                strain.copy(), out,
             )  # fmt: skip
-            beams.mass12[e, :, column] = out.ravel()
+            found[e, :, column] = out.ravel()
+    found.setflags(write=False)
+    return found

@@ -89,14 +89,14 @@ class MorphFlights:
         start: StartMode,
         step_s: float,
     ) -> None:
-        self.model, self.path = model, path
+        self.model, self.path = path.flown(model), path
         self.times_s = times_s
         self.grid = time_grid(times_s, step_s)
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
-        found = trim(model, batch, waiting, start=start).require()
-        self.constants = lane_constants(model, batch, self.grid.step_s)
+        found = trim(self.model, batch, waiting, start=start).require()
+        self.constants = lane_constants(self.model, batch, self.grid.step_s)
         self.constants.set_thrust(found.force_B, found.moment_B)
-        self.state = trimmed_state(model, batch, waiting, found)
+        self.state = trimmed_state(self.model, batch, waiting, found)
 
     def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:
         """Fly schedules of all hinges; with the torque of their motors if asked for.

@@ -118,7 +118,7 @@ class ScheduleOptimisation:
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
-        return common_path(self.chain("rigid")[0], *ends)
+        return common_path(self.chain("rigid")[0], *ends, may_halve=self.parameters.wing_sets == 1)
 
     def chain(self, name: ModelName) -> tuple[ChainModel, ParameterBatch]:
         """One of the models that are searched with, and its parameters."""

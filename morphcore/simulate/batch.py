@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
-from morphcore.models.kernels.layout import JOINTS
+from morphcore.models.kernels.layout import JOINTS, state_rows
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
+from morphcore.simulate.kernels.step import SLOPES
 from morphcore.simulate.plan import FlightPlan
 from morphcore.stopping import Stop, heed
 from morphcore.threads import in_threads, thread_count
@@ -103,7 +104,9 @@ def fly_batch(
     bounds = _groups(count, threads)
     groups = bounds.size - 1
     rows, columns = model.lattice.operator_shape
-    work = np.zeros((groups, 3, model.state_rows, width))
+    mechanical = state_rows(model.links, model.coordinates)[2]
+    slopes = np.zeros((count, SLOPES, mechanical, width))
+    middle = np.zeros((groups, model.state_rows, width))
     scratch = np.zeros((groups, model.scratch_rows, width))
     inputs, outputs = np.zeros((groups, columns, width)), np.zeros((groups, rows, width))
     shared = shared_numbers(model)
@@ -112,15 +115,15 @@ def fly_batch(
     for first in range(0, plan.grid.steps, length):
         heed(stop)
         last = min(first + length, plan.grid.steps)
-        operators, strips = plan.table.between(first, last + 1)
-        hinges, wind_N = plan.hinges[first : last + 1], plan.wind_N[first : last + 1]
+        operators, strips = plan.middle.table.between(first, last)
+        hinges, wind_N = plan.middle.hinges[first:last], plan.middle.wind_N[first:last]
         accelerations = plan.mean_accelerations[first:last]
         record = np.empty((last - first, record_rows, count, width))
         common = (
             model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, wind_N,
-            constants.rows, plan.grid.step_s, blocks,
+            constants.rows, plan.grid.step_s, first, blocks, slopes,
         )  # fmt: skip
-        own = (work, scratch, inputs, outputs)
+        own = (middle, scratch, inputs, outputs)
         in_threads(partial(_fly_group, bounds, common, own, record), groups)
         yield Chunk(first + 1, record.reshape(last - first, record_rows, -1)[..., :particles])
 

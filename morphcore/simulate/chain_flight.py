@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
-from morphcore.models.kinematics import tip_positions
+from morphcore.models.kinematics import tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
@@ -41,16 +42,17 @@ def chain_flight(
     ----------
     at : (k,) rows of the grid to report. Others as in `flight.simulate`.
     """
-    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N)
-    found = trim(model, batch, plan, start=start).require()
-    constants = lane_constants(model, batch, grid.step_s)
+    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=batch.wing_sets == 1)
+    flown = plan.flown(model)
+    found = trim(flown, batch, plan, start=start).require()
+    constants = lane_constants(flown, batch, grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
-    state = trimmed_state(model, batch, plan, found)
-    rows, flown = JOINTS + model.coordinates, []
-    for chunk in fly_batch(model, plan, constants, state, record_rows=rows, stop=stop):
-        flown.append(chunk.rows[..., 0])
+    state = trimmed_state(flown, batch, plan, found)
+    rows, chunks = JOINTS + flown.coordinates, []
+    for chunk in fly_batch(flown, plan, constants, state, record_rows=rows, stop=stop):
+        chunks.append(chunk.rows[..., 0])
         yield chunk.first / grid.steps, None
-    history = np.concatenate(flown)
+    history = np.concatenate(chunks)
     turned = np.abs(history[:, JOINTS:]).max(axis=1, initial=0.0)
     require_sound(
         history,
@@ -62,13 +64,17 @@ def chain_flight(
     history = history[at]
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
+    angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
+    if plan.halved and model.mirror is not None:  # the other half did the same
+        angles, tips_z = model.mirror.spread(angles), model.mirror.spread(tips_z)
+        found = replace(found, q_joint=whole_joints(model, found.q_joint))
     record = FlightRecord(
         euler=euler_from_quaternion(quaternion),
         omega_B=history[:, OMEGA:VELOCITY],
         velocity_N=velocity_N,
         position_N=history[:, POSITION:JOINTS],
-        angles=plan.angles[at],
-        tips_z=_tips_z(model, batch, plan, history[:, JOINTS:], at),
+        angles=angles,
+        tips_z=tips_z,
         trim=found,
     )
     yield 1.0, record

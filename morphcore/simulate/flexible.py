@@ -2,34 +2,48 @@
 
 Brüls, Cardona & Arnold (2012): velocities and positions advance with an algorithmic acceleration ``a`` that
 averages the true one, A; positions move by the exponential of the increment in body axes. Each step's
-equations hold at its end to `TOLERANCE`, air loads included: the lattice stands where the step's predictor
-puts it (third order off), its circulations, lag and forces follow every iteration.
+equations hold at its end to `kernels.flexible_step.TOLERANCE`, air loads included: the lattice stands where
+the step's predictor puts it (third order off), its circulations, lag and forces follow every iteration.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.moving_lattice import MovingLattice, acting_circulation, followed
+from morphcore.aero.moving_lattice import MovingLattice, acting_circulation
 from morphcore.errors import FlightDiverged
 from morphcore.models.flexible import FlexibleModel
 from morphcore.multibody.beam import (
-    BeamTurnedTooFar,
+    GAUSS,
+    GAUSS_SERIES,
     BeamWorkspace,
     NodePoses,
+    Sections,
     carried,
     expand_solution,
     factor,
     node_forces,
     reduce_right,
-    sections_of,
-    subtract_section_forces,
 )
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE
+from morphcore.simulate.kernels.flexible_step import (
+    FLOWN,
+    INVERSE_WANTED,
+    MATRIX_WANTED,
+    MOST_ITERATIONS,
+    RECORD,
+    STILL,
+    Path,
+    Rule,
+    Scratch,
+    State,
+    Structure,
+    fly_steps,
+)
 from morphcore.simulate.kernels.roots import (
     follow_fuselage,
     gather_root_matrices,
@@ -45,10 +59,7 @@ Array = NDArray[np.float64]
 # best equivalent models are off (tests/simulate/test_flexible.py)
 FLEXIBLE_STEP_S = 0.001
 SPECTRAL_RADIUS = 0.6  # of the stepper at infinite frequency: stretching waves die out in some ten steps
-TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
 START_TOLERANCE = 1e-9  # of the accelerations at the start, relative
-SLOW = 0.1  # of the last iteration's change: then the matrix is formed anew
-MOST_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
@@ -133,6 +144,7 @@ class FlexibleFlight:
             flight.air_density_kg_m3,
             flight.mach or 0.0,
         )
+        self.sections = Sections(model.beams, model.element, model.fraction)
         self._v: Array = np.zeros((3, 6))
         self._m: Array = np.zeros((2, 6, 6))
 
@@ -147,27 +159,47 @@ class FlexibleFlight:
         """What structure, inertia and weight ask of the nodes, (n, 6)."""
         return node_forces(self.model.beams, self.work, poses, V, A, self.gravity_N)
 
-    def place_lattice(self, poses: NodePoses, V: Array, wind_N: Array) -> Array:
-        """Put the lattice on the deformed wings; returns the sections' twists (k, 6)."""
-        found, twists = self._sections(poses, V)
+    def place_lattice(self, poses: NodePoses, wind_N: Array, V: Array) -> None:
+        """Put sections and lattice on the deformed wings, at the strains of the last `structure`."""
+        found = self.sections.place(self.work, poses)
         R_NB, x_N = poses.R[0], poses.x[0]
-        R_BS = np.ascontiguousarray(R_NB.T @ found.R)
-        self.lattice.place(R_BS, (found.x - x_N) @ R_NB, wind_N @ R_NB - V[0, 3:])
-        return twists
-
-    def twists(self, poses: NodePoses, V: Array) -> Array:
-        """The sections' twists (k, 6) in their axes."""
-        return self._sections(poses, V)[1]
-
-    def _sections(self, poses: NodePoses, V: Array) -> tuple[NodePoses, Array]:
-        model = self.model
-        return sections_of(model.beams, self.work, poses, V, model.element, model.fraction)
+        self.lattice.place(R_NB.T @ found.R, (found.x - x_N) @ R_NB, wind_N @ R_NB - V[0, 3:])
 
     def subtract_air(self, acting: Array, twists: Array, wind_B: Array, right: Array) -> None:
         """Subtract the air's forces from the nodes' demands (n, 6)."""
-        model = self.model
-        forces = self.lattice.section_forces(acting, twists, wind_B)
-        subtract_section_forces(model.beams, self.work, model.element, model.fraction, forces, right)
+        self.sections.subtract(self.lattice.section_forces(acting, twists, wind_B), right)
+
+    def structure_arrays(self) -> Structure:
+        """Beams, sections and scratch as the kernels take them."""
+        model, beams, work, sections = self.model, self.model.beams, self.work, self.sections
+        return Structure(
+            ends=beams.ends,
+            rest=beams.rest,
+            stiffness=beams.stiffness,
+            damping=beams.damping,
+            mass=beams.mass,
+            bodies=beams.bodies,
+            inertia=beams.inertia,
+            gauss=GAUSS,
+            gauss_series=GAUSS_SERIES,
+            roots=model.roots,
+            tips=model.tips,
+            gravity_N=self.gravity_N,
+            thrust=self.thrust,
+            section_element=model.element,
+            section_fraction=model.fraction,
+            section_series=sections.series,
+            section_blocks=sections.blocks,
+            strains=work.strains,
+            rates=work.rates,
+            tangents=work.tangents,
+            inverses=work.inverses,
+            couplings=work.couplings,
+            diagonals=work.diagonals,
+            v=work.v,
+            m=work.m,
+            poses=work.poses,
+        )
 
     def total_on_fuselage(self, demands: Array, path: HingePath, row: int) -> Array:
         """Sum (6,) of forces at roots and fuselage about the reference point, in B."""
@@ -215,91 +247,126 @@ class Stepper:
         """Newmark's beta."""
         return 0.25 * (self.gamma + 0.5) ** 2
 
-    def averaged(self, before: FlexibleState, A: Array) -> Array:
-        """The algorithmic acceleration (n, 6) of a step whose true one at its end is A."""
-        new = (1.0 - self.alpha_f) * A + self.alpha_f * before.A - self.alpha_m * before.a
-        return np.asarray(new / (1.0 - self.alpha_m))
-
-    def velocity(self, before: FlexibleState, a: Array) -> Array:
-        """Twists (n, 6) at the end of the step."""
-        return np.asarray(before.V + self.step_s * ((1.0 - self.gamma) * before.a + self.gamma * a))
-
-    def increment(self, before: FlexibleState, a: Array) -> Array:
-        """Increments (n, 6) of the poses."""
+    def coefficients(self, lag_time: Array, still: float = STILL) -> Rule:
+        """As the kernels take them; lag_time (2, r), s; still : of the induced velocities, 0 for exact."""
         h = self.step_s
-        return np.asarray(h * before.V + h * h * ((0.5 - self.beta) * before.a + self.beta * a))
+        share = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
+        z = h / lag_time
+        return Rule(
+            step_s=h,
+            gamma=self.gamma,
+            beta=self.beta,
+            of_new=share,
+            of_old=self.alpha_f / (1.0 - self.alpha_m),
+            of_average=self.alpha_m / (1.0 - self.alpha_m),
+            of_rate=share * h * self.gamma,
+            of_pose=share * h * h * self.beta,
+            still=still,
+            decay=np.exp(-z),
+            mean=-np.expm1(-z) / z,
+        )
 
 
-def stepped(
-    flight: FlexibleFlight, before: FlexibleState, path: HingePath, row: int, wind_N: Array, rule: Stepper
-) -> FlexibleState:
-    """The state one step on, at row ``row`` of the hinges' path.
+class FlexibleRun:
+    """A flight under way: its state, moved step by step by `kernels.flexible_step`.
 
-    Raises
-    ------
-    _Lost : Newton's iteration does not arrive. BeamTurnedTooFar : an element is bent too far.
+    Parameters
+    ----------
+    wind_N : (steps + 1, 3) at the grid's times, m/s. state : at the first of them.
+
+    Attributes
+    ----------
+    records : (steps + 1, RECORD + s) of the steps flown, `kernels.flexible_step`. row : the last one.
     """
-    h, model = rule.step_s, flight.model
-    share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
-    A = before.A.copy()
-    lag, circulation = before.lag, before.circulation
-    slow, last = True, np.inf
-    for iteration in range(MOST_ITERATIONS):
-        a, V, poses = _moved(flight, before, A, path, row, rule)
-        demands = flight.structure(poses, V, A)
-        twists = flight.place_lattice(poses, V, wind_N) if iteration == 0 else flight.twists(poses, V)
-        wind_B = wind_N @ poses.R[0]
-        circulation = flight.lattice.circulation(twists, wind_B)
-        lag = followed(before.lag, before.circulation, circulation, model.riders.lag_time, h)
-        flight.subtract_air(acting_circulation(circulation, lag), twists, wind_B, demands)
-        demands[0] -= flight.thrust
-        if slow:
-            factor(model.beams, flight.work, 1.0, share * h * rule.gamma, share * h * h * rule.beta)
-        change = flight.solve(-demands, path, row)
-        A += change
-        largest = h * float(np.abs(change).max())
-        if largest < TOLERANCE:
-            a, V, poses = _moved(flight, before, A, path, row, rule)
-            return FlexibleState(poses, V, A, a, lag, circulation)
-        if not np.isfinite(largest):
-            break
-        slow, last = largest > SLOW * last, largest
-    raise _Lost
 
+    def __init__(
+        self, flight: FlexibleFlight, path: HingePath, grid: TimeGrid, wind_N: Array, state: FlexibleState
+    ) -> None:
+        model, rule = flight.model, Stepper(grid.step_s)
+        self.grid, self.row = grid, 0
+        self._flight = flight
+        self._structure = flight.structure_arrays()
+        self._path = Path(
+            R_BW=path.R_BW,
+            origin_B=path.origin_B,
+            axis=path.axis,
+            rate=path.rate,
+            acceleration=path.acceleration,
+            wind_N=np.array(wind_N, dtype=np.float64),
+        )
+        self._rule = rule.coefficients(model.riders.lag_time)
+        self._state, self._trial = _state_arrays(state), _state_arrays(state)
+        sections, rings = model.element.size, state.circulation.size
+        self._scratch = Scratch(
+            R_NS=np.zeros((sections, 3, 3)),
+            x_N=np.zeros((sections, 3)),
+            twists=np.zeros((sections, 6)),
+            forces=np.zeros((sections, 6)),
+            right=np.zeros((model.beams.nodes, 6)),
+            blocked=np.zeros(rings),
+            residual=np.zeros(rings),
+            acting=np.zeros(rings),
+            inverse=np.zeros((rings, rings)),  # none yet: the first step asks for one
+            small=np.zeros((2, 6, 6)),
+            pace=np.zeros(1),
+            turn=np.zeros((7, 3)),
+            vector=np.zeros((3, 6)),
+        )
+        self.records: Array = np.zeros((grid.steps + 1, RECORD + model.roots.size))
+        flight.structure(state.poses, state.V, state.A)
+        self._form_matrix()
 
-def _moved(
-    flight: FlexibleFlight, before: FlexibleState, A: Array, path: HingePath, row: int, rule: Stepper
-) -> tuple[Array, Array, NodePoses]:
-    """Where twist rates A (n, 6) at the end of a step lead: a, V and poses; the roots' part of A is set."""
-    a = rule.averaged(before, A)
-    V, poses = rule.velocity(before, a), before.poses.copy()
-    poses.move(rule.increment(before, a))
-    flight.follow(poses, V, A, path, row)
-    return a, V, poses
+    def fly_to(self, row: int) -> None:
+        """Fly on to a row of the grid.
 
+        Raises
+        ------
+        FlightDiverged : the flight leaves what the model can follow.
+        """
+        inverted = -1
+        while self.row < row:
+            self.row, status = fly_steps(
+                self._structure, self._flight.lattice.parts, self._flight.lattice.at, self._path, self._rule,
+                self._state, self._trial, self._scratch, self.records, self.row, row,
+                self._formed == self.row,
+            )  # fmt: skip
+            if status == MATRIX_WANTED:
+                self._form_matrix()
+            elif status == INVERSE_WANTED and inverted != self.row and self._renew_inverse():
+                inverted = self.row
+            elif status != FLOWN:
+                raise FlightDiverged(time_s=float(self.grid.times_s[self.row]))
 
-class _Lost(Exception):
-    """A step without a solution; `fly_flexible` says when."""
+    def _form_matrix(self) -> None:
+        """Factor the iteration matrix at the last strains that were asked for."""
+        flight, rule = self._flight, self._rule
+        factor(flight.model.beams, flight.work, 1.0, rule.of_rate, rule.of_pose)
+        self._formed = self.row
 
-
-def fly_flexible(
-    flight: FlexibleFlight, path: HingePath, grid: TimeGrid, wind_N: Array, state: FlexibleState
-) -> Iterator[FlexibleState]:
-    """States at all grid times, the first included; wind_N (steps + 1, 3), m/s.
-
-    Raises
-    ------
-    FlightDiverged : the flight leaves what the model can follow.
-    """
-    rule = Stepper(grid.step_s)
-    yield state
-    for step in range(grid.steps):
+    def _renew_inverse(self) -> bool:
+        """Invert the influence where the lattice is now; False: it cannot be."""
+        matrix = self._flight.lattice.at.influence[:-1]
+        if not np.isfinite(matrix).all():
+            return False
         try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                state = stepped(flight, state, path, step + 1, wind_N[step + 1], rule)
-        except (_Lost, BeamTurnedTooFar):
-            raise FlightDiverged(time_s=float(grid.times_s[step])) from None
-        yield state
+            self._scratch.inverse[:] = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+
+def _state_arrays(state: FlexibleState) -> State:
+    """A copy of a state, as the kernels move it."""
+    return State(
+        R=state.poses.R.copy(),
+        x=state.poses.x.copy(),
+        V=state.V.copy(),
+        A=state.A.copy(),
+        a=state.a.copy(),
+        A_before=state.A.copy(),
+        lag=state.lag.copy(),
+        circulation=state.circulation.copy(),
+    )
 
 
 def set_in_motion(
@@ -321,7 +388,9 @@ def set_in_motion(
     for iteration in range(MOST_ITERATIONS):
         flight.follow(poses, V, A, path, 0)
         demands = flight.structure(poses, V, A)
-        twists = flight.place_lattice(poses, V, wind_N) if iteration == 0 else flight.twists(poses, V)
+        if iteration == 0:
+            flight.place_lattice(poses, wind_N, V)
+        twists = flight.sections.twists(V)
         wind_B = wind_N @ poses.R[0]
         circulation = flight.lattice.circulation(twists, wind_B)
         flight.subtract_air(acting_circulation(circulation, state.lag), twists, wind_B, demands)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
-from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, fly_flexible, hinge_path, set_in_motion
+from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.record import FlightRecord, require_sound
@@ -50,14 +49,13 @@ def flexible_flight(
         trim = trim_flexible(flight, path, wind_N[0], start=start)
     flight.thrust = np.concatenate([trim.moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
-    states = fly_flexible(flight, path, grid, wind_N, begin)
-    rows: list[Array] = []
-    for first in range(0, grid.steps + 1, CHUNK_STEPS):
+    run = FlexibleRun(flight, path, grid, wind_N, begin)
+    for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None
         heed(stop)
         with one_blas_thread():
-            rows += [_row(model, state) for state in islice(states, CHUNK_STEPS)]
-    history = np.stack(rows)
+            run.fly_to(min(first + CHUNK_STEPS, grid.steps))
+    history = _history(run.records)
     require_sound(history, history[:, 6:9], model.flight, times)
     history = history[at]
     record = FlightRecord(
@@ -79,10 +77,9 @@ def flexible_flight(
     yield 1.0, record
 
 
-def _row(model: FlexibleModel, state: FlexibleState) -> Array:
-    """Euler angles, omega_B, velocity_N, position_N, and the tips' z of a state."""
-    R_NB, x = state.poses.R[0], state.poses.x
-    tips_B = (x[model.tips] - x[model.roots]) @ R_NB
-    return np.concatenate(
-        [euler_from_rotation(R_NB), state.V[0, :3], R_NB @ state.V[0, 3:], x[0], tips_B[:, 2]]
-    )
+def _history(records: Array) -> Array:
+    """Euler angles, omega_B, velocity_N, position_N, and the tips' z from a run's records."""
+    R_NB = records[:, :9].reshape(-1, 3, 3)
+    velocity_N = np.einsum("kij,kj->ki", R_NB, records[:, 12:15])
+    euler = np.stack([euler_from_rotation(R) for R in R_NB])
+    return np.concatenate([euler, records[:, 9:12], velocity_N, records[:, 15:]], axis=1)

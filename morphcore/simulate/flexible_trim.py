@@ -105,7 +105,8 @@ class _Balance:
         V = self._rigid(poses, V_B)
         A = np.zeros_like(V)
         demands = flight.structure(poses, V, A)
-        twists = flight.place_lattice(poses, V, self.wind_N)
+        flight.place_lattice(poses, self.wind_N, V)
+        twists = flight.sections.twists(V)
         wind_B = self.wind_N @ R_NB
         circulation = flight.lattice.circulation(twists, wind_B)
         flight.subtract_air(circulation, twists, wind_B, demands)

@@ -21,10 +21,11 @@ from morphcore.simulate.schedule import HingeMotion, Schedule
 Array = NDArray[np.float64]
 
 # holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
-STEP_S = 0.005
+STEP_S = 0.01
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
+ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: their flight rolls by less than that
 RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at its end
 
 
@@ -41,6 +42,18 @@ class TimeGrid:
     def times_s(self) -> Array:
         """(steps + 1,) times."""
         return np.asarray(self.start_s + self.step_s * np.arange(self.steps + 1), dtype=np.float64)
+
+    @property
+    def middles_s(self) -> Array:
+        """(steps,) times in the middles of the steps."""
+        return np.asarray(self.start_s + self.step_s * (np.arange(self.steps) + 0.5), dtype=np.float64)
+
+    @property
+    def halves_s(self) -> Array:
+        """(2 steps + 1,) times and middles, in turn."""
+        times = np.empty(2 * self.steps + 1)
+        times[::2], times[1::2] = self.times_s, self.middles_s
+        return times
 
 
 def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
@@ -84,11 +97,25 @@ class OperatorTable:
 
 
 @dataclass(frozen=True)
+class Middles:
+    """What the stages of a flight read, in the middles of its steps.
+
+    hinges : (steps, s, HINGE_ROWS) for the kernels. wind_N : (steps, 3) m/s. table : the plan's own, at the
+    positions of the middles.
+    """
+
+    hinges: Array
+    wind_N: Array
+    table: OperatorTable
+
+
+@dataclass(frozen=True)
 class FlightPlan:
     """Everything about a flight that does not depend on the parameters.
 
     angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)
-    for the kernels. wind_N : (steps + 1, 3) m/s.
+    for the kernels. wind_N : (steps + 1, 3) m/s. middle : hinges, wind and lattices between the grid times.
+    halved : the s surfaces are one half of a symmetric aircraft whose other half does the same.
     """
 
     grid: TimeGrid
@@ -98,6 +125,12 @@ class FlightPlan:
     hinges: Array
     wind_N: Array
     table: OperatorTable
+    middle: Middles
+    halved: bool = False
+
+    def flown(self, model: ChainModel) -> ChainModel:
+        """What flies this plan: the model, or one half of it."""
+        return _flown(model, halved=self.halved)
 
     @property
     def mean_accelerations(self) -> Array:
@@ -129,10 +162,18 @@ def flight_plan(
     *,
     air_velocity_N: Callable[[Array], Array] | None = None,
     node_spacing_rad: float = NODE_SPACING_RAD,
+    may_halve: bool = False,
 ) -> FlightPlan:
-    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at)."""
-    times = grid.times_s
+    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at).
+
+    With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
+    plan is one for half of it: ``plan.flown(model)`` is what flies it, if both wings have the same
+    parameters.
+    """
+    times = grid.halves_s
     motions = [schedule.motion(times) for schedule in schedules]
+    if may_halve and air_velocity_N is None:
+        model, motions = _halved(model, motions)
     angles = np.stack([motion.angle for motion in motions], axis=1)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
     table = _operator_table(model, angles * _hinged(model.aircraft), node_spacing_rad)
@@ -147,12 +188,18 @@ class CommonPath:
     their links alone may share them too.
 
     low_rad, high_rad : the range. matrices, strips : as of ``OperatorTable``, at equal distances over it.
+    halved : as of ``FlightPlan``.
     """
 
     low_rad: float
     high_rad: float
     matrices: Array
     strips: Array
+    halved: bool
+
+    def flown(self, model: ChainModel) -> ChainModel:
+        """What flies the plans: the model, or one half of it."""
+        return _flown(model, halved=self.halved)
 
     def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
         """Prepare a flight in which all hinges follow one schedule.
@@ -161,7 +208,7 @@ class CommonPath:
         ------
         InvalidInput : the schedule leaves the range.
         """
-        motion = schedule.motion(grid.times_s)
+        motion = schedule.motion(grid.halves_s)
         width = self.high_rad - self.low_rad
         share = (motion.angle - self.low_rad) / width
         if share.min() < -RANGE_SLACK or share.max() > 1.0 + RANGE_SLACK:
@@ -172,13 +219,21 @@ class CommonPath:
             )
         position = share * (self.matrices.shape[0] - 1)
         table = OperatorTable(self.matrices, self.strips, position)
-        return _plan(model, grid, [motion] * len(model.aircraft.surfaces), table)
+        flown = self.flown(model)
+        return _plan(flown, grid, [motion] * len(flown.aircraft.surfaces), table)
 
 
 def common_path(
-    model: ChainModel, low_rad: float, high_rad: float, node_spacing_rad: float = NODE_SPACING_RAD
+    model: ChainModel,
+    low_rad: float,
+    high_rad: float,
+    node_spacing_rad: float = NODE_SPACING_RAD,
+    *,
+    may_halve: bool = False,
 ) -> CommonPath:
-    """Tabulate the lattice for all hinges alike between two different angles."""
+    """Tabulate the lattice for all hinges alike between two angles; ``may_halve`` as of ``flight_plan``."""
+    if may_halve and model.half is not None:
+        model = model.half
     mach = model.flight.mach or 0.0
     count = max(4, int(np.ceil((high_rad - low_rad) / node_spacing_rad)) + 1)
     rows = np.outer(np.linspace(low_rad, high_rad, count), _hinged(model.aircraft))
@@ -188,7 +243,13 @@ def common_path(
         high_rad,
         np.stack([item.matrix for item in operators]),
         np.stack([item.strips for item in operators]),
+        bool(model.lattice.images),
     )
+
+
+def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
+    half = model.half if halved else None
+    return model if half is None else half
 
 
 def _plan(
@@ -198,6 +259,7 @@ def _plan(
     table: OperatorTable,
     wind_N: Array | None = None,
 ) -> FlightPlan:
+    """A plan of motions, table and wind at the grid's times and middles in turn."""
     hinges = np.stack(
         [
             hinge_rows(surface, motion.angle, motion.rate)
@@ -206,12 +268,41 @@ def _plan(
         axis=1,
     )
     angles, rates, accelerations = (
-        np.stack([getattr(motion, name) for motion in motions], axis=1)
+        np.stack([getattr(motion, name)[::2] for motion in motions], axis=1)
         for name in ("angle", "rate", "acceleration")
     )
     if wind_N is None:
-        wind_N = np.tile(model.flight.wind_N, (grid.steps + 1, 1))
-    return FlightPlan(grid, angles, rates, accelerations, hinges, wind_N, table)
+        wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
+    own, between = (
+        replace(table, position=table.position[part]) for part in (slice(0, None, 2), slice(1, None, 2))
+    )
+    return FlightPlan(
+        grid,
+        angles,
+        rates,
+        accelerations,
+        hinges[::2],
+        wind_N[::2],
+        own,
+        Middles(np.ascontiguousarray(hinges[1::2]), np.ascontiguousarray(wind_N[1::2]), between),
+        halved=bool(model.lattice.images),
+    )
+
+
+def _halved(model: ChainModel, motions: list[HingeMotion]) -> tuple[ChainModel, list[HingeMotion]]:
+    """The half of an aircraft that does what the other one does, and its motions; all if there is none."""
+    mirror, half = model.mirror, model.half
+    if mirror is None or half is None:
+        return model, motions
+    hinged = _hinged(model.aircraft)
+    differences = [
+        np.abs(motions[own].angle - motions[image].angle).max()
+        for own, image in zip(mirror.own, mirror.image, strict=True)
+        if hinged[own]
+    ]
+    if max(differences, default=0.0) > ALIKE_RAD:
+        return model, motions
+    return half, [motions[own] for own in mirror.own]
 
 
 def hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -135,12 +136,15 @@ class Tabulated:
     time_s: Array
     angle_rad: Array
 
+    @cached_property
+    def _curve(self) -> Akima1DInterpolator:
+        return Akima1DInterpolator(self.time_s, self.angle_rad, method="makima")
+
     def motion(self, time_s: ArrayLike) -> HingeMotion:
         """The motion; held at both ends."""
         if self.time_s.size < 3 or np.ptp(self.angle_rad) == 0.0:
             return Hold(float(self.angle_rad[0])).motion(time_s)
-        curve = Akima1DInterpolator(self.time_s, self.angle_rad, method="makima")
-        return _held(curve, time_s, float(self.time_s[0]), float(self.time_s[-1]))
+        return _held(self._curve, time_s, float(self.time_s[0]), float(self.time_s[-1]))
 
 
 def _held(

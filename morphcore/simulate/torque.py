@@ -7,12 +7,18 @@ from numpy.typing import NDArray
 
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
+from morphcore.models.kernels.layout import LINKS_C
+from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.kernels.torque import torques
 from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
 
+LAG_DECAYS = (
+    10,
+    12,
+)  # rows of a link's constants: decay of the slow and the fast lag, each before its weight
 CHUNK = 64  # instants: bounds the memory of the interpolated operators
 
 
@@ -33,6 +39,7 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
     width = constants.rows.shape[-1]
     zero, block, rates = np.zeros((3, model.state_rows, width))
     scratch = np.zeros((model.scratch_rows, width))
+    laid = closing_half_a_step(model, constants.rows[0])
     inputs, outputs = np.zeros((columns, width)), np.zeros((rows, width))
     shared = shared_numbers(model)
     for first in range(0, states.shape[0], CHUNK):
@@ -41,7 +48,21 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
         torques(
             lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], plan.accelerations[part],
-            operators, plan.wind_N[part], constants.rows[0], states[part], zero, block, scratch, inputs,
+            operators, plan.wind_N[part], laid, states[part], zero, block, scratch, inputs,
             outputs, rates, out[part],
         )  # fmt: skip
     return out
+
+
+def closing_half_a_step(model: ChainModel, rows: Array) -> Array:
+    """A block's constants (rows, width) whose lag weights are those of half the step they were laid out for.
+
+    The lag states of a state stem from the stage in the middle of the step before (see kernels/step.py). With
+    the decay e of half a step and the weight w = 1 - (1 - e^2) T / h of a whole one, that of a half is
+    1 - 2 (1 - w) / (1 + e).
+    """
+    halved = rows.copy()
+    for link in range(model.links):
+        for decay in (LINKS_C + LINK_ROWS * link + column for column in LAG_DECAYS):
+            halved[decay + 1] = 1.0 - 2.0 * (1.0 - rows[decay + 1]) / (1.0 + rows[decay])
+    return halved

@@ -29,10 +29,10 @@ UNLIKE = (ConstantRate(0.0, 0.6, 0.3, ramp_s=0.1), ConstantRate(0.1, 0.4, 0.4, r
 
 @pytest.fixture(scope="module")
 def flown():
-    """Many random parameter sets, flown together for half a second."""
+    """Many random parameter sets, flown together for most of a second."""
     model = example_model(3)
     batch = random_batch(np.random.default_rng(0), model, 2 * TOGETHER * BLOCKS_PER_GROUP + 3)
-    plan = plan_of(model, UNLIKE, 0.5, STEP_S)
+    plan = plan_of(model, UNLIKE, 0.8, STEP_S)  # more steps than a chunk
     return model, batch, plan, fly_trimmed(model, plan, batch)
 
 
@@ -139,7 +139,8 @@ def test_sweep_to_the_far_end(links, left_share):
     schedules = [ConstantRate(0.0, share * 1.2, 1.5, start_s=0.1) for share in (1.0, left_share)]
     flown = fly_trimmed(model, plan_of(model, schedules, 2.0, STEP_S))
     assert np.isfinite(flown.states).all()
-    assert np.abs(np.diff(flown.states[:, 0, 4:7], axis=0)).max() < 0.05  # rad/s in a step: no kick
+    # no kick: the rates change by less than 10 rad/s^2
+    assert np.abs(np.diff(flown.states[:, 0, 4:7], axis=0)).max() < 10.0 * STEP_S
     n = model.coordinates
     assert np.abs(flown.states[:, 0, 13 : 13 + n]).max(initial=0.0) < 0.2
     assert np.abs(flown.euler).max() < 2.5

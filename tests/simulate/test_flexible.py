@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from functools import cache
 from typing import Any
@@ -21,6 +22,7 @@ from morphcore.stopping import Interrupted
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
 
 Array = NDArray[np.float64]
+flexible = importlib.import_module("morphcore.simulate.flexible")  # `morphcore.simulate` is a function
 SMOOTHED = LatticeSettings(core=VortexCore("smoothed"))
 MORPH = ConstantRate(0.0, 1.0, 2.0, start_s=0.1)
 
@@ -71,6 +73,27 @@ def test_a_trimmed_aircraft_flies_on() -> None:
 def test_halving_the_step_changes_nothing() -> None:
     """Attitude at 1 ms and at 0.5 ms differ by less than 1e-5 rad (asked: 1e-4)."""
     assert np.abs(flown(0.001) - flown(0.0005)).max() < 1e-5
+
+
+def test_what_a_step_keeps_does_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fresh influence in every iteration and a fresh inverse in every step fly the same: 1e-9 rad."""
+    kept = flown()
+    coefficients, fly_to = flexible.Stepper.coefficients, flexible.FlexibleRun.fly_to
+
+    def exact(rule: flexible.Stepper, lag_time: Array) -> Any:
+        return coefficients(rule, lag_time, still=0.0)
+
+    def renewing(run: flexible.FlexibleRun, row: int) -> None:
+        while run.row < row:
+            run._scratch.inverse[:] = 0.0  # so that each step asks for one
+            fly_to(run, run.row + 1)
+
+    monkeypatch.setattr(flexible.Stepper, "coefficients", exact)
+    monkeypatch.setattr(flexible.FlexibleRun, "fly_to", renewing)
+    fresh = simulate(
+        example_aircraft(), example_flight(), sample("train_rate_0.5"), model="flexible", duration_s=0.8
+    )  # fmt: skip
+    assert np.abs(fresh.trajectory.theta - kept).max() < 1e-9
 
 
 def test_the_stepper_is_of_second_order() -> None:

@@ -12,6 +12,7 @@ from morphcore.models.equivalent import lane_constants, physical_guess
 from morphcore.models.tree import chain_tree, link_bodies
 from morphcore.multibody.dynamics import Acceleration, energy, inverse_dynamics, momentum
 from morphcore.simulate.batch import initial_state, state_rates
+from morphcore.simulate.kernels.step import BEFORE, GAMMA, LAST
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.schedule import Hold
 from tests.models.chains import (
@@ -54,6 +55,34 @@ def test_order_two(links):
     assert errors[0] < SHIPPED_STEP_ERROR_RAD
 
 
+def growth(stiff, gamma=GAMMA):
+    """Spectral radius (k,) of a step of u' = lambda u with A exact, for stiff = h lambda (k,).
+
+    From the definition: the recursion of (u, h k1, h k2) that the step makes.
+    """
+    k = np.zeros((stiff.size, 3), dtype=complex)
+    # h k = z (U + gamma h k - (gamma - BEFORE) h k1 - BEFORE h k2), U = u + LAST h k1 + BEFORE h k2
+    implicit = 1.0 - gamma * stiff
+    k[:, 0] = stiff / implicit
+    k[:, 1] = stiff * (LAST - (gamma - BEFORE)) / implicit
+    k[:, 2] = stiff * (BEFORE - BEFORE) / implicit
+    step = np.zeros((stiff.size, 3, 3), dtype=complex)
+    step[:, 0] = k + np.array([1.0, 0.0, 0.0])
+    step[:, 1] = k
+    step[:, 2, 1] = 1.0
+    return np.abs(np.linalg.eigvals(step)).max(axis=1)
+
+
+def test_no_joint_grows_and_stiff_ones_die_out():
+    """Undamped oscillations of any frequency stay or shrink; at infinity 1/3 is left, the least there is."""
+    sizes = np.logspace(-2, 6, 801)
+    for angle in (0.5, 0.6, 0.75, 1.0):  # of the pole, in pi: undamped to aperiodic
+        assert growth(sizes * np.exp(1j * np.pi * angle)).max() < 1.0 + 1e-9
+    infinite = np.array([-1e12 + 0j])
+    assert growth(infinite)[0] == pytest.approx(1.0 / 3.0, abs=1e-5)  # a double root: round-off's square root
+    assert all(growth(infinite, GAMMA + off)[0] > 1.0 / 3.0 + 0.01 for off in (-0.02, 0.02))
+
+
 def shipped_step_error(links, name, parts):
     """Largest difference in attitude, (3,) rad, between the shipped step and one of its many parts."""
     model = example_model(links)
@@ -66,7 +95,7 @@ def shipped_step_error(links, name, parts):
 def test_shipped_step():
     """The step that ships stays within 1e-4 rad of a tenth of it (which has 1 per cent of its error).
 
-    Measured on three links: 1e-5 rad.
+    Measured on three links: 2e-5 rad.
     """
     assert shipped_step_error(3, "train_asymmetric", 10).max() < SHIPPED_STEP_ERROR_RAD
 

@@ -1,102 +1,100 @@
-"""Circulation and Kutta-Joukowski forces of a lattice whose influence is frozen while velocities change."""
+"""Kutta-Joukowski forces and profile drag of a lattice on its sections, while velocities change."""
 
 from __future__ import annotations
 
-from morphcore.jit import entry_kernel
+from math import sqrt
+
+from morphcore.aero.kernels.lattice_place import induced_velocity, normal_influence, place_points
+from morphcore.jit import entry_kernel, kernel
 
 
 @entry_kernel
-def normal_influence(normals, velocity, out):
-    """Normal velocity (r, r) at control points of rings: velocity (3, rings, points), r points first."""
-    rings = normals.shape[0]
-    for p in range(rings):
-        nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-        for q in range(rings):
-            out[p, q] = nx * velocity[0, q, p] + ny * velocity[1, q, p] + nz * velocity[2, q, p]
+def place_lattice(parts, place, stream_B):
+    """Put the lattice on the sections of ``place``, wake along stream_B (3,); its normal influence."""
+    place_points(parts, place, stream_B)
+    normal_influence(parts, place)
+
+
+@kernel
+def rider_velocity(R, twist, arm, out):
+    """Velocity (3,) in B of a point at ``arm`` on a section of axes R (3, 3) and ``twist`` (6,)."""
+    vx = twist[3] + twist[1] * arm[2] - twist[2] * arm[1]
+    vy = twist[4] + twist[2] * arm[0] - twist[0] * arm[2]
+    vz = twist[5] + twist[0] * arm[1] - twist[1] * arm[0]
+    for i in range(3):
+        out[i] = R[i, 0] * vx + R[i, 1] * vy + R[i, 2] * vz
+
+
+@kernel
+def add_rider_force(R, arm, fx, fy, fz, out):
+    """Add a force in B on a riding point to its section's force vector (6,), in section axes."""
+    x = R[0, 0] * fx + R[1, 0] * fy + R[2, 0] * fz
+    y = R[0, 1] * fx + R[1, 1] * fy + R[2, 1] * fz
+    z = R[0, 2] * fx + R[1, 2] * fy + R[2, 2] * fz
+    out[0] += arm[1] * z - arm[2] * y
+    out[1] += arm[2] * x - arm[0] * z
+    out[2] += arm[0] * y - arm[1] * x
+    out[3] += x
+    out[4] += y
+    out[5] += z
 
 
 @entry_kernel
-def rider_velocities(section, arm, R_BS, twist, out):
-    """Velocities (m, 3) in B of points that ride on sections: at ``arm`` (m, 3) in axes of ``section`` (m,).
+def blocked_flow(parts, place, twists, wind_B, out):
+    """Normal velocity (r,) that the circulations have to bring about at the control points, m/s.
 
-    R_BS (k, 3, 3) section axes to B; twist (k, 6) of the sections in their own axes.
+    ``twists`` (k, 6) of the sections in their axes; wind_B (3,).
     """
-    for m in range(section.size):
-        k = section[m]
-        x, y, z = arm[m, 0], arm[m, 1], arm[m, 2]
-        vx = twist[k, 3] + twist[k, 1] * z - twist[k, 2] * y
-        vy = twist[k, 4] + twist[k, 2] * x - twist[k, 0] * z
-        vz = twist[k, 5] + twist[k, 0] * y - twist[k, 1] * x
+    for p in range(out.size):
+        k = parts.control[p]
+        velocity = place.control_velocity[p]
+        rider_velocity(place.R_BS[k], twists[k], parts.control_arm[p], velocity)
+        total = 0.0
         for i in range(3):
-            out[m, i] = R_BS[k, i, 0] * vx + R_BS[k, i, 1] * vy + R_BS[k, i, 2] * vz
+            total += place.normals[i, p] * (velocity[i] - wind_B[i])
+        out[p] = total
 
 
 @entry_kernel
-def corner_forces(
-    velocity,
-    first,
-    gamma,
-    wind,
-    corner_velocity,
-    corners,
-    start,
-    end,
-    plus,
-    minus,
-    density,
-    local,
-    out,
-):
-    """Force of the air on the bound edges, density * gamma * velocity x edge, half on each end corner.
+def section_forces(parts, place, gamma, twists, wind_B, still, out):
+    """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,).
 
-    velocity (3, r, points) with the edges' midpoints from point ``first`` on; gamma (r,) circulations; wind
-    (3,) and corner_velocity (c, 3) of air and structure, m/s: an edge's midpoint moves with the mean of its
-    corners. local (3, e) is scratch; out (c, 3), N.
+    Each bound edge bears density * gamma * velocity x edge, half on each end corner; its middle moves with
+    the mean of its corners. Profile drag of each strip is along the velocity of its middle. ``still`` : of
+    `induced_velocity`, 0 for exact.
     """
-    edges = start.size
-    for axis in range(3):
-        row = local[axis]
-        for e in range(edges):
-            row[e] = wind[axis] - 0.5 * (corner_velocity[start[e], axis] + corner_velocity[end[e], axis])
-        for q in range(gamma.size):
-            source, strength = velocity[axis, q], gamma[q]
-            for e in range(edges):
-                row[e] += strength * source[first + e]
-    out[:] = 0.0
-    for e in range(edges):
-        a, b = start[e], end[e]
-        strength = 0.0
-        if plus[e] >= 0:
-            strength += gamma[plus[e]]
-        if minus[e] >= 0:
-            strength -= gamma[minus[e]]
-        strength *= 0.5 * density
+    induced_velocity(parts, place, gamma, still)
+    for c in range(place.corners.shape[0]):
+        k = parts.corner[c]
+        rider_velocity(place.R_BS[k], twists[k], parts.corner_arm[c], place.corner_velocity[c])
+    corners, moved, force = place.corners, place.corner_velocity, place.force
+    force[:] = 0.0
+    for e in range(place.induced.shape[1]):
+        a, b = parts.line_start[e], parts.line_end[e]
+        strength = 0.5 * parts.density * place.strength[e]
         ex, ey, ez = (
             corners[b, 0] - corners[a, 0],
             corners[b, 1] - corners[a, 1],
             corners[b, 2] - corners[a, 2],
         )
-        fx = strength * (local[1, e] * ez - local[2, e] * ey)
-        fy = strength * (local[2, e] * ex - local[0, e] * ez)
-        fz = strength * (local[0, e] * ey - local[1, e] * ex)
-        for corner in (a, b):
-            out[corner, 0] += fx
-            out[corner, 1] += fy
-            out[corner, 2] += fz
-
-
-@entry_kernel
-def add_rider_forces(section, arm, R_BS, force, out):
-    """Add forces (m, 3) in B on riding points to force vectors (k, 6) of their sections, in section axes."""
-    for m in range(section.size):
-        k = section[m]
-        fx, fy, fz = force[m, 0], force[m, 1], force[m, 2]
-        x = R_BS[k, 0, 0] * fx + R_BS[k, 1, 0] * fy + R_BS[k, 2, 0] * fz
-        y = R_BS[k, 0, 1] * fx + R_BS[k, 1, 1] * fy + R_BS[k, 2, 1] * fz
-        z = R_BS[k, 0, 2] * fx + R_BS[k, 1, 2] * fy + R_BS[k, 2, 2] * fz
-        out[k, 0] += arm[m, 1] * z - arm[m, 2] * y
-        out[k, 1] += arm[m, 2] * x - arm[m, 0] * z
-        out[k, 2] += arm[m, 0] * y - arm[m, 1] * x
-        out[k, 3] += x
-        out[k, 4] += y
-        out[k, 5] += z
+        u = strength * (wind_B[0] - 0.5 * (moved[a, 0] + moved[b, 0]) + place.induced[0, e])
+        v = strength * (wind_B[1] - 0.5 * (moved[a, 1] + moved[b, 1]) + place.induced[1, e])
+        w = strength * (wind_B[2] - 0.5 * (moved[a, 2] + moved[b, 2]) + place.induced[2, e])
+        fx, fy, fz = v * ez - w * ey, w * ex - u * ez, u * ey - v * ex
+        force[a, 0] += fx
+        force[a, 1] += fy
+        force[a, 2] += fz
+        force[b, 0] += fx
+        force[b, 1] += fy
+        force[b, 2] += fz
+    out[:] = 0.0
+    for c in range(place.corners.shape[0]):
+        k = parts.corner[c]
+        add_rider_force(place.R_BS[k], parts.corner_arm[c], force[c, 0], force[c, 1], force[c, 2], out[k])
+    flow = place.drag_velocity
+    for t in range(parts.drag.size):
+        k = parts.drag[t]
+        rider_velocity(place.R_BS[k], twists[k], parts.drag_arm[t], flow)
+        u, v, w = wind_B[0] - flow[0], wind_B[1] - flow[1], wind_B[2] - flow[2]
+        factor = 0.5 * parts.density * parts.drag_area[t] * sqrt(u * u + v * v + w * w)
+        add_rider_force(place.R_BS[k], parts.drag_arm[t], factor * u, factor * v, factor * w, out[k])

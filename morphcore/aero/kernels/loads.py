@@ -29,7 +29,7 @@ JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0 = 0, 1, 2, 3, 4
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
 
 
 @kernel

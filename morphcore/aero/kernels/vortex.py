@@ -27,6 +27,51 @@ TINY = 1e-150
 
 
 @inlined
+def segment_strength(a, b, dot, cross2, length2, core4):
+    """Factor k of a segment's velocity -k (e x a), 1/m^2; "line".
+
+    a, b : distances of start and end from the point; dot, cross2 : product of both vectors and square of
+    e x a; length2 : of the segment. ``core4`` is the core radius to the fourth, m^4.
+    """
+    ab = a * b + TINY
+    # (ab + dot)(ab - dot) = cross2, and one of the two factors is always a sum: alongside (dot < 0) the
+    # singular 1 / cross2 meets the core's cross2 and drops out; beyond the ends nothing is singular
+    root = sqrt(cross2 * cross2 + core4 * length2 * length2 + TINY)
+    beside = dot <= 0.0
+    above = ab - dot if beside else cross2
+    below = 1.0 if beside else ab + dot
+    return (a + b) * above / (FOUR_PI * ab * below * root)
+
+
+@inlined
+def leg_strength(a, along, cross2, core4):
+    """Factor k of a leg's velocity -k (u x a), 1/m; "line". ``along`` is a . u, else as above."""
+    root = sqrt(cross2 * cross2 + core4)
+    # along < 0: the point lies downstream of the start, beside the leg
+    beside = along <= 0.0
+    above = a - along if beside else cross2
+    below = 1.0 if beside else a + along
+    return above / (FOUR_PI * (a + TINY) * below * root)
+
+
+@inlined
+def smoothed_segment_strength(a, b, dot, cross2, length2, core2):
+    """Factor k of a segment as in ``segment_strength``; "smoothed", core radius squared, m^2."""
+    ab = a * b + TINY
+    # ab + dot, alongside (dot < 0) without cancellation; see segment_strength
+    total = cross2 / (ab - dot) if dot <= 0.0 else ab + dot
+    return (a + b) / (FOUR_PI * (ab * total + core2 * length2 + TINY))
+
+
+@inlined
+def smoothed_leg_strength(a, along, cross2, core2):
+    """Factor k of a leg as in ``leg_strength``; "smoothed"."""
+    # a + along, downstream of the start (along < 0) without cancellation
+    total = cross2 / (a - along + TINY) if along <= 0.0 else a + along
+    return 1.0 / (FOUR_PI * (a * total + core2))
+
+
+@inlined
 def segment_velocity(ax, ay, az, ex, ey, ez, core4):
     """Velocity (3 components, 1/m of unit circulation) of a segment from P + a to P + a + e, at P; "line".
 
@@ -36,19 +81,11 @@ def segment_velocity(ax, ay, az, ex, ey, ez, core4):
     bx, by, bz = ax + ex, ay + ey, az + ez
     # e x a, not a x b: no cancellation far away
     cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-    cross2 = cx * cx + cy * cy + cz * cz
-    length2 = ex * ex + ey * ey + ez * ez
     a = sqrt(ax * ax + ay * ay + az * az)
     b = sqrt(bx * bx + by * by + bz * bz)
-    ab = a * b + TINY
     dot = ax * bx + ay * by + az * bz
-    # (ab + dot)(ab - dot) = cross2, and one of the two factors is always a sum: alongside (dot < 0) the
-    # singular 1 / cross2 meets the core's cross2 and drops out; beyond the ends nothing is singular
-    root = sqrt(cross2 * cross2 + core4 * length2 * length2 + TINY)
-    beside = dot <= 0.0
-    above = ab - dot if beside else cross2
-    below = 1.0 if beside else ab + dot
-    k = (a + b) * above / (FOUR_PI * ab * below * root)
+    cross2 = cx * cx + cy * cy + cz * cz
+    k = segment_strength(a, b, dot, cross2, ex * ex + ey * ey + ez * ez, core4)
     # the vector from start to point is -a: e x (-a) turns the law right-handed
     return -k * cx, -k * cy, -k * cz
 
@@ -60,15 +97,8 @@ def leg_velocity(ax, ay, az, ux, uy, uz, core4):
     ``u`` is a unit vector. Circulation is right-handed about ``u``; arguments as in ``segment_velocity``.
     """
     cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
-    cross2 = cx * cx + cy * cy + cz * cz
     a = sqrt(ax * ax + ay * ay + az * az)
-    along = ax * ux + ay * uy + az * uz
-    root = sqrt(cross2 * cross2 + core4)
-    # along < 0: the point lies downstream of the start, beside the leg
-    beside = along <= 0.0
-    above = a - along if beside else cross2
-    below = 1.0 if beside else a + along
-    k = above / (FOUR_PI * (a + TINY) * below * root)
+    k = leg_strength(a, ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz, core4)
     return -k * cx, -k * cy, -k * cz
 
 
@@ -80,15 +110,11 @@ def smoothed_segment_velocity(ax, ay, az, ex, ey, ez, core2):
     """
     bx, by, bz = ax + ex, ay + ey, az + ez
     cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
-    cross2 = cx * cx + cy * cy + cz * cz
-    length2 = ex * ex + ey * ey + ez * ez
     a = sqrt(ax * ax + ay * ay + az * az)
     b = sqrt(bx * bx + by * by + bz * bz)
-    ab = a * b + TINY
     dot = ax * bx + ay * by + az * bz
-    # ab + dot, alongside (dot < 0) without cancellation; see segment_velocity
-    total = cross2 / (ab - dot) if dot <= 0.0 else ab + dot
-    k = (a + b) / (FOUR_PI * (ab * total + core2 * length2 + TINY))
+    cross2 = cx * cx + cy * cy + cz * cz
+    k = smoothed_segment_strength(a, b, dot, cross2, ex * ex + ey * ey + ez * ez, core2)
     return -k * cx, -k * cy, -k * cz
 
 
@@ -100,10 +126,6 @@ def smoothed_leg_velocity(ax, ay, az, ux, uy, uz, core2):
     numerator and denominator both grow as l^2 and leave ``(u x -a) / (a (a + a.u) + core^2) / 4 pi``.
     """
     cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
-    cross2 = cx * cx + cy * cy + cz * cz
     a = sqrt(ax * ax + ay * ay + az * az)
-    along = ax * ux + ay * uy + az * uz
-    # a + along, downstream of the start (along < 0) without cancellation
-    total = cross2 / (a - along + TINY) if along <= 0.0 else a + along
-    k = 1.0 / (FOUR_PI * (a * total + core2))
+    k = smoothed_leg_strength(a, ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz, core2)
     return -k * cx, -k * cy, -k * cz

@@ -6,7 +6,15 @@ accelerations from root to tips. The rows are those of layout.py.
 
 from __future__ import annotations
 
-from morphcore.aero.kernels.loads import LINK0, LINKS, lagged_motion, lane_product, link_wrench, strip_inputs
+from morphcore.aero.kernels.loads import (
+    LINK0,
+    LINKS,
+    PAIRED,
+    lagged_motion,
+    lane_product,
+    link_wrench,
+    strip_inputs,
+)
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
@@ -19,16 +27,24 @@ from morphcore.models.kernels.layout import (
     S_BASE_FORCE,
     S_BASE_INERTIA,
     S_CARRIED,
-    S_FACTOR,
+    S_GRAVITY,
     S_INERTIA,
     S_SUMS,
     S_TWIST,
+    S_WIND,
     constant_rows,
     joint_rows_of_scratch,
     link_rows_of_scratch,
     state_rows,
 )
-from morphcore.multibody.kernels.articulated import LINK_ROWS, accumulate, add_bias, add_link, solve_base
+from morphcore.multibody.kernels.articulated import (
+    LINK_ROWS,
+    accumulate,
+    accumulate_pair,
+    add_bias,
+    add_link,
+    solve_base,
+)
 from morphcore.multibody.kernels.gimbal import (
     JOINT_ROWS,
     carry_through_gimbal,
@@ -53,8 +69,10 @@ def body_axes(lanes, state, wind, gravity, scratch):
         ax, ay, az = nx * wn + ex * we + dx * wd, ny * wn + ey * we + dy * wd, nz * wn + ez * we + dz * wd
         scratch[0, l], scratch[1, l], scratch[2, l] = state[4, l], state[5, l], state[6, l]
         scratch[3, l], scratch[4, l], scratch[5, l] = state[7, l] - ax, state[8, l] - ay, state[9, l] - az
-        scratch[100, l], scratch[101, l], scratch[102, l] = ax, ay, az
-        scratch[103, l], scratch[104, l], scratch[105, l] = gravity * dx, gravity * dy, gravity * dz
+        scratch[S_WIND, l], scratch[S_WIND + 1, l], scratch[S_WIND + 2, l] = ax, ay, az
+        scratch[S_GRAVITY, l] = gravity * dx
+        scratch[S_GRAVITY + 1, l] = gravity * dy
+        scratch[S_GRAVITY + 2, l] = gravity * dz
 
 
 @kernel
@@ -72,10 +90,7 @@ def start_base(lanes, constants, twist, shared, inertia, force):
         row = inertia[i]
         for l in range(len(lanes)):
             row[l] = value
-    for i in range(6):
-        row = force[i]
-        for l in range(len(lanes)):
-            row[l] = 0.0
+    clear(lanes, force)
     add_bias(lanes, inertia, twist, force)  # momentum of the fuselage
     for l in range(len(lanes)):
         hx, hy, hz = force[0, l], force[1, l], force[2, l]
@@ -91,13 +106,11 @@ def start_base(lanes, constants, twist, shared, inertia, force):
 
 
 @kernel
-def clear(lanes, block):
-    """Zero some rows."""
-    if not_in_lanes(block, lanes):
-        return
-    for i in range(block.shape[0]):
-        for l in range(len(lanes)):
-            block[i, l] = 0.0
+def clear(lanes, block):  # noqa: ARG001 - every kernel is called with its lanes
+    """Zero some rows, as one long vector."""
+    rows = block.reshape(-1)
+    for i in range(rows.size):
+        rows[i] = 0.0
 
 
 @kernel
@@ -228,7 +241,10 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
             if k == 0:
                 add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
                 carry_through_hinge(lanes, hinges[s], inertia, carried)
-                accumulate(lanes, inertia, carried, base_inertia, base_force)
+                if surfaces[s, PAIRED]:
+                    accumulate_pair(lanes, inertia, carried, base_inertia, base_force)
+                else:
+                    accumulate(lanes, inertia, carried, base_inertia, base_force)
             else:
                 last_joint -= 1
                 c = 3 * last_joint
@@ -243,7 +259,7 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
                     carried,
                 )
                 carry_through_gimbal(lanes, rows, joint, inertia, carried)
-    solve_base(lanes, base_inertia, base_force, scratch[S_FACTOR : S_FACTOR + 21], base_acceleration)
+    solve_base(lanes, base_inertia, base_force, base_acceleration)
 
     # root -> tips: accelerations
     joint_number = 0
@@ -282,10 +298,10 @@ def base_rates(lanes, state, scratch, rates):
         rates[3, l] = 0.5 * (a * r + b * q - c * p)
         rates[4, l], rates[5, l], rates[6, l] = scratch[6, l], scratch[7, l], scratch[8, l]
         # the pass ran in axes that move with the wind: v' = a + g - omega x wind, Galileo's shift
-        wx, wy, wz = scratch[100, l], scratch[101, l], scratch[102, l]
-        rates[7, l] = scratch[9, l] + scratch[103, l] - (q * wz - r * wy)
-        rates[8, l] = scratch[10, l] + scratch[104, l] - (r * wx - p * wz)
-        rates[9, l] = scratch[11, l] + scratch[105, l] - (p * wy - q * wx)
+        wx, wy, wz = scratch[S_WIND, l], scratch[S_WIND + 1, l], scratch[S_WIND + 2, l]
+        rates[7, l] = scratch[9, l] + scratch[S_GRAVITY, l] - (q * wz - r * wy)
+        rates[8, l] = scratch[10, l] + scratch[S_GRAVITY + 1, l] - (r * wx - p * wz)
+        rates[9, l] = scratch[11, l] + scratch[S_GRAVITY + 2, l] - (p * wy - q * wx)
         rates[10, l] = (
             (a * a + b * b - c * c - d * d) * u + 2.0 * (b * c - a * d) * v + 2.0 * (b * d + a * c) * w
         )

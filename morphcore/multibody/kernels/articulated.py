@@ -17,8 +17,18 @@ from __future__ import annotations
 from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
-# mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area, weights of the lag (4)
+# mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area; of the slow and the
+# fast lag the decay over half a step and the weight of a step
 LINK_ROWS = 14
+
+
+@inlined
+def inverse_symmetric(a00, a01, a02, a11, a12, a22):
+    """Inverse of a symmetric, well scaled 3 x 3 matrix by cofactors: its six distinct elements."""
+    m00, m01, m02 = a11 * a22 - a12 * a12, a02 * a12 - a01 * a22, a01 * a12 - a02 * a11
+    m11, m12, m22 = a00 * a22 - a02 * a02, a01 * a02 - a00 * a12, a00 * a11 - a01 * a01
+    inverse = 1.0 / (a00 * m00 + a01 * m01 + a02 * m02)
+    return m00 * inverse, m01 * inverse, m02 * inverse, m11 * inverse, m12 * inverse, m22 * inverse
 
 
 @inlined
@@ -224,62 +234,88 @@ def accumulate(lanes, inertia, force, total_inertia, total_force):
 
 
 @kernel
-def solve_base(lanes, inertia, force, factor, acceleration):
-    """Base acceleration from I a = -p, by L D L^T; ``factor`` holds 21 scratch rows."""
+def accumulate_pair(lanes, inertia, force, total_inertia, total_force):
+    """Add a surface's articulated inertia and force, and those of its mirror image, to the fuselage's.
+
+    Under reflection about the x-z plane the components (wx, wz, v_y) change their sign: products of two that
+    do, or of two that do not, are doubled, the others cancel.
+    """
     if (
         not_in_lanes(inertia, lanes)
         or not_in_lanes(force, lanes)
-        or not_in_lanes(factor, lanes)
-        or not_in_lanes(acceleration, lanes)
+        or not_in_lanes(total_inertia, lanes)
+        or not_in_lanes(total_force, lanes)
     ):
         return
-    for l in range(len(lanes)):  # into the lower triangle, row by row
-        factor[0, l] = inertia[0, l]
-        factor[1, l], factor[2, l] = inertia[1, l], inertia[3, l]
-        factor[3, l], factor[4, l], factor[5, l] = inertia[2, l], inertia[4, l], inertia[5, l]
-        factor[6, l], factor[7, l], factor[8, l] = inertia[6, l], inertia[9, l], inertia[12, l]
-        factor[9, l] = inertia[15, l]
-        factor[10, l], factor[11, l], factor[12, l] = inertia[7, l], inertia[10, l], inertia[13, l]
-        factor[13, l], factor[14, l] = inertia[16, l], inertia[18, l]
-        factor[15, l], factor[16, l], factor[17, l] = inertia[8, l], inertia[11, l], inertia[14, l]
-        factor[18, l], factor[19, l], factor[20, l] = inertia[17, l], inertia[19, l], inertia[20, l]
-    for i in range(6):
-        row = i * (i + 1) // 2
-        for j in range(i):
-            col = j * (j + 1) // 2
-            for k in range(j):
-                a, b = factor[row + k], factor[col + k]
-                d = factor[k * (k + 1) // 2 + k]
-                c = factor[row + j]
-                for l in range(len(lanes)):
-                    c[l] -= a[l] * b[l] * d[l]
-            c = factor[row + j]
-            d = factor[col + j]
-            for l in range(len(lanes)):
-                c[l] /= d[l]
-        e = factor[row + i]
-        for k in range(i):
-            a = factor[row + k]
-            d = factor[k * (k + 1) // 2 + k]
-            for l in range(len(lanes)):
-                e[l] -= a[l] * a[l] * d[l]
-    for i in range(6):
-        row = i * (i + 1) // 2
-        x = acceleration[i]
-        p = force[i]
-        for l in range(len(lanes)):
-            x[l] = -p[l]
-        for k in range(i):
-            a, y = factor[row + k], acceleration[k]
-            for l in range(len(lanes)):
-                x[l] -= a[l] * y[l]
-    for i in range(6):
-        d, x = factor[i * (i + 1) // 2 + i], acceleration[i]
-        for l in range(len(lanes)):
-            x[l] /= d[l]
-    for i in range(5, -1, -1):
-        x = acceleration[i]
-        for k in range(i + 1, 6):
-            a, y = factor[k * (k + 1) // 2 + i], acceleration[k]
-            for l in range(len(lanes)):
-                x[l] -= a[l] * y[l]
+    for l in range(len(lanes)):
+        total_inertia[0, l] += 2.0 * inertia[0, l]
+        total_inertia[2, l] += 2.0 * inertia[2, l]
+        total_inertia[3, l] += 2.0 * inertia[3, l]
+        total_inertia[5, l] += 2.0 * inertia[5, l]
+        total_inertia[7, l] += 2.0 * inertia[7, l]
+        total_inertia[9, l] += 2.0 * inertia[9, l]
+        total_inertia[11, l] += 2.0 * inertia[11, l]
+        total_inertia[13, l] += 2.0 * inertia[13, l]
+        total_inertia[15, l] += 2.0 * inertia[15, l]
+        total_inertia[17, l] += 2.0 * inertia[17, l]
+        total_inertia[18, l] += 2.0 * inertia[18, l]
+        total_inertia[20, l] += 2.0 * inertia[20, l]
+        total_force[1, l] += 2.0 * force[1, l]
+        total_force[3, l] += 2.0 * force[3, l]
+        total_force[5, l] += 2.0 * force[5, l]
+
+
+@kernel
+def solve_base(lanes, inertia, force, acceleration):
+    """Base acceleration [w'; v'] from I [w'; v'] = -[n; f], by blocks of three.
+
+    With I = [A B; B^T L]: (A - B L^-1 B^T) w' = B L^-1 f - n and v' = -L^-1 (f + B^T w'). L holds masses, the
+    Schur complement the inertia about their centre: both positive definite and well scaled.
+    """
+    if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes) or not_in_lanes(acceleration, lanes):
+        return
+    for l in range(len(lanes)):
+        b0, b1, b2 = inertia[6, l], inertia[7, l], inertia[8, l]
+        b3, b4, b5 = inertia[9, l], inertia[10, l], inertia[11, l]
+        b6, b7, b8 = inertia[12, l], inertia[13, l], inertia[14, l]
+        l00, l01, l02, l11, l12, l22 = inverse_symmetric(
+            inertia[15, l], inertia[16, l], inertia[17, l], inertia[18, l], inertia[19, l], inertia[20, l]
+        )
+        # W = B L^-1
+        w0, w1, w2 = (
+            b0 * l00 + b1 * l01 + b2 * l02,
+            b0 * l01 + b1 * l11 + b2 * l12,
+            b0 * l02 + b1 * l12 + b2 * l22,
+        )
+        w3, w4, w5 = (
+            b3 * l00 + b4 * l01 + b5 * l02,
+            b3 * l01 + b4 * l11 + b5 * l12,
+            b3 * l02 + b4 * l12 + b5 * l22,
+        )
+        w6, w7, w8 = (
+            b6 * l00 + b7 * l01 + b8 * l02,
+            b6 * l01 + b7 * l11 + b8 * l12,
+            b6 * l02 + b7 * l12 + b8 * l22,
+        )
+        s00, s01, s02, s11, s12, s22 = inverse_symmetric(
+            inertia[0, l] - (w0 * b0 + w1 * b1 + w2 * b2),
+            inertia[1, l] - (w0 * b3 + w1 * b4 + w2 * b5),
+            inertia[2, l] - (w0 * b6 + w1 * b7 + w2 * b8),
+            inertia[3, l] - (w3 * b3 + w4 * b4 + w5 * b5),
+            inertia[4, l] - (w3 * b6 + w4 * b7 + w5 * b8),
+            inertia[5, l] - (w6 * b6 + w7 * b7 + w8 * b8),
+        )
+        fx, fy, fz = force[3, l], force[4, l], force[5, l]
+        nx = w0 * fx + w1 * fy + w2 * fz - force[0, l]
+        ny = w3 * fx + w4 * fy + w5 * fz - force[1, l]
+        nz = w6 * fx + w7 * fy + w8 * fz - force[2, l]
+        ax = s00 * nx + s01 * ny + s02 * nz
+        ay = s01 * nx + s11 * ny + s12 * nz
+        az = s02 * nx + s12 * ny + s22 * nz
+        fx += b0 * ax + b3 * ay + b6 * az
+        fy += b1 * ax + b4 * ay + b7 * az
+        fz += b2 * ax + b5 * ay + b8 * az
+        acceleration[0, l], acceleration[1, l], acceleration[2, l] = ax, ay, az
+        acceleration[3, l] = -(l00 * fx + l01 * fy + l02 * fz)
+        acceleration[4, l] = -(l01 * fx + l11 * fy + l12 * fz)
+        acceleration[5, l] = -(l02 * fx + l12 * fy + l22 * fz)

@@ -19,25 +19,25 @@ Shapes: n nodes, e elements, g Gauss points. ``ends`` (e, 2) nodes; ``rest`` (e,
 from __future__ import annotations
 
 from morphcore.jit import entry_kernel, kernel
+from morphcore.multibody.kernels.helix import (
+    helix_coefficients,
+    helix_map,
+    helix_terms,
+    helix_twist,
+    subtract_helix_force,
+)
 from morphcore.multibody.kernels.se3 import (
     ad,
     ad_transposed,
-    add_from_body,
     composed_pose,
+    even_series_with_slope,
     exponential,
-    inverse_tangent,
     inverse_tangent_coefficients,
-    inverse_tangent_transposed,
     logarithm,
     relative_pose,
-    tangent,
-    tangent_terms,
-    tangent_transposed,
-    tangent_with_rate,
-    to_body,
 )
 
-VECTOR_SCRATCH = 24  # rows of six numbers
+VECTOR_SCRATCH = 18  # rows of six numbers
 MATRIX_SCRATCH = 16  # matrices of 6 x 6
 
 
@@ -52,23 +52,6 @@ def multiply(matrix, vector, out):
 
 
 @kernel
-def element_strain(ends, R, x, V, element, v, poses, d, d_rate):
-    """d, its rate, and in v[0], v[1] the rigid part U of V_b and the rest W; False: turned too far.
-
-    ``v`` (4, 6) and ``poses`` (2, 4, 3) are scratch; poses[0] keeps the relative pose.
-    """
-    a, b = ends[element, 0], ends[element, 1]
-    relative_pose(R[a], x[a], R[b], x[b], poses[0, :3], poses[0, 3])
-    if not logarithm(poses[0, :3], poses[0, 3], d):
-        return False
-    to_body(poses[0, :3], poses[0, 3], V[a], v[0])
-    for i in range(6):
-        v[1, i] = V[b, i] - v[0, i]
-    inverse_tangent(d, v[1], 1.0, v[2:4], d_rate)
-    return True
-
-
-@kernel
 def internal_force(rest, stiffness, damping, d, d_rate, strain, sigma):
     """sigma = K (d - rest + damping d_rate); strain (6,) is scratch."""
     for i in range(6):
@@ -78,72 +61,113 @@ def internal_force(rest, stiffness, damping, d, d_rate, strain, sigma):
 
 @entry_kernel
 def beam_forces(
-    ends, rest, stiffness, damping, mass, gauss, R, x, V, A, gravity_N, v, poses, strains, rates, out
+    ends, rest, stiffness, damping, mass, gauss, series, R, x, V, A, gravity_N, v, poses, strains, rates, out
 ):
     """Add to out (n, 6) the forces that internal strain, inertia and weight ask of the nodes, in node axes.
 
-    In motion without other loads they vanish. ``strains`` and ``rates`` (e, 6) return d and its rate; ``v``
-    (VECTOR_SCRATCH, 6) and ``poses`` (2, 4, 3) are scratch. Returns the number of the first element that
-    turned by more than `se3.LARGEST_ANGLE`, else -1.
+    In motion without other loads they vanish. ``gauss``, ``series`` : the Gauss points and their
+    `helix.helix_series`. ``strains`` and ``rates`` (e, 6) return d and its rate; ``v`` (VECTOR_SCRATCH, 6)
+    and ``poses`` (2, 4, 3) are scratch. Returns the number of the first element that turned by more than
+    `se3.LARGEST_ANGLE`, else -1.
+
+    Weight is inertia against free fall: translation with the acceleration of gravity is rigid, and rigid
+    motion passes through the helix unchanged.
     """
+    u, w, u1, u2, u1_rate, u2_rate = v[0], v[1], v[2], v[3], v[4], v[5]
+    twist, acceleration, momentum, force, sigma = v[6], v[7], v[8], v[9], v[10]
+    root_force, end_force, once, twice = v[11], v[12], v[13], v[14]
+    fall, b0, b1 = v[15], v[16], v[17]
     for element in range(ends.shape[0]):
         a, b = ends[element, 0], ends[element, 1]
         d, d_rate = strains[element], rates[element]
-        if not element_strain(ends, R, x, V, element, v, poses, d, d_rate):
+        relative_pose(R[a], x[a], R[b], x[b], poses[0, :3], poses[0, 3])
+        if not logarithm(poses[0, :3], poses[0, 3], d):
             return element
-        rigid, rest_of_twist = v[0], v[1]
-        sigma, root_force = v[4], v[5]
-        internal_force(rest[element], stiffness[element], damping[element], d, d_rate, v[6], sigma)
-        # d'' from A_b = Ad A_a - ad(W) U + T' d' + T d''
-        terms = tangent_terms(d)
+        z = -(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        m = d[0] * d[3] + d[1] * d[4] + d[2] * d[5]
+        # d' = T(d)^-1 V_b - T(-d)^-1 V_a
         for i in range(6):
-            v[7, i] = 0.0
-        tangent_with_rate(d, d_rate, 1.0, d_rate, v[7], terms, v[2:4], v[8], v[9])
-        to_body(poses[0, :3], poses[0, 3], A[a], v[10])
-        ad(rest_of_twist, rigid, v[11])
+            u[i] = V[b, i] - V[a, i]
+            b0[i] = V[b, i] + V[a, i]
+        ad(d, u, u1)
+        ad(d, u1, u2)
+        ad(d, b0, b1)
+        even, even_z = even_series_with_slope(z)
         for i in range(6):
-            v[7, i] = A[b, i] - v[10, i] + v[11, i] - v[9, i]
-        inverse_tangent(d, v[7], 1.0, v[2:4], v[12])
-        gravity_a = v[13]
+            d_rate[i] = u[i] + 0.5 * b1[i] + even * u2[i]
         for i in range(3):
-            gravity_a[i] = R[a, 0, i] * gravity_N[0] + R[a, 1, i] * gravity_N[1] + R[a, 2, i] * gravity_N[2]
-            root_force[i], root_force[3 + i] = 0.0, 0.0
+            d_rate[3 + i] -= 2.0 * m * even_z * u2[i]
+        z_rate = -2.0 * (d[0] * d_rate[0] + d[1] * d_rate[1] + d[2] * d_rate[2])
+        m_rate = d_rate[0] * d[3] + d_rate[1] * d[4] + d_rate[2] * d[5]
+        m_rate += d[0] * d_rate[3] + d[1] * d_rate[4] + d[2] * d_rate[5]
+        internal_force(rest[element], stiffness[element], damping[element], d, d_rate, b0, sigma)
+        for i in range(3):
+            fall[i] = A[a, i]
+            w[i] = A[b, i] - A[a, i]
+            fall[3 + i] = A[a, 3 + i] - (
+                R[a, 0, i] * gravity_N[0] + R[a, 1, i] * gravity_N[1] + R[a, 2, i] * gravity_N[2]
+            )
+            w[3 + i] = (
+                A[b, 3 + i]
+                - (R[b, 0, i] * gravity_N[0] + R[b, 1, i] * gravity_N[1] + R[b, 2, i] * gravity_N[2])
+                - fall[3 + i]
+            )
+        ad(d, w, b0)
+        ad(d_rate, u, b1)
+        for i in range(6):
+            u1_rate[i] = b0[i] + b1[i]
+        ad(d, u1_rate, b0)
+        ad(d_rate, u1, b1)
+        for i in range(6):
+            u2_rate[i] = b0[i] + b1[i]
+            root_force[i], end_force[i], once[i], twice[i] = 0.0, 0.0, 0.0, 0.0
+        terms = helix_terms(z)
         for point in range(gauss.size):
             s = gauss[point]
+            c1, c2, c1_z, c2_z, c1_zz, c2_zz = helix_coefficients(series[point], z, terms)
+            p1, p2 = z_rate * c1_z, z_rate * c2_z
+            e1, e2 = -2.0 * m * c1_z, -2.0 * m * c2_z
+            f1 = -2.0 * (m_rate * c1_z + m * z_rate * c1_zz)
+            f2 = -2.0 * (m_rate * c2_z + m * z_rate * c2_zz)
             for i in range(6):
-                v[14, i] = s * d[i]
-            E, offset = poses[1, :3], poses[1, 3]
-            exponential(v[14], E, offset)
-            to_body(E, offset, V[a], v[15])
-            tangent_with_rate(d, d_rate, s, d_rate, v[12], terms, v[2:4], v[8], v[9])
-            for i in range(6):
-                v[8, i] *= s
-            ad(v[8], v[15], v[16])
-            to_body(E, offset, A[a], v[17])
-            twist, acceleration = v[18], v[19]
-            for i in range(6):
-                twist[i] = v[15, i] + v[8, i]
-                acceleration[i] = v[17, i] - v[16, i] + s * v[9, i]
-            for i in range(3):
-                acceleration[3 + i] -= (
-                    E[0, i] * gravity_a[0] + E[1, i] * gravity_a[1] + E[2, i] * gravity_a[2]
+                twist[i] = V[a, i] + s * u[i] + c1 * u1[i] + c2 * u2[i]
+                acceleration[i] = (
+                    fall[i] + s * w[i] + c1 * u1_rate[i] + c2 * u2_rate[i] + p1 * u1[i] + p2 * u2[i]
                 )
+            for i in range(3):
+                twist[3 + i] += e1 * u1[i] + e2 * u2[i]
+                acceleration[3 + i] += e1 * u1_rate[i] + e2 * u2_rate[i] + f1 * u1[i] + f2 * u2[i]
             # Newton and Euler: I a + v x* I v
             section = mass[element, point]
-            multiply(section, twist, v[20])
-            ad_transposed(twist, v[20], v[21])
-            multiply(section, acceleration, v[22])
+            multiply(section, twist, momentum)
+            ad_transposed(twist, momentum, b0)
+            multiply(section, acceleration, force)
             for i in range(6):
-                v[22, i] -= v[21, i]
-            tangent_transposed(d, s, v[22], terms, v[2], v[23])
-            add_from_body(E, offset, v[22], root_force)
-            for i in range(6):
-                sigma[i] += s * v[23, i]
-        even, odd = v[6], v[7]
-        inverse_tangent_transposed(d, sigma, v[2:4], even, odd)
+                force[i] -= b0[i]
+                root_force[i] += force[i]
+                end_force[i] += s * force[i]
+                once[i] += c1 * force[i]
+                twice[i] += c2 * force[i]
+            for i in range(3):
+                once[i] += e1 * force[3 + i]
+                twice[i] += e2 * force[3 + i]
+        ad_transposed(d, twice, b0)
         for i in range(6):
-            out[a, i] += odd[i] - even[i] + root_force[i]
-            out[b, i] += odd[i] + even[i]
+            once[i] += b0[i]
+        ad_transposed(d, once, b0)
+        # T(d)^-T sigma = even + odd, T(-d)^-T sigma = even - odd
+        ad_transposed(d, sigma, b1)
+        for i in range(6):
+            twice[i] = even * sigma[i]
+        for i in range(3):
+            twice[i] -= 2.0 * m * even_z * sigma[3 + i]
+        ad_transposed(d, twice, momentum)
+        ad_transposed(d, momentum, force)
+        for i in range(6):
+            end_force[i] += b0[i]
+            same, opposite = 0.5 * b1[i], sigma[i] + force[i]
+            out[a, i] += same - opposite + root_force[i] - end_force[i]
+            out[b, i] += same + opposite + end_force[i]
     return -1
 
 
@@ -174,19 +198,22 @@ def body_forces(nodes, inertia, R, V, A, gravity_N, v, out):
 
 
 @entry_kernel
-def section_motion(ends, fractions, elements, R, x, V, strains, rates, v, poses, R_out, x_out, V_out):
-    """Poses and twists of sections: section k at ``fractions[k]`` of ``elements[k]``, for strains as given.
+def place_sections(ends, fractions, series, elements, strains, R, x, v, poses, R_out, x_out, blocks):
+    """Poses of sections for strains as given, and the maps between their twists and the nodes'.
 
-    R_out (k, 3, 3), x_out (k, 3), V_out (k, 6) in the section's own axes. An element below zero, -1 - node,
+    Section k lies at ``fractions[k]`` of ``elements[k]``, with its `helix.helix_series` in series[k]. R_out
+    (k, 3, 3), x_out (k, 3); blocks (k, 2, 3, 3) of `helix.helix_map`. An element below zero, -1 - node,
     stands for that node itself.
     """
     for k in range(elements.size):
         element = elements[k]
         if element < 0:
             node = -1 - element
-            R_out[k] = R[node]
-            x_out[k] = x[node]
-            V_out[k] = V[node]
+            for i in range(3):
+                x_out[k, i] = x[node, i]
+                for j in range(3):
+                    R_out[k, i, j] = R[node, i, j]
+                    blocks[k, 0, i, j], blocks[k, 1, i, j] = 0.0, 0.0
             continue
         a, s = ends[element, 0], fractions[k]
         d = strains[element]
@@ -194,35 +221,27 @@ def section_motion(ends, fractions, elements, R, x, V, strains, rates, v, poses,
             v[0, i] = s * d[i]
         exponential(v[0], poses[0, :3], poses[0, 3])
         composed_pose(R[a], x[a], poses[0, :3], poses[0, 3], R_out[k], x_out[k])
-        to_body(poses[0, :3], poses[0, 3], V[a], v[1])
-        tangent(d, s, rates[element], tangent_terms(d), v[2], v[3])
-        for i in range(6):
-            V_out[k, i] = v[1, i] + s * v[3, i]
+        helix_map(d, s, series[k], blocks[k])
 
 
 @entry_kernel
-def add_section_forces(ends, fractions, elements, strains, forces, v, poses, out):
+def section_twists(ends, elements, blocks, V, out):
+    """Twists (k, 6) of sections in their own axes, with the blocks of `place_sections`."""
+    for k in range(elements.size):
+        element = elements[k]
+        a = ends[element, 0] if element >= 0 else -1 - element
+        b = ends[element, 1] if element >= 0 else a
+        helix_twist(V[a], V[b], blocks[k], out[k])
+
+
+@entry_kernel
+def subtract_forces(ends, elements, blocks, forces, out):
     """Subtract from out (n, 6) the nodes' share of force vectors (k, 6) on sections, by virtual work."""
     for k in range(elements.size):
         element = elements[k]
-        if element < 0:
-            for i in range(6):
-                out[-1 - element, i] -= forces[k, i]
-            continue
-        a, b, s = ends[element, 0], ends[element, 1], fractions[k]
-        d = strains[element]
-        for i in range(6):
-            v[0, i] = s * d[i]
-            v[1, i] = 0.0
-        exponential(v[0], poses[0, :3], poses[0, 3])
-        add_from_body(poses[0, :3], poses[0, 3], forces[k], v[1])
-        tangent_transposed(d, s, forces[k], tangent_terms(d), v[2], v[3])
-        for i in range(6):
-            v[3, i] *= s
-        inverse_tangent_transposed(d, v[3], v[4:6], v[6], v[7])
-        for i in range(6):
-            out[a, i] -= v[7, i] - v[6, i] + v[1, i]
-            out[b, i] -= v[7, i] + v[6, i]
+        a = ends[element, 0] if element >= 0 else -1 - element
+        b = ends[element, 1] if element >= 0 else a
+        subtract_helix_force(forces[k], blocks[k], out[a], out[b])
 
 
 @kernel

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes, sine_cosine
-from morphcore.multibody.kernels.articulated import carry_lane
+from morphcore.multibody.kernels.articulated import carry_lane, inverse_symmetric
 
 JOINT_ROWS = 44
 
@@ -111,12 +111,7 @@ def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
         d11 = s20 * t0 + s21 * t1 + added[1, l]
         d12 = t2
         d22 = g2 + added[2, l]
-        # inverse by cofactors: D is symmetric positive definite and well scaled
-        m00, m01, m02 = d11 * d22 - d12 * d12, d02 * d12 - d01 * d22, d01 * d12 - d02 * d11
-        m11, m12, m22 = d00 * d22 - d02 * d02, d01 * d02 - d00 * d12, d00 * d11 - d01 * d01
-        inverse = 1.0 / (d00 * m00 + d01 * m01 + d02 * m02)
-        m00, m01, m02 = m00 * inverse, m01 * inverse, m02 * inverse
-        m11, m12, m22 = m11 * inverse, m12 * inverse, m22 * inverse
+        m00, m01, m02, m11, m12, m22 = inverse_symmetric(d00, d01, d02, d11, d12, d22)
         joint[35, l], joint[36, l], joint[37, l] = m00, m01, m02
         joint[38, l], joint[39, l], joint[40, l] = m11, m12, m22
         p0, p1, p2 = force[0, l], force[1, l], force[2, l]

@@ -122,6 +122,16 @@ def even_series(z):
 
 
 @kernel
+def even_series_with_slope(z):
+    """`even_series` and its derivative by z."""
+    total, slope = 0.0, 0.0
+    for k in range(12, 0, -1):
+        slope = slope * z + total
+        total = total * z + BERNOULLI[k]
+    return total, slope
+
+
+@kernel
 def logarithm(R, x, d):
     """Logarithm d (6,) of a pose that turns by less than LARGEST_ANGLE; returns False beyond."""
     sx, sy, sz = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])

@@ -10,7 +10,7 @@ from morphcore.simulate.kernels.step import instant_rates, step_block
 def fly(
     lanes,
     first, last, surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants,
-    step, state, work, scratch, inputs, outputs, record,
+    step, number, state, slopes, middle, scratch, inputs, outputs, record,
 ):  # fmt: skip
     """Fly the blocks first..last - 1 over some steps.
 
@@ -18,18 +18,19 @@ def fly(
 
     Parameters (b blocks, t steps, s surfaces, n links, j strips)
     ----------
-    surfaces : (s, 5); ranges : (b, n, 2); shared : (23,). strips : (t + 1, j, 3); hinges : (t + 1, s,
-    HINGE_ROWS); hinge_accelerations : (t, s); operators : (t + 1, rows, columns); wind : (t + 1, 3).
-    constants : (b, rows, width). step : s. state : (b, rows, width), advanced in place. work : (3, rows,
-    width); scratch, inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r
-    rows of the state after each step.
+    surfaces : (s, 5); ranges : (b, n, 2); shared : (23,). In the middles of the steps: strips : (t, j, 3);
+    hinges : (t, s, HINGE_ROWS); operators : (t, rows, columns); wind : (t, 3). hinge_accelerations : (t, s).
+    constants : (b, rows, width). step : s. number : steps made before. state : (b, rows, width), advanced in
+    place. slopes : (b, SLOPES, mechanical rows, width), the blocks' memory. middle : (rows, width); scratch,
+    inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r rows of the
+    state after each step.
     """
     for n in range(record.shape[0]):
         for b in range(first, last):
             step_block(
-                lanes, surfaces, ranges[b], shared, strips[n : n + 2], hinges[n : n + 2],
-                hinge_accelerations[n], operators[n : n + 2], wind[n : n + 2], constants[b], state[b], step,
-                work[0], work[1], work[2], scratch, inputs, outputs,
+                lanes, surfaces, ranges[b], shared, strips[n], hinges[n], hinge_accelerations[n],
+                operators[n], wind[n], constants[b], state[b], step, number + n, slopes[b], middle, scratch,
+                inputs, outputs,
             )  # fmt: skip
             for r in range(record.shape[1]):
                 for l in range(len(lanes)):

@@ -1,0 +1,80 @@
+"""Mirror symmetry of an aircraft about its x-z plane: which surfaces are each other's image.
+
+A symmetric aircraft whose hinges move alike flies straight on: its left half does what its right half does.
+Then one half is flown, which stands for both (models/equivalent.py), and nothing is lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
+from morphcore.geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Indices of an aircraft's surfaces: ``own`` of one half, ``image`` of their images in the same order."""
+
+    own: tuple[int, ...]
+    image: tuple[int, ...]
+
+    def spread(self, values: Array) -> Array:
+        """Columns (k, s) of all surfaces from those of one half, (k, s / 2), where both sides are alike."""
+        out = np.empty((values.shape[0], 2 * values.shape[1]))
+        out[:, self.own] = out[:, self.image] = values
+        return out
+
+
+def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
+    """The symmetry of an aircraft in a flight condition; None where anything differs at all.
+
+    Wind does not count: a uniform one carries the aircraft along.
+    """
+    if not (_is_symmetric(aircraft.fuselage) and _starts_straight(flight)):
+        return None
+    own, image = [], []
+    waiting = list(range(len(aircraft.surfaces)))
+    while waiting:
+        first = waiting.pop(0)
+        reflection = _reflection(aircraft.surfaces[first])
+        found = next(
+            (k for k in waiting if replace(aircraft.surfaces[k], name=reflection.name) == reflection), None
+        )
+        if found is None:
+            return None
+        waiting.remove(found)
+        own.append(first)
+        image.append(found)
+    return Mirror(tuple(own), tuple(image))
+
+
+def _reflection(surface: Surface) -> Surface:
+    """The surface on the other side; hinge coordinates are alike on both sides."""
+    hinge = surface.hinge
+    return replace(
+        surface,
+        side="left" if surface.side == "right" else "right",
+        position_m=_across(surface.position_m),
+        hinge=None if hinge is None else replace(hinge, position_m=_across(hinge.position_m)),
+    )
+
+
+def _across(point_B: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = point_B
+    return x, -y, z
+
+
+def _is_symmetric(fuselage: Fuselage) -> bool:
+    ixy, iyz = fuselage.inertia_B[0, 1], fuselage.inertia_B[1, 2]
+    return bool(fuselage.centre_of_mass_B[1] == ixy == iyz == 0.0)
+
+
+def _starts_straight(flight: Flight) -> bool:
+    start = flight.start
+    return start is None or bool(start.force_B[1] == start.moment_B[0] == start.moment_B[2] == 0.0)

@@ -1,0 +1,409 @@
+"""Steps of the flexible model, one after the other without a return to Python.
+
+Generalised-alpha on SE(3) as `simulate.flexible` describes it. A step starts from the acceleration carried on
+straight from the last two, places the lattice and the sections' maps there (third order off), and iterates on
+the whole equations of its end, air loads included, with the structure's factored matrix, the air's part left
+out; a step in which the iteration slows down asks for a new matrix and is flown again. The circulations
+follow by refinement with the inverse of an earlier influence matrix, to `REFINED`; a step that does not get
+there hands back its matrix for a new inverse and is flown again.
+
+The parts of a step are pasted into the one kernel: compiled apart, each would be optimised once more with all
+that it calls.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, section_forces
+from morphcore.aero.kernels.lattice_place import refine
+from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
+from morphcore.jit import entry_kernel, inlined
+from morphcore.multibody.kernels.beam import (
+    beam_forces,
+    body_forces,
+    condense,
+    invert,
+    multiply,
+    place_sections,
+    section_twists,
+    substitute,
+    subtract_forces,
+)
+from morphcore.multibody.kernels.poses import move_poses
+from morphcore.simulate.kernels.roots import (
+    follow_fuselage,
+    gather_root_matrices,
+    gather_roots,
+    spread_to_roots,
+)
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
+SLOW = 0.1  # of the last iteration's change: then the matrix may be too old
+MOST_ITERATIONS = 50
+REFINED = 1e-12  # what is left of the flow through the panels, of its largest before
+STILL = 1e-7  # of the largest circulation: smaller changes within a step leave the induced velocities
+MOST_PASSES = 8  # of refinement; beyond, the inverse is renewed
+FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
+RECORD = 18  # numbers of a record before the tips: R_NB row by row, twist, position of the fuselage
+
+
+class Structure(NamedTuple):
+    """Beams, bodies, roots and sections as their kernels take them, with scratch; see `multibody.beam`."""
+
+    ends: IntArray
+    rest: Array
+    stiffness: Array
+    damping: Array
+    mass: Array
+    bodies: IntArray
+    inertia: Array
+    gauss: Array
+    gauss_series: Array
+    roots: IntArray
+    tips: IntArray
+    gravity_N: Array
+    thrust: Array
+    section_element: IntArray
+    section_fraction: Array
+    section_series: Array
+    section_blocks: Array
+    strains: Array
+    rates: Array
+    tangents: Array
+    inverses: Array
+    couplings: Array
+    diagonals: Array
+    v: Array
+    m: Array
+    poses: Array
+
+
+class Path(NamedTuple):
+    """Prescribed motion of all hinges, `simulate.flexible.HingePath`, and wind_N (k, 3) at its times."""
+
+    R_BW: Array
+    origin_B: Array
+    axis: Array
+    rate: Array
+    acceleration: Array
+    wind_N: Array
+
+
+class Rule(NamedTuple):
+    """Coefficients of the stepper; decay, mean : (2, r) of the lag's exact step; still : `STILL`."""
+
+    step_s: float
+    gamma: float
+    beta: float
+    of_new: float
+    of_old: float
+    of_average: float
+    of_rate: float
+    of_pose: float
+    still: float
+    decay: Array
+    mean: Array
+
+
+class State(NamedTuple):
+    """State arrays that move in time, as `FlexibleState`; A_before : (n, 6) twist rates one step earlier."""
+
+    R: Array
+    x: Array
+    V: Array
+    A: Array
+    a: Array
+    A_before: Array
+    lag: Array
+    circulation: Array
+
+
+class Scratch(NamedTuple):
+    """Room for one step (n nodes, k sections, r rings): right (n, 6); twists, forces (k, 6); others (r,)."""
+
+    R_NS: Array
+    x_N: Array
+    twists: Array
+    forces: Array
+    right: Array
+    blocked: Array
+    residual: Array
+    acting: Array
+    inverse: Array
+    small: Array
+    pace: Array
+    turn: Array
+    vector: Array
+
+
+@entry_kernel
+def fly_steps(structure, parts, place, path, rule, state, trial, scratch, records, first, last, fresh):
+    """Fly from row ``first`` to row ``last`` of the path; states move in place.
+
+    ``trial`` is a State of scratch. records (k, RECORD + tips) gets a row for every time. ``fresh`` : the
+    matrix was formed in the first step itself. Returns the row reached and what stopped the flight there.
+    """
+    row = first
+    while True:
+        _record(structure, state, records[row])
+        if row == last:
+            return row, FLOWN
+        status = _step(structure, parts, place, path, rule, state, trial, scratch, row + 1, fresh)
+        if status != FLOWN:
+            return row, status
+        row, fresh = row + 1, False
+
+
+@inlined
+def _record(structure, state, out):
+    """Attitude, twist and position of the fuselage and the tips' z in B from their roots."""
+    for i in range(3):
+        for j in range(3):
+            out[3 * i + j] = state.R[0, i, j]
+        out[15 + i] = state.x[0, i]
+    for i in range(6):
+        out[9 + i] = state.V[0, i]
+    for s in range(structure.roots.size):
+        root, tip = structure.roots[s], structure.tips[s]
+        total = 0.0
+        for i in range(3):
+            total += (state.x[tip, i] - state.x[root, i]) * state.R[0, i, 2]
+        out[RECORD + s] = total
+
+
+@inlined
+def _moved(structure, path, rule, state, trial, scratch, row):
+    """Where the trial's twist rates lead at the end of a step; the roots' part of them is set."""
+    h = rule.step_s
+    increments = scratch.right
+    for n in range(trial.A.shape[0]):
+        for i in range(6):
+            a0 = state.a[n, i]
+            a = rule.of_new * trial.A[n, i] + rule.of_old * state.A[n, i] - rule.of_average * a0
+            trial.a[n, i] = a
+            trial.V[n, i] = state.V[n, i] + h * ((1.0 - rule.gamma) * a0 + rule.gamma * a)
+            increments[n, i] = h * state.V[n, i] + h * h * ((0.5 - rule.beta) * a0 + rule.beta * a)
+        for i in range(3):
+            trial.x[n, i] = state.x[n, i]
+            for j in range(3):
+                trial.R[n, i, j] = state.R[n, i, j]
+    move_poses(increments, trial.R, trial.x, scratch.turn)
+    follow_fuselage(
+        structure.roots,
+        path.R_BW[row],
+        path.origin_B[row],
+        path.axis[row],
+        path.rate[row],
+        path.acceleration[row],
+        trial.R,
+        trial.x,
+        trial.V,
+        trial.A,
+        structure.v,
+    )
+
+
+@inlined
+def _place(structure, parts, place, trial, scratch, wind_B):
+    """Put sections and lattice where the trial is."""
+    place_sections(
+        structure.ends,
+        structure.section_fraction,
+        structure.section_series,
+        structure.section_element,
+        structure.strains,
+        trial.R,
+        trial.x,
+        structure.v,
+        structure.poses,
+        scratch.R_NS,
+        scratch.x_N,
+        structure.section_blocks,
+    )
+    R, x = trial.R[0], trial.x[0]
+    for k in range(structure.section_element.size):
+        for i in range(3):
+            place.x_B[k, i] = 0.0
+            for j in range(3):
+                place.x_B[k, i] += R[j, i] * (scratch.x_N[k, j] - x[j])
+                total = 0.0
+                for c in range(3):
+                    total += R[c, i] * scratch.R_NS[k, c, j]
+                place.R_BS[k, i, j] = total
+    stream_B = scratch.vector[1]
+    for i in range(3):
+        stream_B[i] = wind_B[i] - trial.V[0, 3 + i]
+    place_lattice(parts, place, stream_B)
+
+
+@inlined
+def _tie_roots(structure, path, small, row):
+    """small[0] = the inverse of what fuselage and all chains weigh at the reference point."""
+    for i in range(6):
+        for j in range(6):
+            small[1, i, j] = structure.diagonals[0, i, j]
+    gather_root_matrices(
+        structure.roots,
+        path.R_BW[row],
+        path.origin_B[row],
+        structure.diagonals,
+        structure.v,
+        structure.m,
+        small[1],
+    )
+    invert(small[1], small[0])
+
+
+@inlined
+def _solve(structure, path, small, right, vector, row):
+    """Solution of the factored matrix, the roots tied to the fuselage, in place of ``right`` (n, 6)."""
+    condense(structure.ends, structure.tangents, structure.inverses, structure.v, right)
+    total = vector[0]
+    for i in range(6):
+        total[i] = right[0, i]
+    gather_roots(structure.roots, path.R_BW[row], path.origin_B[row], right, total)
+    multiply(small[0], total, right[0])
+    spread_to_roots(structure.roots, path.R_BW[row], path.origin_B[row], right[0], right)
+    substitute(structure.ends, structure.couplings, right)
+
+
+@inlined
+def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh):
+    """One step to ``row``; returns a status, FLOWN if it was made.
+
+    A matrix is given up when the iteration slows to twice the pace that one ``fresh`` in its step has: what
+    the air does to it, no new matrix would mend.
+    """
+    nodes, rings = state.A.shape[0], state.circulation.size
+    wind_B, right = scratch.vector[0], scratch.right
+    for n in range(nodes):
+        for i in range(6):
+            trial.A[n, i] = 2.0 * state.A[n, i] - state.A_before[n, i]
+    for q in range(rings):
+        trial.circulation[q] = state.circulation[q]
+    tied, last, arrived = False, math.inf, False
+    status = LOST
+    for iteration in range(MOST_ITERATIONS):
+        _moved(structure, path, rule, state, trial, scratch, row)
+        if arrived:
+            status = FLOWN
+            break
+        right[:] = 0.0
+        failed = beam_forces(
+            structure.ends,
+            structure.rest,
+            structure.stiffness,
+            structure.damping,
+            structure.mass,
+            structure.gauss,
+            structure.gauss_series,
+            trial.R,
+            trial.x,
+            trial.V,
+            trial.A,
+            structure.gravity_N,
+            structure.v,
+            structure.poses,
+            structure.strains,
+            structure.rates,
+            right,
+        )
+        if failed >= 0:
+            status = BENT_TOO_FAR
+            break
+        body_forces(
+            structure.bodies,
+            structure.inertia,
+            trial.R,
+            trial.V,
+            trial.A,
+            structure.gravity_N,
+            structure.v,
+            right,
+        )
+        for i in range(3):
+            wind_B[i] = 0.0
+            for j in range(3):
+                wind_B[i] += trial.R[0, j, i] * path.wind_N[row, j]
+        if iteration == 0:
+            _place(structure, parts, place, trial, scratch, wind_B)
+        section_twists(
+            structure.ends, structure.section_element, structure.section_blocks, trial.V, scratch.twists
+        )
+        blocked_flow(parts, place, scratch.twists, wind_B, scratch.blocked)
+        if not refine(
+            place.influence,
+            scratch.inverse,
+            scratch.blocked,
+            scratch.residual,
+            REFINED,
+            MOST_PASSES,
+            trial.circulation,
+        ):
+            status = INVERSE_WANTED
+            break
+        for q in range(rings):
+            before, after = state.circulation[q], trial.circulation[q]
+            total = (1.0 - JONES_A1 - JONES_A2) * after
+            for k in range(2):
+                decay, mean = rule.decay[k, q], rule.mean[k, q]
+                lag = decay * state.lag[k, q] + (mean - decay) * before + (1.0 - mean) * after
+                trial.lag[k, q] = lag
+                total += (JONES_A1 if k == 0 else JONES_A2) * lag
+            scratch.acting[q] = total
+        section_forces(parts, place, scratch.acting, scratch.twists, wind_B, rule.still, scratch.forces)
+        subtract_forces(
+            structure.ends, structure.section_element, structure.section_blocks, scratch.forces, right
+        )
+        for i in range(6):
+            right[0, i] -= structure.thrust[i]
+        for n in range(nodes):
+            for i in range(6):
+                right[n, i] = -right[n, i]
+        if not tied:
+            _tie_roots(structure, path, scratch.small, row)
+            tied = True
+        _solve(structure, path, scratch.small, right, scratch.vector[2:], row)
+        largest = 0.0
+        for n in range(nodes):
+            for i in range(6):
+                trial.A[n, i] += right[n, i]
+                size = abs(right[n, i])
+                largest = size if not size <= largest else largest  # NaN wins
+        largest *= rule.step_s
+        if not largest < math.inf:
+            break
+        arrived = largest < TOLERANCE
+        pace, last = largest / last, largest
+        if fresh:
+            scratch.pace[0] = max(scratch.pace[0], pace) if iteration > 1 else pace
+        elif pace > max(SLOW, 2.0 * scratch.pace[0]) and not arrived:
+            status = MATRIX_WANTED
+            break
+    if status == FLOWN:
+        _accept(state, trial)
+    return status
+
+
+@inlined
+def _accept(state, trial):
+    """Make the trial the state."""
+    for n in range(state.A.shape[0]):
+        for i in range(6):
+            state.A_before[n, i] = state.A[n, i]
+            state.V[n, i], state.A[n, i], state.a[n, i] = trial.V[n, i], trial.A[n, i], trial.a[n, i]
+        for i in range(3):
+            state.x[n, i] = trial.x[n, i]
+            for j in range(3):
+                state.R[n, i, j] = trial.R[n, i, j]
+    for q in range(state.circulation.size):
+        state.circulation[q] = trial.circulation[q]
+        state.lag[0, q], state.lag[1, q] = trial.lag[0, q], trial.lag[1, q]

@@ -1,0 +1,62 @@
+"""A process's first seconds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core import event
+
+from morphcore.bench.fresh_process import in_fresh_process
+from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
+from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, request_of
+from morphcore.identify import identification_from_document
+from morphcore.jit import kernel
+
+ALLOWED_S = 0.5
+
+
+def test_a_request_of_the_benchmark_is_one_that_the_library_takes() -> None:
+    """Three flights to train on, and a first step that leaves a best so far."""
+    run = identification_from_document(request_of(bench_of(QUICK)))
+    assert [sample.role for sample in run.samples] == ["train"] * 3
+    assert next(run.steps()).best_cost > 0.0
+
+
+def test_compilations_are_written_down_once_each() -> None:
+    """A kernel's time holds that of what it calls; a second call compiles nothing."""
+
+    @kernel
+    def inner(x: Any) -> Any:
+        return 2.0 * x
+
+    @kernel
+    def outer(x: Any) -> Any:
+        return inner(x) + inner(x + 1.0)
+
+    times = CompileTimes()
+    with event.install_listener(COMPILING, times):
+        assert outer(1.0) == 6.0
+        assert outer(2.0) == 10.0
+    (outermost,) = times.by_entry
+    assert outermost.endswith("outer")
+    own = times.own
+    assert len(own) == 2
+    assert min(own.values()) > 0.0
+    np.testing.assert_allclose(sum(own.values()), times.by_entry[outermost], rtol=1e-6)
+
+
+def test_a_process_that_fails_says_why() -> None:
+    """The end of its error is in the exception."""
+    with pytest.raises(RuntimeError, match="no_such_function"):
+        in_fresh_process("morphcore.bench.start_up:no_such_function")
+
+
+@pytest.mark.slow
+def test_a_warm_process_begins_its_first_generation_in_half_a_second() -> None:
+    """From the document of a request, three flights, to the first step told: seconds of computing."""
+    first_generation(example_samples_dir())  # compiles, should that be needed
+    found = first_generation(example_samples_dir())
+    print(found)
+    assert found["job"]["computing_s"] < ALLOWED_S

@@ -1,0 +1,72 @@
+"""The step chosen for given flights holds its tolerance, and asks for no shorter one than needed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from morphcore.frames import wrap_angle
+from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.plan import time_grid
+from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.simulate.step_choice import CANDIDATES_S, TOLERANCE_RAD, choose_step
+from tests.models.chains import example_aircraft, example_flight
+from tests.simulate.flights import example_model, fly_trimmed, plan_of, sample, sample_schedules
+
+SLOW = [ConstantRate(0.0, 0.3, 0.5, ramp_s=0.2)] * 2
+# one wing jerks through 0.5 rad: its ramps last two steps of 10 ms
+HARD = [ConstantRate(0.0, 0.5, 0.4, start_s=0.1, ramp_s=0.02), Hold()]
+TIMES_S = np.linspace(0.0, 0.6, 61)
+
+
+def error(model, schedules, step_s):
+    """Attitude error of a step against an eighth of the shortest candidate, rad: a flight of its own."""
+    fine_s = CANDIDATES_S[-1] / 8
+    coarse, fine = (
+        fly_trimmed(model, plan_of(model, schedules, 0.6, step)).euler for step in (step_s, fine_s)
+    )
+    every = round(step_s / fine_s)
+    return float(np.abs(wrap_angle(coarse - fine[::every])).max())
+
+
+@pytest.mark.parametrize(("schedules", "expected_s"), [(SLOW, 0.01), (HARD, 0.005)])
+def test_the_longest_step_within_the_tolerance(schedules, expected_s):
+    """What is chosen is within the tolerance; of what is refused the error is indeed greater.
+
+    The estimate is that of the asymptotic error: right to a quarter here.
+    """
+    model = example_model(2)
+    found = choose_step(model, [(schedules, TIMES_S)])
+    assert found.holds
+    assert found.step_s == expected_s
+    assert found.error_rad <= TOLERANCE_RAD
+    assert error(model, schedules, found.step_s) == pytest.approx(found.error_rad, rel=0.25)
+    for refused_s in (step for step in CANDIDATES_S if step > found.step_s):
+        assert error(model, schedules, refused_s) > TOLERANCE_RAD
+
+
+def test_the_worst_flight_decides():
+    """Of several flights the one that needs the shortest step sets it, in any order."""
+    model = example_model(2)
+    flights = [(SLOW, TIMES_S), (HARD, TIMES_S)]
+    alone = choose_step(model, flights[1:])
+    assert choose_step(model, flights) == choose_step(model, flights[::-1]) == alone
+
+
+def test_a_tolerance_beyond_reach():
+    """Where no candidate holds the tolerance, the shortest is taken and says so."""
+    found = choose_step(example_model(2), [(HARD, TIMES_S)], tolerance_rad=1e-9)
+    assert not found.holds
+    assert found.step_s == CANDIDATES_S[-1]
+    assert found.error_rad > 1e-9
+
+
+@pytest.mark.parametrize("name", ["train_rate_0.8", "train_asymmetric"])
+def test_the_sample_flights_take_the_longest_step(name):
+    """10 ms hold on the examples, whose rows they hit."""
+    model = chain_model(example_aircraft(), example_flight(), 3)
+    flown = sample(name)
+    found = choose_step(model, [(sample_schedules(name), flown.time_s)], physical_guess(model))
+    assert found.holds
+    assert found.step_s == CANDIDATES_S[0]
+    assert time_grid(flown.time_s, found.step_s).at is not None
