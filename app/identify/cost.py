@@ -17,13 +17,25 @@ DESCENT_TRIALS = (
 )
 REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
 REFERENCE_LINKS = 3
+CORRECTIONS = 4  # that may be sought; of symmetric samples all but the profile drag
+ASYMMETRIC_RAD = 0.01  # a sample is asymmetric whose sweeps differ, or that rolls or yaws, by more
 
 
-def parameter_count(model: SoughtModel, links: int) -> int:
+def _asymmetric(sample: InlineSample) -> bool:
+    apart = max(abs(a - b) for a, b in zip(sample.sweep_left_rad, sample.sweep_right_rad, strict=True))
+    turned = max(max(angle) - min(angle) for angle in (sample.phi_rad, sample.psi_rad))
+    return max(apart, turned) > ASYMMETRIC_RAD
+
+
+def parameter_count(model: SoughtModel, links: int, training: Sequence[InlineSample]) -> int:
     """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections."""
+    if model.aero_coefficients is None:
+        corrections = CORRECTIONS - (not any(_asymmetric(sample) for sample in training))
+    else:
+        corrections = len(model.aero_coefficients)
     joints = links - 1
     per_wing = 7 * joints
-    return per_wing * (2 if model.separate_wings else 1) + len(model.aero_coefficients)
+    return per_wing * (2 if model.separate_wings else 1) + corrections
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:
@@ -45,9 +57,9 @@ def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample
     samples
         The samples with their rows.
     """
-    parameters = parameter_count(request.model, links)
-    sets = _parameter_sets(request.search, parameters)
     training = [sample for sample in samples if sample.role == "train"]
+    parameters = parameter_count(request.model, links, training)
+    sets = _parameter_sets(request.search, parameters)
     flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
     return CostEstimate(
         samples=len(samples),

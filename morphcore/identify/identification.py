@@ -15,12 +15,13 @@ from morphcore.errors import InvalidInput
 from morphcore.evolution import Evolution, EvolutionState, first_evolution
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
+from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.trajectory import Trajectory
@@ -74,6 +75,7 @@ class Identification:
         self.search = search or SearchSettings()
         self.samples = tuple(samples)
         self._clock = clock
+        self._step_s = self.settings.step_s
         names = [sample.name for sample in samples]
         if len(set(names)) != len(names):
             raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
@@ -85,11 +87,14 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
+        sought = self.settings.aero_coefficients
+        if sought is None:
+            sought = corrections_told([sample for sample in samples if sample.role == "train"])
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
-            aero_coefficients=self.settings.aero_coefficients,
+            aero_coefficients=sought,
             bounds=self.settings.bounds,
         )
         warm_start = self.search.warm_start
@@ -102,13 +107,32 @@ class Identification:
         """A chain model with the lattice that the settings ask for."""
         return chain_model(aircraft, flight, links, self.settings.lattice)
 
+    @property
+    def step_s(self) -> float:
+        """The time step of all flights, s: the one asked for, or chosen from the samples to fit."""
+        return self._chosen_step()
+
+    def _chosen_step(self, stop: Stop | None = None) -> float:
+        """Choose the step if none is given: from the inputs alone, so that a resumed search has the same."""
+        if self._step_s is None:
+            with one_blas_thread():
+                self._step_s = longest_step(
+                    self.model,
+                    self.space.decode(self.space.guess),
+                    [sample for sample in self.samples if sample.role == "train"],
+                    self.settings.start,
+                    stop,
+                    separate_wings=self.settings.separate_wings,
+                )
+        return self._step_s
+
     @cached_property
     def cases(self) -> tuple[SampleCase, ...]:
         """All samples with their plans."""
         return sample_cases(
             self.model,
             self.samples,
-            self.settings.step_s,
+            self.step_s,
             separate_wings=self.settings.separate_wings,
         )
 
@@ -129,6 +153,7 @@ class Identification:
         while state is None or state.phase != "done":
             begin = self._clock()
             with one_blas_thread():
+                self._chosen_step(stop)
                 state = self._baseline(stop) if state is None else self._advance(state, stop)
             state = self._timed(state, self._clock() - begin)
             yield self._step(state)

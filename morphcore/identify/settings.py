@@ -10,7 +10,7 @@ from morphcore.errors import InvalidInput
 from morphcore.evolution import FEWEST, EvolutionSettings
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
-from morphcore.identify.parameters import AERO_COEFFICIENTS, BOUND_NAMES
+from morphcore.identify.parameters import BOUND_NAMES
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.plan import STEP_S
@@ -21,6 +21,7 @@ Method = Literal["hybrid", "least_squares", "cma", "pso"]
 
 METHODS: tuple[Method, ...] = ("hybrid", "least_squares", "cma", "pso")
 LARGEST_SEED = 2**53 - 1
+SHORTEST_STEP_S = 5e-4
 PAPER_PARTICLES = 2500
 # starts of the hybrid's second polish
 DEFAULT_STARTS = 4
@@ -33,14 +34,19 @@ WARM_SCREEN = 32
 
 @dataclass(frozen=True)
 class ModelSettings:
-    """The model whose parameters are sought."""
+    """The model whose parameters are sought.
+
+    ``aero_coefficients`` : the corrections to seek; None: those that the flights to fit can tell (see
+    ``morphcore/identify/sought.py``). ``step_s`` : s; None: the longest that holds the tolerance of
+    ``morphcore/simulate/step_choice.py`` on the flights to fit.
+    """
 
     links_per_wing: int = 3
     separate_wings: bool = False
-    aero_coefficients: tuple[str, ...] = AERO_COEFFICIENTS
+    aero_coefficients: tuple[str, ...] | None = None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     lattice: LatticeSettings = DEFAULT_LATTICE
-    step_s: float = STEP_S
+    step_s: float | None = None
     start: StartMode = "trim"
 
 
@@ -74,15 +80,16 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
     bounds = fields.optional_child("bounds")
     pairs = {name: _pair(bounds, name) for name in BOUND_NAMES if bounds.has(name)}
     bounds.done()
+    listed = fields.raw("aero_coefficients", None)
     settings = ModelSettings(
         links_per_wing=fields.whole(
             "links_per_wing", default=default.links_per_wing, least=1, most=MOST_LINKS
         ),
         separate_wings=fields.flag("separate_wings", default=False),
-        aero_coefficients=tuple(fields.raw("aero_coefficients", list(AERO_COEFFICIENTS))),
+        aero_coefficients=None if listed is None else tuple(listed),
         bounds=pairs,
         lattice=lattice_settings(fields.raw("lattice", {}), f"{pointer}/lattice"),
-        step_s=fields.number("step_s", default=default.step_s, least=5e-4, most=0.01),
+        step_s=fields.optional_number("step_s", least=SHORTEST_STEP_S, most=STEP_S),
         start=fields.choice("start", ("trim", "given")) if fields.has("start") else "trim",  # type: ignore[arg-type]
     )
     fields.done()
