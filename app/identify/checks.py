@@ -39,7 +39,9 @@ def samples_request_faults(request: SamplesRequest, samples: Sequence[InlineSamp
         *flexible_wing_faults(request.aircraft, "nothing_to_identify"),
         *_bounds_faults(model.bounds),
         *_together_faults(samples),
-        *repeated_faults(model.aero_coefficients, "/model/aero_coefficients", "Name each correction once."),
+        *repeated_faults(
+            model.aero_coefficients or [], "/model/aero_coefficients", "Name each correction once."
+        ),
     ]
     hinges = hinge_ranges(request.aircraft)
     for number, sample in enumerate(samples):

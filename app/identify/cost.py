@@ -8,33 +8,43 @@ from app.identify.schemas import CostEstimate, SamplesRequest, Search, SoughtMod
 from app.schemas.samples import InlineSample
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
-SWARM_PARTICLES = {"pso": 256, "hybrid": 128}
+SWARM_PARTICLES = {"pso": 200, "cma": 32}
 PAPER_PARTICLES = 2500
-SWARM_GENERATIONS = {"pso": 200, "hybrid": 20}
-POLISH_STARTS = 4
-POLISH_ITERATIONS = 25
+SWARM_GENERATIONS = {"pso": 100, "cma": 200}
+DESCENT_ITERATIONS = 20
+DESCENT_TRIALS = (
+    24  # trial steps of an iteration; its Jacobian flies a parameter set a parameter and one more
+)
 REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
 REFERENCE_LINKS = 3
+CORRECTIONS = 4  # that may be sought; of symmetric samples all but the profile drag
+ASYMMETRIC_RAD = 0.01  # a sample is asymmetric whose sweeps differ, or that rolls or yaws, by more
 
 
-def parameter_count(model: SoughtModel, links: int) -> int:
+def _asymmetric(sample: InlineSample) -> bool:
+    apart = max(abs(a - b) for a, b in zip(sample.sweep_left_rad, sample.sweep_right_rad, strict=True))
+    turned = max(max(angle) - min(angle) for angle in (sample.phi_rad, sample.psi_rad))
+    return max(apart, turned) > ASYMMETRIC_RAD
+
+
+def parameter_count(model: SoughtModel, links: int, training: Sequence[InlineSample]) -> int:
     """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections."""
+    if model.aero_coefficients is None:
+        corrections = CORRECTIONS - (not any(_asymmetric(sample) for sample in training))
+    else:
+        corrections = len(model.aero_coefficients)
     joints = links - 1
     per_wing = 7 * joints
-    return per_wing * (2 if model.separate_wings else 1) + len(model.aero_coefficients)
+    return per_wing * (2 if model.separate_wings else 1) + corrections
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:
     """Count the parameter sets that a search flies through every training sample."""
-    sets = 0
-    if search.method in SWARM_PARTICLES:
-        particles = search.particles or (
-            PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[search.method]
-        )
-        sets += particles * (search.generations or SWARM_GENERATIONS[search.method])
-    if search.method != "pso":
-        sets += POLISH_STARTS * POLISH_ITERATIONS * (parameters + 1)
-    return sets
+    if search.method not in SWARM_PARTICLES and search.preset != "paper":
+        return DESCENT_ITERATIONS * (parameters + 1 + DESCENT_TRIALS)
+    method = "pso" if search.preset == "paper" else search.method
+    particles = search.particles or (PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[method])
+    return particles * (search.generations or SWARM_GENERATIONS[method])
 
 
 def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample]) -> CostEstimate:
@@ -47,9 +57,9 @@ def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample
     samples
         The samples with their rows.
     """
-    parameters = parameter_count(request.model, links)
-    sets = _parameter_sets(request.search, parameters)
     training = [sample for sample in samples if sample.role == "train"]
+    parameters = parameter_count(request.model, links, training)
+    sets = _parameter_sets(request.search, parameters)
     flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
     return CostEstimate(
         samples=len(samples),

@@ -19,7 +19,7 @@ from app.schemas.search import WEEK_S, SwarmSearch, WarmStart
 MAX_SAMPLES = 64
 
 Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
-Method = Literal["hybrid", "pso", "least_squares"]
+Method = Literal["hybrid", "least_squares", "cma", "pso"]
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
     Field(min_length=2, max_length=2, description="[low, high], low below high."),
@@ -44,15 +44,19 @@ class SoughtModel(Strict):
     separate_wings: bool = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
-    aero_coefficients: list[Correction] = Field(
-        default=["lift_factor", "centre_shift_m", "profile_drag", "lag_s"],
+    aero_coefficients: list[Correction] | None = Field(
+        default=None,
         max_length=4,
-        description="Aerodynamic corrections that are sought; the others keep their neutral values.",
+        description="Aerodynamic corrections that are sought; the others keep their neutral values. "
+        "Left out: those that the training samples can tell, which are all, but `profile_drag` only if one "
+        "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad).",
     )
     bounds: Bounds | None = None
     lattice: Lattice = Lattice()
     step_s: StepS | None = Field(
-        default=None, description="Time step; the solver's own choice when left out."
+        default=None,
+        description="Longest time step. Left out: the longest of 10, 5 and 2.5 ms that holds the training "
+        "samples' attitude to 5e-5 rad with the physical guess; the result's `model` says which.",
     )
     start: Start = Field(
         default="trim", description="Trim each model by itself, or start from `flight.start`."
@@ -192,6 +196,9 @@ class SearchReport(BaseModel):
     flights: int
     generations: int
     wall_s: float
+    aero_coefficients: list[Correction] | None = Field(
+        default=None, description="Aerodynamic corrections that were sought."
+    )
     history: list[dict[str, Any]]
 
 

@@ -76,7 +76,7 @@ StartAt = Annotated[
     Start | None, model_option("--start", help="Trim each model by itself, or start as the flight file says.")
 ]
 
-Method = Annotated[str | None, search_option("--method", help="hybrid, pso or least_squares.")]
+Method = Annotated[str | None, search_option("--method", help="hybrid, least_squares, cma or pso.")]
 Seed = Annotated[int | None, search_option("--seed", min=0, help="Same seed, same answer.")]
 Particles = Annotated[int | None, search_option("--particles", min=2, help="Swarm size.")]
 Generations = Annotated[int | None, search_option("--generations", min=1, help="Swarm generations.")]

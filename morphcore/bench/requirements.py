@@ -40,6 +40,9 @@ class Requirement:
 
 REQUIREMENTS = (
     Requirement("batch/real_time_factor_per_core", 3_000.0, at_least=True),
+    Requirement("search/arrived_share", 1.0, at_least=True),
+    Requirement("search/flight_sets_to_target", 3_000.0),
+    Requirement("search/wall_s_to_target", 15.0),
     Requirement("mujoco/batch_ratio", 30.0, at_least=True),
     Requirement("mujoco/single_ratio", 1.0, at_least=True),
     # the counts are whole numbers of a short flight: no allowance for time, one for rounding

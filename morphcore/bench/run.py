@@ -15,6 +15,7 @@ from morphcore.bench.machine import machine
 from morphcore.bench.memory import swarm_memory
 from morphcore.bench.operations import operations, structural_growth
 from morphcore.bench.requirements import judged
+from morphcore.bench.search import search_benchmark
 from morphcore.bench.setting import FULL, LINKS, QUICK, RATE_SAMPLES, Bench, Clock, Effort, Figures, bench_of
 from morphcore.bench.single_flights import flexible_flight, single_flights
 from morphcore.bench.start_up import cold_compilation, first_generation
@@ -39,6 +40,7 @@ SECTIONS: Mapping[str, Section] = {
     "flexible": lambda bench: {"flexible": flexible_flight(bench)},
     "growth_with_links": lambda bench: {"growth_with_links": growth_with_links(bench)},
     "operations": _counted,
+    "search": lambda bench: {"search": search_benchmark(bench)},
     "mujoco": lambda bench: {"mujoco": against_mujoco(bench)},
     "step_error": lambda bench: {"step_error": step_error(bench)},
     "lattice": lambda bench: {"lattice": lattice_cost(bench)},

@@ -34,7 +34,7 @@ class Effort:
 
     particles : parameter sets of the swarm. rounds : interleaved repetitions, of which medians are taken.
     singles : repetitions of single flights. links : numbers of links whose cost is compared.
-    refinement : how many times finer the reference of the step error is.
+    refinement : how many times finer the reference of the step error is. seeds : of each search.
     """
 
     particles: int
@@ -42,10 +42,11 @@ class Effort:
     singles: int
     links: tuple[int, ...]
     refinement: int
+    seeds: int = 10
 
 
 FULL = Effort(particles=2500, rounds=3, singles=15, links=(1, 2, 3, 4, 5, 6, 7, 8), refinement=50)
-QUICK = Effort(particles=480, rounds=2, singles=5, links=(1, 3, 5), refinement=10)
+QUICK = Effort(particles=480, rounds=2, singles=5, links=(1, 3, 5), refinement=10, seeds=1)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from morphcore.bench.requirements import BY_PATH
+from morphcore.bench.search import search_table
 from morphcore.bench.setting import LINKS, Figures
 from morphcore.lanes import TOGETHER
 
@@ -110,6 +111,21 @@ def _operations(figures: Figures) -> Iterator[Line]:
     yield Line("dearest further link over the second one", growth, _must(figures, "structural_growth"))
 
 
+def _search(figures: Figures) -> Iterator[Line]:
+    found = figures["search"]
+    methods = found["methods"].values()
+    arrived, runs = (sum(method[name] for method in methods) for name in ("arrived", "seeds"))
+    what = f"searches from {len(found['samples'])} flights that end within 10 % of the best J"
+    yield Line(what, f"{arrived} of {runs}", _must(figures, "search/arrived_share"))
+    path = "search/flight_sets_to_target"
+    yield Line("flight sets to there, the worst", f"{found['flight_sets_to_target']:,}", _must(figures, path))
+    path = "search/wall_s_to_target"
+    value = f"{found['wall_s_to_target']:.3g} s"
+    yield Line("time to there, median", value, _must(figures, path, unit=" s"))
+    for name, value in search_table(found):
+        yield Line(f"search: {name}", value)
+
+
 def _mujoco(figures: Figures) -> Iterator[Line]:
     found = figures["mujoco"]
     what = (
@@ -174,6 +190,7 @@ LINES: Mapping[str, Callable[[Figures], Iterator[Line]]] = {
     "flexible": _flexible,
     "growth_with_links": _growth,
     "operations": _operations,
+    "search": _search,
     "mujoco": _mujoco,
     "step_error": _step_error,
     "lattice": _lattice,

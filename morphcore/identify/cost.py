@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.errors import InvalidInput
+from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.lanes import TOGETHER
@@ -19,6 +19,7 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constan
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.step_choice import choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time
@@ -98,6 +99,30 @@ def sample_cases(
         )
         for i, sample in enumerate(samples)
     )
+
+
+def longest_step(
+    model: ChainModel,
+    batch: ParameterBatch,
+    samples: Sequence[Trajectory],
+    start: StartMode,
+    stop: Stop | None = None,
+    *,
+    separate_wings: bool = False,
+) -> float:
+    """The longest step, s, with which a parameter set flies samples within the tolerance of ``choose_step``.
+
+    A set that has no trim flies nothing that could be compared: the default step it is.
+    """
+    flights = [
+        (sample_schedules(model.aircraft, sample, f"/samples/{i}"), sample.time_s)
+        for i, sample in enumerate(samples)
+    ]
+    try:
+        found = choose_step(model, flights, batch, start=start, may_halve=not separate_wings, stop=stop)
+    except TrimNotFound:
+        return STEP_S
+    return found.step_s
 
 
 def shared_trims(

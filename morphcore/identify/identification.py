@@ -9,15 +9,19 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from morphcore.errors import InvalidInput
+from morphcore.evolution import Evolution, EvolutionState, first_evolution
+from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.cost import SampleCase, costs, residuals, sample_cases
+from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.simulate.trajectory import Trajectory
@@ -32,9 +36,21 @@ Clock = Callable[[], float]
 SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical guess, in search coordinates
 # A weak prior on the polish: being off the physical guess by one unit costs as much as one error of this
 # size. It settles the directions that the samples cannot see and is far below what they can.
-PRIOR_RAD = 1e-4
-# the field of starts narrows as the polish goes on: iteration -> starts kept (as a share of the first field)
-NARROWING = ((4, 1.0), (8, 0.5), (14, 0.25))
+PRIOR_RAD = 3e-5
+# hopeless starts are dropped as the polish goes on: iterations -> starts kept (as a share of the first field)
+NARROWING = ((3, 1.0), (6, 0.5))
+# phases in which a generation of costs is asked for and told
+ASKED: tuple[Phase, ...] = ("swarm", "evolution")
+FOLLOWING: dict[str, Phase] = {
+    "pso": "swarm",
+    "cma": "evolution",
+    "hybrid": "polish",
+    "least_squares": "polish",
+}
+# "hybrid" looks elsewhere where the descent from the physical guess leaves errors above 1 % of the motion
+# (rms, so squared here): it may have ended in a wrong valley. Where it does not, a screen and three times the
+# flights lowered J by five per cent at most (docs/performance_search.md).
+GOOD_FIT = 1e-4
 
 
 class Identification:
@@ -59,6 +75,7 @@ class Identification:
         self.search = search or SearchSettings()
         self.samples = tuple(samples)
         self._clock = clock
+        self._step_s = self.settings.step_s
         names = [sample.name for sample in samples]
         if len(set(names)) != len(names):
             raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
@@ -70,11 +87,14 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
+        sought = self.settings.aero_coefficients
+        if sought is None:
+            sought = corrections_told([sample for sample in samples if sample.role == "train"])
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
-            aero_coefficients=self.settings.aero_coefficients,
+            aero_coefficients=sought,
             bounds=self.settings.bounds,
         )
         warm_start = self.search.warm_start
@@ -87,13 +107,32 @@ class Identification:
         """A chain model with the lattice that the settings ask for."""
         return chain_model(aircraft, flight, links, self.settings.lattice)
 
+    @property
+    def step_s(self) -> float:
+        """The time step of all flights, s: the one asked for, or chosen from the samples to fit."""
+        return self._chosen_step()
+
+    def _chosen_step(self, stop: Stop | None = None) -> float:
+        """Choose the step if none is given: from the inputs alone, so that a resumed search has the same."""
+        if self._step_s is None:
+            with one_blas_thread():
+                self._step_s = longest_step(
+                    self.model,
+                    self.space.decode(self.space.guess),
+                    [sample for sample in self.samples if sample.role == "train"],
+                    self.settings.start,
+                    stop,
+                    separate_wings=self.settings.separate_wings,
+                )
+        return self._step_s
+
     @cached_property
     def cases(self) -> tuple[SampleCase, ...]:
         """All samples with their plans."""
         return sample_cases(
             self.model,
             self.samples,
-            self.settings.step_s,
+            self.step_s,
             separate_wings=self.settings.separate_wings,
         )
 
@@ -114,6 +153,7 @@ class Identification:
         while state is None or state.phase != "done":
             begin = self._clock()
             with one_blas_thread():
+                self._chosen_step(stop)
                 state = self._baseline(stop) if state is None else self._advance(state, stop)
             state = self._timed(state, self._clock() - begin)
             yield self._step(state)
@@ -131,9 +171,9 @@ class Identification:
     # a generation asked for and told, so that others may fly it
 
     def generation_task(self, checkpoint: bytes) -> GenerationTask | None:
-        """What the step after a checkpoint flies; None where that step is no generation of a swarm."""
+        """What the step after a checkpoint flies; None where that step is no generation of costs."""
         state = decode(checkpoint)
-        return self._task(state) if state.phase == "swarm" else None
+        return self._task(state) if state.phase in ASKED else None
 
     def task_costs(self, points: Array, stop: Stop | None = None) -> Array:
         """Costs (p,) of search points (p, d), rad^2: of any part of a task, whoever flies the rest."""
@@ -150,7 +190,7 @@ class Identification:
         ValueError : there is no such task, or it has another number of points.
         """
         state = decode(checkpoint)
-        if state.phase != "swarm" or cost.shape != self._task(state).points.shape[:1]:
+        if state.phase not in ASKED or cost.shape != self._task(state).points.shape[:1]:
             raise ValueError(f"costs {cost.shape} do not answer the task after {state.phase}")
         with one_blas_thread():
             return self._step(self._timed(self._moved(state, cost), wall_s))
@@ -160,37 +200,45 @@ class Identification:
     def _baseline(self, stop: Stop | None) -> SearchState:
         """Fly what is known before: from here on there is a best so far."""
         cost = self._costs(self.known, stop)
-        following: Phase = "swarm" if self.search.method == "pso" else "screen"
-        phase: Phase = following if self.space.dimension else "done"
+        phase = FOLLOWING[self.search.method] if self.space.dimension else "done"
         best = int(np.argmin(cost))
-        flights = cost.size * len(self.training)
-        state = SearchState(phase, self.known[best], float(cost[best]), flights=flights)
+        state = SearchState(
+            phase,
+            self.known[best],
+            float(cost[best]),
+            flights=cost.size * len(self.training),
+            polish=first_polish(self.known, cost) if phase == "polish" else None,
+        )
         return _recorded(state, "baseline", 0)
 
     def _advance(self, state: SearchState, stop: Stop | None) -> SearchState:
-        step = {"screen": self._screen, "swarm": self._generation, "polish": self._polish}[state.phase]
+        step = {"screen": self._screen, "polish": self._polish}.get(state.phase, self._generation)
         return step(state, stop)
+
+    @cached_property
+    def _good(self) -> float:
+        """J with which a descent has ended well, rad^2: a share of the motion in the samples."""
+        return GOOD_FIT * sum(
+            float(np.sum((case.weight * wrap_angle(case.sample.euler - case.sample.euler[0])) ** 2))
+            for case in self.training
+        )
 
     def _screen(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Fly candidates around what is known and choose the polish's starts among them."""
-        rng = np.random.default_rng(self.search.seed)
-        spread = rng.normal(0.0, SCREEN_SPREAD, (self.search.screen, self.space.dimension))
+        spread = SCREEN_SPREAD * _even_normals(self.search.screen, self.space.dimension, self.search.seed)
         points = np.clip(self.known[0] + spread, self.space.lower, self.space.upper)
-        known = self.known[: self.search.screen]
-        points[: len(known)] = known
         cost = self._costs(points, stop)
-        order = np.argsort(cost, kind="stable")
-        chosen = np.unique(np.append(order[: self.search.starts - len(known)], range(len(known))))
-        best = int(order[0])
-        found = SearchState(
-            "polish",
-            points[best],
-            float(cost[best]),
-            state.generation + 1,
-            state.flights + cost.size * len(self.training),
-            state.wall_s,
-            state.history,
+        chosen = np.argsort(cost, kind="stable")[: self.search.starts]
+        better = cost[chosen[0]] < state.best_cost
+        found = replace(
+            state,
+            phase="polish",
+            best=points[chosen[0]] if better else state.best,
+            best_cost=float(cost[chosen[0]]) if better else state.best_cost,
+            generation=state.generation + 1,
+            flights=state.flights + cost.size * len(self.training),
             polish=first_polish(points[chosen], cost[chosen]),
+            screened=True,
         )
         return _recorded(found, "screen", cost.size)
 
@@ -208,22 +256,30 @@ class Identification:
             return np.concatenate([self._residuals(points, stop), prior], axis=1)
 
         after = next_polish(before, self.space.lower, self.space.upper, errors, keep)
-        if after is before:
-            return replace(state, phase="done")
-        best = after.point[after.best]
+        if after is before:  # none of the starts kept moves any more
+            return replace(state, phase=self._after_descent(state))
+        point = after.point[after.best]
+        cost = float(after.cost[after.best] - PRIOR_RAD**2 * np.sum((point - self.space.guess) ** 2))
+        better = cost < state.best_cost
+        over = after.iteration >= self.search.iterations or not np.any(after.active)
         moved = replace(
             state,
-            phase="polish" if after.iteration < self.search.iterations else "done",
-            best=best,
-            best_cost=float(after.cost[after.best] - PRIOR_RAD**2 * np.sum((best - self.space.guess) ** 2)),
+            best=point if better else state.best,
+            best_cost=cost if better else state.best_cost,
             generation=state.generation + 1,
             flights=state.flights + flown * len(self.training),
             polish=after,
         )
+        if over:
+            moved = replace(moved, phase=self._after_descent(moved))
         return _recorded(moved, "polish", flown)
 
+    def _after_descent(self, state: SearchState) -> Phase:
+        looks = self.search.method == "hybrid" and not state.screened
+        return "screen" if looks and state.best_cost > self._good else "done"
+
     def _generation(self, state: SearchState, stop: Stop | None) -> SearchState:
-        """Fly one generation of the swarm and move it."""
+        """Fly one generation and move it."""
         return self._moved(state, self._costs(self._task(state).points, stop))
 
     def _swarm(self, state: SearchState) -> SwarmState:
@@ -231,26 +287,48 @@ class Identification:
         known = (self.known - self.space.lower) / width
         return state.swarm or first_swarm(self.search.swarm, known, self.search.seed)
 
+    @cached_property
+    def _evolution(self) -> Evolution:
+        width = self.space.upper - self.space.lower
+        return Evolution(self.search.evolution, (self.known[0] - self.space.lower) / width, self.search.seed)
+
+    def _evolved(self, state: SearchState) -> EvolutionState:
+        return state.evolution or first_evolution(self.search.evolution)
+
     def _task(self, state: SearchState) -> GenerationTask:
-        swarm, space = self._swarm(state), self.space
-        return GenerationTask(swarm.generation, space.lower + (space.upper - space.lower) * swarm.position)
+        """The points of the next generation: of the swarm, or of the evolution strategy."""
+        space = self.space
+        if state.phase == "swarm":
+            swarm = self._swarm(state)
+            generation, unit = swarm.generation, swarm.position
+        else:
+            evolved = self._evolved(state)
+            generation, unit = evolved.generation, self._evolution.points(evolved)
+        return GenerationTask(generation, space.lower + (space.upper - space.lower) * unit)
 
     def _moved(self, state: SearchState, cost: Array) -> SearchState:
-        """Move the swarm, given the costs of its present positions."""
-        settings, space = self.search.swarm, self.space
-        moved = next_swarm(self._swarm(state), settings, cost)
-        least = float(moved.best_cost.min())
-        better = least < state.best_cost
+        """Move the swarm or the evolution strategy, given the costs of its present points."""
+        points = self._task(state).points
+        least = int(np.argmin(cost))
+        better = cost[least] < state.best_cost
         found = replace(
             state,
-            phase="swarm" if moved.generation < settings.generations else "done",
-            best=space.lower + (space.upper - space.lower) * moved.leader if better else state.best,
-            best_cost=min(least, state.best_cost),
-            generation=moved.generation,
+            best=points[least] if better else state.best,
+            best_cost=min(float(cost[least]), state.best_cost),
+            generation=state.generation + 1,
             flights=state.flights + cost.size * len(self.training),
-            swarm=moved,
         )
-        return _recorded(found, "swarm", cost.size, mean_cost=float(cost.mean()))
+        if state.phase == "swarm":
+            moved = next_swarm(self._swarm(state), self.search.swarm, cost)
+            over = moved.generation >= self.search.swarm.generations
+            found = replace(found, swarm=moved)
+        else:
+            evolved = self._evolution.moved(self._evolved(state), cost)
+            over = evolved.generation >= self.search.evolution.generations
+            over = over or self._evolution.converged(evolved)
+            found = replace(found, evolution=evolved)
+        row = _recorded(found, state.phase, cost.size, mean_cost=float(cost.mean()))
+        return replace(row, phase="done") if over else row
 
     def _timed(self, state: SearchState, elapsed_s: float) -> SearchState:
         """Count the time of a step; when the search has used up its own, that step is the last."""
@@ -270,7 +348,12 @@ class Identification:
 
     def _step(self, state: SearchState) -> Step:
         last = state.history[-1]
-        total = self.search.swarm.generations if self.search.method == "pso" else 2 + self.search.iterations
+        total = {
+            "pso": self.search.swarm.generations,
+            "cma": self.search.evolution.generations,
+            "least_squares": 1 + self.search.iterations,
+            "hybrid": 2 + 2 * self.search.iterations,
+        }[self.search.method]
         fraction = 1.0 if state.phase == "done" else min(state.generation / total, 0.99)
         return Step(
             phase=str(last["phase"]),
@@ -281,6 +364,12 @@ class Identification:
             message=f"{last['phase']}: J = {state.best_cost:.3g} rad^2 after {state.flights} flights",
             checkpoint=encode(state),
         )
+
+
+def _even_normals(count: int, d: int, seed: int) -> Array:
+    """(count, d) normal numbers spread more evenly than independent draws: a scrambled Sobol sequence."""
+    draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
+    return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])
 
 
 def _recorded(state: SearchState, phase: str, particles: int, **more: float) -> SearchState:

@@ -1,8 +1,17 @@
-"""Multi-start Levenberg-Marquardt in a box, all starts and all finite differences flown as one batch.
+"""Multi-start Levenberg-Marquardt in a box that follows curved valleys; all starts fly as one batch.
 
-Marquardt (1963) with Nielsen's damping, bounds by the active set (a coordinate at its bound whose descent
-leads outward is held). Several damping values are tried at once, since a wider batch costs hardly more than a
-narrow one.
+Levenberg (1944), Marquardt (1963): J(x) is lowered by the step s that minimises |r + D s|^2 + mu |s|^2. Few
+directions of such a problem are stiff and many are loose ("sloppy": Transtrum, Machta & Sethna 2011), and its
+valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: by
+what its residuals differ from the linear forecast, c = r(x + s) - r - D s, the same least-squares problem is
+amended, solved and flown again. The first correction is the geodesic acceleration of Transtrum & Sethna
+(2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the multi-step method of
+Fan (2012) does. A correction costs one flight, a Jacobian d.
+
+The damping is Levenberg's (equal in all coordinates, which are of order one), not Marquardt's: scaled by the
+Jacobian's columns it would let a coordinate that the samples hardly see run far off. Several damping values
+are tried at once, since a wider batch costs hardly more than a narrow one. Bounds by the active set (a
+coordinate at its bound whose descent leads outward is held).
 """
 
 from __future__ import annotations
@@ -16,12 +25,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
 
-PROBE = 1e-4  # forward-difference step in coordinates of order one; residuals are good to 1e-12
-DAMPING_TRIALS = (0.03, 0.3, 3.0, 30.0)  # times each start's present damping
-FIRST_DAMPING = 1e-2
-LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e8
-STALLED = 0.05  # relative decrease of the cost that counts as none: past it, only unseen directions drift
+# forward-difference step in coordinates of order one: residuals are good to 1e-12, and a slope is off by half
+# a step times their second derivative
+PROBE = 1e-5
+DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # times the present one
+CORRECTIONS = 2  # of each trial step, by what its flight differs from the forecast
+FIRST_DAMPING = 1e-3  # in units of the sum of the squares of the Jacobian
+LEAST_DAMPING, MOST_DAMPING = 1e-14, 1e6
+STALLED = 0.01  # relative decrease of the cost that counts as none: past it, only unseen directions drift
 PATIENCE = 3  # iterations without decrease before a start has converged
+EXACT_RMS = 1e-8  # residuals below it are those of the arithmetic: nothing is left to fit
 
 
 @dataclass(frozen=True)
@@ -61,34 +74,65 @@ def next_polish(
         return state
     points = state.point[chosen]
     error, jacobian = differences(points, upper, residuals)
-    trials, factors = [], []
-    for factor in DAMPING_TRIALS:
-        trials.append(
-            np.stack(
-                [
-                    _step(x, r, j, factor * damping, lower, upper)
-                    for x, r, j, damping in zip(points, error, jacobian, state.damping[chosen], strict=True)
-                ]
-            )
-        )
-        factors.append(factor)
-    flown = residuals(np.concatenate(trials))
-    tried = np.einsum("pm,pm->p", flown, flown).reshape(len(factors), chosen.size)
-    winner = np.argmin(tried, axis=0)
-    rows = np.arange(chosen.size)
-    before = np.einsum("pm,pm->p", error, error)
-    after = tried[winner, rows]
+    before = np.einsum("sm,sm->s", error, error)
+    dampings = np.clip(state.damping[chosen, None] * DAMPING_TRIALS, LEAST_DAMPING, MOST_DAMPING)  # (s, t)
+    found, after, winner = _best_trials(points, error, jacobian, dampings, lower, upper, residuals)
     improved = after < before
     point, cost = state.point.copy(), state.cost.copy()
     damping, stalled = state.damping.copy(), state.stalled.copy()
-    point[chosen] = np.where(improved[:, None], np.stack(trials)[winner, rows], points)
+    point[chosen] = np.where(improved[:, None], found, points)
     cost[chosen] = np.where(improved, after, before)
-    raised = state.damping[chosen] * max(DAMPING_TRIALS) * 2.0
-    lowered = state.damping[chosen] * np.array(DAMPING_TRIALS)[winner]
+    raised = dampings[:, -1] * DAMPING_TRIALS[-1]
+    lowered = dampings[np.arange(chosen.size), winner]
     damping[chosen] = np.clip(np.where(improved, lowered, raised), LEAST_DAMPING, MOST_DAMPING)
-    still = ~improved | (before - after < STALLED * before)
-    stalled[chosen] = np.where(still, stalled[chosen] + 1, 0)
+    stalled[chosen] = np.where(before - after < STALLED * before, stalled[chosen] + 1, 0)
+    stalled[chosen[cost[chosen] < error.shape[1] * EXACT_RMS**2]] = PATIENCE
     return PolishState(point, cost, damping, stalled, state.iteration + 1)
+
+
+def _best_trials(
+    points: Array,
+    error: Array,
+    jacobian: Array,
+    dampings: Array,
+    lower: Array,
+    upper: Array,
+    residuals: Residuals,
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Fly steps of every damping (s, t) from points (s, d), and their corrections.
+
+    Gives for each start its best point (s, d), the cost there (s,) and which damping led to it (s,).
+    """
+    (count, trials), d = dampings.shape, points.shape[1]
+    squares = jacobian.transpose(0, 2, 1) @ jacobian
+    # the floor is for samples that see nothing at all
+    scale = np.maximum(np.trace(squares, axis1=1, axis2=2), np.finfo(float).tiny / LEAST_DAMPING)
+    best, least = points.copy(), np.full(count, np.inf)
+    winner = np.zeros(count, dtype=np.int64)
+    rows = np.arange(count)
+    assumed = np.repeat(
+        error[:, None, :], trials, axis=1
+    )  # residuals at no step, as if there were no curvature
+    for _ in range(CORRECTIONS + 1):
+        gradients = assumed @ jacobian
+        tried = np.array(
+            [
+                [
+                    _step(points[i], gradients[i, t], squares[i], scale[i] * dampings[i, t], lower, upper)
+                    for t in range(trials)
+                ]
+                for i in range(count)
+            ]
+        )
+        flown = residuals(tried.reshape(-1, d)).reshape(count, trials, -1)
+        costs = np.einsum("stm,stm->st", flown, flown)
+        leader = np.argmin(costs, axis=1)
+        better = costs[rows, leader] < least
+        best = np.where(better[:, None], tried[rows, leader], best)
+        least = np.where(better, costs[rows, leader], least)
+        winner = np.where(better, leader, winner)
+        assumed = flown - (tried - points[:, None, :]) @ jacobian.transpose(0, 2, 1)
+    return best, least, winner
 
 
 def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
@@ -104,23 +148,20 @@ def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Arra
     return flown[:, 0], jacobian.transpose(0, 2, 1)
 
 
-def _step(x: Array, residual: Array, jacobian: Array, damping: float, lower: Array, upper: Array) -> Array:
-    """One damped Gauss-Newton step from x, kept in the box."""
-    gradient = jacobian.T @ residual
-    normal = jacobian.T @ jacobian
-    held = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
-    free = ~held
+def _step(x: Array, gradient: Array, squares: Array, damping: float, lower: Array, upper: Array) -> Array:
+    """Where one damped Gauss-Newton step from x leads, in the box.
+
+    A coordinate that would leave the box stops at its bound, and the others make up for it.
+    """
+    free = ~(((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0)))
+    system = squares + damping * np.eye(x.size)
     move = np.zeros_like(x)
-    # a floor under Marquardt's scale: a coordinate that the samples cannot see must not run to its bound
-    scale = np.diag(normal) + 1e-6 * np.trace(normal) / x.size + 1e-300
-    for _ in range(x.size):
-        if not free.any():
-            break
-        system = normal[np.ix_(free, free)] + damping * np.diag(scale[free])
-        move[:] = 0.0
-        move[free] = np.linalg.solve(system, -gradient[free])
-        leaving = free & (((x + move <= lower) & (x <= lower)) | ((x + move >= upper) & (x >= upper)))
+    while free.any():
+        pull = gradient[free] + system[np.ix_(free, ~free)] @ move[~free]
+        move[free] = np.linalg.solve(system[np.ix_(free, free)], -pull)
+        leaving = free & ((x + move < lower) | (x + move > upper))
         if not leaving.any():
             break
+        move[leaving] = np.clip(x + move, lower, upper)[leaving] - x[leaving]
         free &= ~leaving
     return np.clip(x + move, lower, upper)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,7 +87,10 @@ class SampleFit:
 
 @dataclass(frozen=True)
 class IdentifyResult:
-    """An identified equivalent model (``parameters``, a batch of one) with its proof."""
+    """An identified equivalent model (``parameters``, a batch of one) with its proof.
+
+    ``settings`` : as asked for; step and corrections that were left to the search are filled in.
+    """
 
     model: ChainModel
     parameters: ParameterBatch
@@ -150,6 +153,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         ),
         uncertainty=certainty,
         search={
+            "aero_coefficients": list(space.free_aero),
             "method": settings.method,
             "seed": settings.seed,
             "flights": state.flights,
@@ -165,7 +169,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
         },
-        settings=run.settings,
+        settings=replace(run.settings, step_s=run.step_s, aero_coefficients=space.free_aero),
     )
 
 

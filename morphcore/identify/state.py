@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.checkpoint import pack, unpack
+from morphcore.evolution import EvolutionState
 from morphcore.identify.polish import PolishState
 from morphcore.swarm import SwarmState
 
 Array = NDArray[np.float64]
-Phase = Literal["baseline", "screen", "swarm", "polish", "done"]
+Phase = Literal["baseline", "screen", "swarm", "evolution", "polish", "done"]
 
-VERSION = "identification 2"  # of the checkpoint; a worker refuses one that it does not know
+VERSION = "identification 3"  # of the checkpoint; a worker refuses one that it does not know
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class SearchState:
     """A search between two steps.
 
     phase : what comes next. best : (d,) search point with the least J so far. history : one row per
-    generation.
+    generation. screened : whether candidates away from the physical guess were flown.
     """
 
     phase: Phase
@@ -35,6 +36,8 @@ class SearchState:
     history: tuple[dict[str, Any], ...] = ()
     swarm: SwarmState | None = field(default=None, repr=False)
     polish: PolishState | None = field(default=None, repr=False)
+    evolution: EvolutionState | None = field(default=None, repr=False)
+    screened: bool = False
 
 
 def encode(state: SearchState) -> bytes:
@@ -53,11 +56,12 @@ def decode(checkpoint: bytes) -> SearchState:
 
 
 def _state(tree: dict[str, Any]) -> SearchState:
-    swarm, polish = tree.pop("swarm"), tree.pop("polish")
+    swarm, polish, evolution = tree.pop("swarm"), tree.pop("polish"), tree.pop("evolution")
     if swarm is not None:
         swarm = SwarmState(**{**swarm, "random": tuple(swarm["random"])})
     return SearchState(
         **{**tree, "history": tuple(tree["history"])},
         swarm=swarm,
         polish=None if polish is None else PolishState(**polish),
+        evolution=None if evolution is None else EvolutionState(**evolution),
     )

@@ -183,10 +183,12 @@ class Study:
             rigid = first.chain(first.model.aircraft, first.model.flight, 1)
             models = [(rigid, physical_guess(rigid))]
             models += [(run.model, row.batch) for run, row in zip(self.runs, rows, strict=True)]
+            # the rigid model has no joints that could ask for a shorter step than another model's
+            own_steps = [float(row.model["step_s"]) for row in rows]
             self._prepared = flight_timing(
                 models,
                 [sample for sample in first.samples if sample.role == "train"],
-                step_s=first.settings.step_s,
+                steps_s=[max(own_steps), *own_steps],
                 start=first.settings.start,
                 clock=self._clock,
             )
@@ -218,6 +220,7 @@ class Study:
             plan_s=state.plan_s,
             rounds=len(state.rounds),
             search={
+                "aero_coefficients": list(self.runs[0].space.free_aero),
                 "method": self.search.method,
                 "seed": self.search.seed,
                 "flights": state.flights,

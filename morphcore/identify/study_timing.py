@@ -51,12 +51,12 @@ def _travel(flight: Trajectory) -> float:
 
 @dataclass(frozen=True)
 class FlightTiming:
-    """The flight, and the models that fly it in turn.
+    """The flight with each model's step, and the models that fly it in turn.
 
-    plan_s : wall time of the plan that they share, s.
+    plan_s : wall time of a plan, s.
     """
 
-    case: SampleCase
+    cases: tuple[SampleCase, ...]
     models: tuple[tuple[ChainModel, ParameterBatch], ...]
     start: StartMode
     clock: Clock
@@ -67,13 +67,16 @@ class FlightTiming:
 
         A single flight is a single block of lanes: it never uses more than one thread.
         """
-        return tuple(self._fly(model, batch, stop) for model, batch in self.models)
+        return tuple(
+            self._fly(case, model, batch, stop)
+            for case, (model, batch) in zip(self.cases, self.models, strict=True)
+        )
 
-    def _fly(self, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
+    def _fly(self, case: SampleCase, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
         heed(stop)
         begin = self.clock()
-        for case, found in shared_trims(model, batch, (self.case,), self.start):
-            fly_attitudes(model, batch, case, found)
+        ((_, found),) = shared_trims(model, batch, (case,), self.start)
+        fly_attitudes(model, batch, case, found)
         return self.clock() - begin
 
 
@@ -81,19 +84,22 @@ def flight_timing(
     models: Sequence[tuple[ChainModel, ParameterBatch]],
     samples: Sequence[Trajectory],
     *,
-    step_s: float,
+    steps_s: Sequence[float],
     start: StartMode,
     clock: Clock = time.perf_counter,
 ) -> FlightTiming:
-    """Plan the flight and fly every model once: nothing is compiled or loaded while time is taken."""
+    """Plan the flight and fly every model once: nothing is compiled or loaded while time is taken.
+
+    ``steps_s`` : each model's step.
+    """
     flight = timed_flight(samples)
     first = models[0][0]
-    # a plan knows the lattice and the hinges, not the links: all models fly the same one
-    (case,) = sample_cases(first, [flight], step_s)
-    timing = FlightTiming(case, tuple(models), start, clock, 0.0)
+    # a plan knows the lattice and the hinges, not the links: all models of one step fly the same one
+    cases = {step_s: sample_cases(first, [flight], step_s)[0] for step_s in dict.fromkeys(steps_s)}
+    timing = FlightTiming(tuple(cases[step_s] for step_s in steps_s), tuple(models), start, clock, 0.0)
     timing.round()
     begin = clock()
-    sample_cases(first, [flight], step_s)
+    sample_cases(first, [flight], steps_s[0])
     return replace(timing, plan_s=clock() - begin)
 
 

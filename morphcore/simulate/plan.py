@@ -55,6 +55,12 @@ class TimeGrid:
         times[::2], times[1::2] = self.times_s, self.middles_s
         return times
 
+    def halved(self, times: int = 1) -> TimeGrid:
+        """The grid with all steps halved so many times."""
+        parts = 2**times
+        at = None if self.at is None else self.at * parts
+        return TimeGrid(self.start_s, self.step_s / parts, self.steps * parts, at)
+
 
 def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
     """Make a grid that hits evenly spaced output times; others need interpolation (``at`` is None)."""
@@ -131,6 +137,36 @@ class FlightPlan:
     def flown(self, model: ChainModel) -> ChainModel:
         """What flies this plan: the model, or one half of it."""
         return _flown(model, halved=self.halved)
+
+    def coarser(self, grid: TimeGrid) -> FlightPlan:
+        """The same flight on a grid that gives this plan's by ``halved``: nothing is computed anew.
+
+        Raises
+        ------
+        ValueError : the grid's steps and middles are not among this plan's.
+        """
+        every, rest = divmod(self.grid.steps, grid.steps)
+        if every == 1:
+            return self
+        if rest or every % 2:
+            raise ValueError(f"{grid.steps} steps and their middles are not among {self.grid.steps}")
+        own, between = slice(None, None, every), slice(every // 2, None, every)
+        position = self.table.position
+        return replace(
+            self,
+            grid=grid,
+            angles=self.angles[own],
+            rates=self.rates[own],
+            accelerations=self.accelerations[own],
+            hinges=np.ascontiguousarray(self.hinges[own]),
+            wind_N=np.ascontiguousarray(self.wind_N[own]),
+            table=replace(self.table, position=position[own]),
+            middle=Middles(
+                np.ascontiguousarray(self.hinges[between]),
+                np.ascontiguousarray(self.wind_N[between]),
+                replace(self.table, position=position[between]),
+            ),
+        )
 
     @property
     def mean_accelerations(self) -> Array:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants, physical_guess
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.plan import FlightPlan, flight_plan, time_grid
+from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
-from morphcore.stopping import Stop
+from morphcore.stopping import Stop, heed
 
 Array = NDArray[np.float64]
 
@@ -46,6 +46,7 @@ def choose_step(
     *,
     start: StartMode = "trim",
     air_velocity_N: Callable[[Array], Array] | None = None,
+    may_halve: bool = False,
     candidates_s: Sequence[float] = CANDIDATES_S,
     tolerance_rad: float = TOLERANCE_RAD,
     stop: Stop | None = None,
@@ -60,6 +61,7 @@ def choose_step(
     flights : the schedules of all surfaces and the (k,) output times, s, of each flight.
     batch : the one parameter set to fly; None: the physical guess.
     air_velocity_N : wind at some times; it must not depend on which times are asked for together.
+    may_halve : as of ``flight_plan``; the parameter set must then be alike on both sides.
     candidates_s : falling, each half of the one before.
 
     Raises
@@ -68,21 +70,19 @@ def choose_step(
     """
     batch = physical_guess(model) if batch is None else batch
 
-    def attitude(schedules: Sequence[Schedule], times_s: Array, step_s: float) -> Array:
-        plan = flight_plan(model, schedules, time_grid(times_s, step_s), air_velocity_N=air_velocity_N)
-        return _attitudes(model, batch, plan, trim(model, batch, plan, start=start).require(), stop)
+    def plan(schedules: Sequence[Schedule], grid: TimeGrid) -> FlightPlan:
+        heed(stop)
+        return flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=may_halve)
 
-    steps = [*candidates_s, 0.5 * candidates_s[-1]]
-    flown: list[dict[float, Array]] = [{} for _ in flights]
+    tried = [
+        _Tried(model, batch, schedules, np.asarray(times, dtype=np.float64), candidates_s, start, plan, stop)
+        for schedules, times in flights
+    ]
     error = np.inf
-    for step_s, half_s in pairwise(steps):
+    for step_s in candidates_s:
         error = 0.0
-        for known, (schedules, times) in zip(flown, flights, strict=True):
-            times_s = np.asarray(times, dtype=np.float64)
-            for each in (step_s, half_s):
-                if each not in known:
-                    known[each] = attitude(schedules, times_s, each)
-            error = max(error, HALVED * _difference(known[step_s], known[half_s]))
+        for flight in tried:
+            error = max(error, flight.error(step_s))
             if not error <= tolerance_rad:
                 break  # one flight that asks for less is enough
         if error <= tolerance_rad:
@@ -90,15 +90,56 @@ def choose_step(
     return StepChoice(float(candidates_s[-1]), error, holds=False)
 
 
+@dataclass
+class _Tried:
+    """One flight with several steps: its lattice is tabulated once and its trim found once."""
+
+    model: ChainModel
+    batch: ParameterBatch
+    schedules: Sequence[Schedule]
+    times_s: Array
+    candidates_s: Sequence[float]
+    start: StartMode
+    plan: Callable[[Sequence[Schedule], TimeGrid], FlightPlan]
+    stop: Stop | None
+    known: dict[int, Array] = field(default_factory=dict)
+
+    def error(self, step_s: float) -> float:
+        """Estimated error of the attitude with a step, rad."""
+        grid = time_grid(self.times_s, step_s)
+        return HALVED * _difference(self._attitudes(grid), self._attitudes(grid.halved()))
+
+    @cached_property
+    def finest(self) -> FlightPlan:
+        grid = time_grid(self.times_s, self.candidates_s[0])
+        return self.plan(self.schedules, grid.halved(len(self.candidates_s)))
+
+    @cached_property
+    def trimmed(self) -> Trim:
+        return trim(self.finest.flown(self.model), self.batch, self.finest, start=self.start).require()
+
+    def _attitudes(self, grid: TimeGrid) -> Array:
+        """Euler angles (steps + 1, 3) at the grid times."""
+        if grid.steps not in self.known:
+            halvings, rest = divmod(self.finest.grid.steps, grid.steps)
+            # rows so far apart that no candidate fits between them evenly: grids that are not each other's
+            # halves
+            nested = rest == 0 and halvings.bit_count() == 1
+            plan = self.finest.coarser(grid) if nested else self.plan(self.schedules, grid)
+            self.known[grid.steps] = _attitudes(self.model, self.batch, plan, self.trimmed, self.stop)
+        return self.known[grid.steps]
+
+
 def _attitudes(
     model: ChainModel, batch: ParameterBatch, plan: FlightPlan, found: Trim, stop: Stop | None
 ) -> Array:
     """Euler angles (steps + 1, 3) at the grid times."""
-    constants = lane_constants(model, batch, plan.grid.step_s)
+    flown = plan.flown(model)
+    constants = lane_constants(flown, batch, plan.grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
-    state = trimmed_state(model, batch, plan, found)
+    state = trimmed_state(flown, batch, plan, found)
     chunks = [
-        chunk.rows[..., 0] for chunk in fly_batch(model, plan, constants, state, record_rows=4, stop=stop)
+        chunk.rows[..., 0] for chunk in fly_batch(flown, plan, constants, state, record_rows=4, stop=stop)
     ]
     return euler_from_quaternion(np.concatenate(chunks))
 

@@ -167,3 +167,34 @@ def test_a_common_path_refuses_what_leaves_its_range():
     path = common_path(example_model(1), 0.0, 0.5)
     with pytest.raises(InvalidInput):
         path.plan(example_model(1), ConstantRate(0.0, 0.51, 1.0), time_grid(np.linspace(0.0, 1.0, 11)))
+
+
+@pytest.mark.parametrize("times", [0, 1, 3])
+def test_a_coarser_plan_is_the_plan_of_the_coarser_grid(times):
+    """Motion, wind and lattice at steps and middles are those that planning anew gives."""
+    model = example_model(2)
+    schedules = [ConstantRate(0.0, 0.5, 0.4, start_s=0.1, ramp_s=0.1), Hold()]
+    grid = time_grid(np.linspace(0.0, 0.6, 61))
+    anew = flight_plan(model, schedules, grid)
+    found = flight_plan(model, schedules, grid.halved(times)).coarser(grid)
+    assert found.grid.steps == grid.steps
+    np.testing.assert_array_equal(found.grid.at, grid.at)
+    for name in ("angles", "rates", "accelerations", "hinges", "wind_N"):
+        np.testing.assert_allclose(getattr(found, name), getattr(anew, name), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.middle.hinges, anew.middle.hinges, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(found.middle.wind_N, anew.middle.wind_N)
+    for table, right in ((found.table, anew.table), (found.middle.table, anew.middle.table)):
+        assert table.position.size == right.position.size
+        scale = np.abs(right.matrices).max()
+        for one, other in zip(table.between(0, 60), right.between(0, 60), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-9 * scale)
+
+
+def test_a_plan_holds_no_grid_between_its_steps():
+    """Steps that are not among the plan's are refused."""
+    model = example_model(2)
+    plan = flight_plan(model, [Hold(), Hold()], time_grid(np.linspace(0.0, 0.6, 61)))
+    with pytest.raises(ValueError, match="not among"):
+        plan.coarser(time_grid(np.linspace(0.0, 0.6, 21), 0.03))
+    with pytest.raises(ValueError, match="not among"):
+        plan.coarser(time_grid(np.linspace(0.0, 0.6, 41)))

@@ -70,3 +70,27 @@ def test_the_sample_flights_take_the_longest_step(name):
     assert found.holds
     assert found.step_s == CANDIDATES_S[0]
     assert time_grid(flown.time_s, found.step_s).at is not None
+
+
+@pytest.mark.parametrize("spacing_s", [0.013, 0.007, 0.1 / 3.0])
+def test_rows_of_any_spacing(spacing_s):
+    """Grids of two candidates need not be each other's halves; the estimate stays that of the step itself."""
+    model = example_model(2)
+    times_s = spacing_s * np.arange(round(0.6 / spacing_s))
+    found = choose_step(model, [(HARD, times_s)], candidates_s=CANDIDATES_S)
+    assert found.holds
+    grid = time_grid(times_s, found.step_s)
+    fine_s = grid.step_s / 8
+    coarse, fine = (
+        fly_trimmed(model, plan_of(model, HARD, times_s[-1], step)).euler for step in (grid.step_s, fine_s)
+    )
+    actual = float(np.abs(wrap_angle(coarse - fine[::8])).max())
+    assert actual == pytest.approx(found.error_rad, rel=0.3)
+
+
+def test_half_the_aircraft_chooses_what_the_whole_does():
+    """A symmetric flight of half the aircraft has the same error, so the same step."""
+    model = example_model(2)
+    whole, half = (choose_step(model, [(SLOW, TIMES_S)], may_halve=halve) for halve in (False, True))
+    assert half.step_s == whole.step_s
+    assert half.error_rad == pytest.approx(whole.error_rad, rel=1e-4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import select
@@ -19,11 +20,13 @@ from worker.numerics import Kernels, warm_up_library
 from worker.runner import Runner
 
 SMALL = {"method": "pso", "particles": 4 * TOGETHER + 3, "generations": 3, "seed": 4}
+EVOLUTION = SMALL | {"method": "cma"}
 LARGER = {"method": "pso", "particles": 40 * TOGETHER, "generations": 4, "seed": 4}
 CHUNK_LEASE_S = 2.0
 
 
-def test_a_spread_swarm_is_the_swarm(tmp_path: Path) -> None:
+@pytest.mark.parametrize("search", [SMALL, EVOLUTION], ids=["pso", "cma"])
+def test_a_spread_swarm_is_the_swarm(tmp_path: Path, search: dict[str, Any]) -> None:
     """Two workers by turns (each with plans of its own) end with the document of the mode `single`.
 
     Wall times are left out: no two runs share them. What the kind of database could change is under test with
@@ -36,7 +39,7 @@ def test_a_spread_swarm_is_the_swarm(tmp_path: Path) -> None:
     kernels.wait(lambda: False, poll_s=0.01)
     runners = [Runner(database, kernels, name, lease_s=60.0, heartbeat_s=10.0) for name in ("w1", "w2")]
     store = Workers(database)
-    request = identification("train_rate_0.8", links=2, search=SMALL)
+    request = identification("train_rate_0.8", links=2, search=search)
     single = store.add(request)
     assert runners[0].run_next()[0] is Ending.SUCCEEDED
     together = store.add(spread(request, chunks=3))

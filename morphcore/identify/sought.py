@@ -1,0 +1,31 @@
+"""Which aerodynamic corrections flights can tell: those that are sought if a request names none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from morphcore.identify.parameters import AERO_COEFFICIENTS
+from morphcore.simulate.trajectory import Trajectory
+
+# the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and a
+# fit would put it where it mends other errors of pitch
+ASYMMETRIC_ALONE = ("profile_drag",)
+# 0.6 degrees: above what the noise of an attitude sensor makes of a symmetric flight, and far below what a
+# flight shows that can tell a drag
+ASYMMETRIC_RAD = 0.01
+
+
+def asymmetric(sample: Trajectory) -> bool:
+    """Whether the sweeps of both sides differ, or the flight rolls or yaws, by more than ASYMMETRIC_RAD."""
+    apart = np.abs(sample.sweep_left - sample.sweep_right).max()
+    turned = np.ptp(np.unwrap(np.stack([sample.phi, sample.psi]), axis=1), axis=1).max()
+    return bool(max(apart, turned) > ASYMMETRIC_RAD)
+
+
+def corrections_told(training: Sequence[Trajectory]) -> tuple[str, ...]:
+    """The aerodynamic corrections that the flights to fit can tell."""
+    if any(asymmetric(sample) for sample in training):
+        return AERO_COEFFICIENTS
+    return tuple(name for name in AERO_COEFFICIENTS if name not in ASYMMETRIC_ALONE)

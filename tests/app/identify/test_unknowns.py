@@ -1,0 +1,31 @@
+"""The unknowns that a request is told are those that the search has."""
+
+from __future__ import annotations
+
+import pytest
+
+from morphcore.identify import identification_from_document
+from tests.app.request_documents import identify_document
+from tests.app.running_service import RunningService
+
+
+@pytest.mark.parametrize("roles", [("train", "train"), ("train", "held_out")])
+@pytest.mark.parametrize("listed", [None, [], ["profile_drag", "lag_s"]])
+@pytest.mark.parametrize("separate", [False, True])
+def test_the_unknowns_are_those_of_the_search(
+    service: RunningService,
+    roles: tuple[str, str],
+    listed: list[str] | None,
+    separate: bool,  # noqa: FBT001
+) -> None:
+    """Of symmetric and asymmetric samples, with corrections listed or left to the library."""
+    document = identify_document()
+    symmetric, asymmetric = (
+        next(s for s in document["samples"] if s["name"].endswith(end)) for end in ("0.8", "asymmetric")
+    )
+    document["samples"] = [symmetric | {"role": roles[0]}, asymmetric | {"role": roles[1]}]
+    document["model"] = {"links_per_wing": 2, "separate_wings": separate}
+    if listed is not None:
+        document["model"]["aero_coefficients"] = listed
+    told = service.client.post("/validate/identify", json=document).json()["cost"]
+    assert told["parameters"] == identification_from_document(document).space.dimension
