@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 PACKAGES = ("app", "worker", "morphcore", "cli", "samplefiles")
-KERNELS_MAY_IMPORT = {"__future__", "math", "numpy", "numba", "typing", "collections.abc"}
+KERNELS_MAY_IMPORT = {"__future__", "math", "numpy", "numpy.typing", "numba", "typing", "collections.abc"}
 WORKER_MAY_KNOW = (
     *("app.jobs.", "app.settings", "app.database", "app.errors"),
     *(
