@@ -19,12 +19,21 @@ from morphcore.bench.search import search_benchmark
 from morphcore.bench.setting import FULL, LINKS, QUICK, RATE_SAMPLES, Bench, Clock, Effort, Figures, bench_of
 from morphcore.bench.single_flights import flexible_flight, single_flights
 from morphcore.bench.start_up import cold_compilation, first_generation
+from morphcore.bench.work_precision import quick_work_precision
 from morphcore.errors import InvalidInput
 from morphcore.simulate.plan import STEP_S
 from morphcore.threads import use_threads
 from morphcore.warming import warm_up
 
+WORK_PRECISION_SAMPLES = ("train_rate_0.8", "train_asymmetric")  # both wings alike, and not
+
 Section = Callable[[Bench], Figures]
+
+
+def work_precision_of(bench: Bench) -> Figures:
+    """The shipped stepper and the one before it, on a symmetric and an asymmetric flight."""
+    samples = [bench.samples[name] for name in WORK_PRECISION_SAMPLES]
+    return quick_work_precision(bench.aircraft, bench.flight, samples)
 
 
 def _counted(bench: Bench) -> Figures:
@@ -42,13 +51,14 @@ SECTIONS: Mapping[str, Section] = {
     "operations": _counted,
     "search": lambda bench: {"search": search_benchmark(bench)},
     "mujoco": lambda bench: {"mujoco": against_mujoco(bench)},
+    "work_precision": lambda bench: {"work_precision": work_precision_of(bench)},
     "step_error": lambda bench: {"step_error": step_error(bench)},
     "lattice": lambda bench: {"lattice": lattice_cost(bench)},
     "memory": lambda bench: {"memory": swarm_memory(bench.folder, bench.effort.particles)},
     "start_up": lambda bench: {"start_up": first_generation(bench.folder)},
     "compilation": lambda _: {"compilation": cold_compilation()},
 }
-SLOW_SECTIONS = frozenset({"flexible", "compilation"})  # left out of a quick run
+SLOW_SECTIONS = frozenset({"flexible", "work_precision", "compilation"})  # left out of a quick run
 
 
 def run_benchmarks(

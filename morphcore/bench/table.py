@@ -8,6 +8,7 @@ from typing import NamedTuple
 from morphcore.bench.requirements import BY_PATH
 from morphcore.bench.search import search_table
 from morphcore.bench.setting import LINKS, Figures
+from morphcore.bench.work_precision import work_precision_table
 from morphcore.lanes import TOGETHER
 
 
@@ -182,6 +183,13 @@ def _compilation(figures: Figures) -> Iterator[Line]:
         yield Line(f"of it {kernel.removeprefix('morphcore.')}", f"{seconds:.1f} s")
 
 
+def _work_precision(figures: Figures) -> Iterator[Line]:
+    found = figures["work_precision"]
+    for name, step, stages, cost in work_precision_table(found):
+        what = f"longest step within {found['goal_rad']:g} rad, {name}"
+        yield Line(what, f"{step}, {stages} stages a second, cost {cost}")
+
+
 LINES: Mapping[str, Callable[[Figures], Iterator[Line]]] = {
     "batch": _batch,
     "threads": _threads,
@@ -192,6 +200,7 @@ LINES: Mapping[str, Callable[[Figures], Iterator[Line]]] = {
     "operations": _operations,
     "search": _search,
     "mujoco": _mujoco,
+    "work_precision": _work_precision,
     "step_error": _step_error,
     "lattice": _lattice,
     "memory": _memory,

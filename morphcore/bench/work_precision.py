@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from morphcore.bench_stage import Course, Stages
-from morphcore.bench_steppers import FORMER, SHIPPED, STEPPERS, Stepper
+from morphcore.bench.stage import Course, Stages
+from morphcore.bench.steppers import FORMER, SHIPPED, STEPPERS, Stepper
 from morphcore.export.figure import (
     BLUE,
     GREEN,

@@ -1,4 +1,4 @@
-"""Candidate time steppers of the equivalent model, all made of one stage (see bench_stage.py).
+"""Candidate time steppers of the equivalent model, all made of one stage (see stage.py).
 
 Every one is a function of stages, a step and a number of steps that yields the mechanical state at the start
 and after each step. In all of them the lag states are exact from stage to stage and the hinges' acceleration
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.bench_stage import Lag, Stages
+from morphcore.bench.stage import Lag, Stages
 
 Array = NDArray[np.float64]
 Stepper = Callable[[Stages, float, int], Iterator[Array]]
