@@ -1,4 +1,4 @@
-"""The group SE(3): exponential, logarithm and their tangents against matrix series and finite differences."""
+"""The group SE(3): exponential and logarithm against matrix series, coefficients against closed forms."""
 
 from __future__ import annotations
 
@@ -31,23 +31,6 @@ def hat(d: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def bracket(d: np.ndarray) -> np.ndarray:
-    """ad(d) as a matrix, from its definition."""
-    matrix = np.zeros((6, 6))
-    matrix[:3, :3] = matrix[3:, 3:] = skew(d[:3])
-    matrix[3:, :3] = skew(d[3:])
-    return matrix
-
-
-def tangent_matrix(d: np.ndarray) -> np.ndarray:
-    """T(d) by its series in plain matrices."""
-    total, term = np.eye(6), np.eye(6)
-    for k in range(1, 40):
-        term = -term @ bracket(d) / (k + 1)
-        total = total + term
-    return total
-
-
 def pose(d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """exp(d) by the kernel."""
     R, x = np.empty((3, 3)), np.empty(3)
@@ -78,48 +61,6 @@ def test_a_turn_beyond_the_series_is_refused() -> None:
     """Past 1.5 rad, and at half a turn where the sine vanishes again, there is no logarithm, only False."""
     for angle in (1.6, 2.5, np.pi):
         assert not se3.logarithm(*pose(a_twist(angle)), np.empty(6))
-
-
-@pytest.mark.parametrize("angle", ANGLES)
-@pytest.mark.parametrize("s", [0.3, 1.0])
-def test_tangents_match_their_series(angle: float, s: float) -> None:
-    """Horner's T, its transpose and the closed inverse equal plain matrix series."""
-    d, x = a_twist(angle), RNG.normal(size=6)
-    terms, scratch, out = se3.tangent_terms(d), np.empty(6), np.empty(6)
-    T = tangent_matrix(s * d)
-    se3.tangent(d, s, x, terms, scratch, out)
-    np.testing.assert_allclose(out, T @ x, atol=1e-12)
-    se3.tangent_transposed(d, s, x, terms, scratch, out)
-    np.testing.assert_allclose(out, T.T @ x, atol=1e-12)
-    for sign in (1.0, -1.0):
-        se3.inverse_tangent(d, x, sign, np.empty((2, 6)), out)
-        np.testing.assert_allclose(out, np.linalg.solve(tangent_matrix(sign * d), x), atol=1e-11)
-    even, odd = np.empty(6), np.empty(6)
-    se3.inverse_tangent_transposed(d, x, np.empty((2, 6)), even, odd)
-    np.testing.assert_allclose(even + odd, np.linalg.solve(tangent_matrix(d).T, x), atol=1e-11)
-    np.testing.assert_allclose(even - odd, np.linalg.solve(tangent_matrix(-d).T, x), atol=1e-11)
-
-
-@pytest.mark.parametrize("angle", [0.03, 0.4, 1.4])
-def test_tangent_is_the_body_velocity_of_the_exponential(angle: float) -> None:
-    """(exp d)^-1 d/dt exp d = T(d) d', and its rate is the derivative in time: central differences, 1e-7."""
-    d, d_rate, d_second, h = a_twist(angle), RNG.normal(size=6), RNG.normal(size=6), 1e-5
-
-    def at(t: float) -> np.ndarray:
-        return d + t * d_rate + 0.5 * t * t * d_second
-
-    def velocity(t: float) -> np.ndarray:
-        ahead, behind = expm(hat(at(t + h))), expm(hat(at(t - h)))
-        twist = np.linalg.solve(expm(hat(at(t))), (ahead - behind) / (2.0 * h))
-        return np.array([twist[2, 1], twist[0, 2], twist[1, 0], *twist[:3, 3]])
-
-    out, out_rate = np.empty(6), np.empty(6)
-    terms = se3.tangent_terms(d)
-    se3.tangent_with_rate(d, d_rate, 1.0, d_rate, d_second, terms, np.empty((2, 6)), out, out_rate)
-    np.testing.assert_allclose(out, velocity(0.0), atol=1e-7)
-    h_slow = 1e-3
-    slope = (velocity(h_slow) - velocity(-h_slow)) / (2.0 * h_slow)
-    np.testing.assert_allclose(out_rate, slope, atol=1e-4)  # second differences of second differences
 
 
 def test_coefficients_match_the_closed_form() -> None:

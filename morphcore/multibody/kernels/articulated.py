@@ -281,41 +281,27 @@ def solve_base(lanes, inertia, force, acceleration):
         l00, l01, l02, l11, l12, l22 = inverse_symmetric(
             inertia[15, l], inertia[16, l], inertia[17, l], inertia[18, l], inertia[19, l], inertia[20, l]
         )
-        # W = B L^-1
-        w0, w1, w2 = (
-            b0 * l00 + b1 * l01 + b2 * l02,
-            b0 * l01 + b1 * l11 + b2 * l12,
-            b0 * l02 + b1 * l12 + b2 * l22,
-        )
-        w3, w4, w5 = (
-            b3 * l00 + b4 * l01 + b5 * l02,
-            b3 * l01 + b4 * l11 + b5 * l12,
-            b3 * l02 + b4 * l12 + b5 * l22,
-        )
-        w6, w7, w8 = (
-            b6 * l00 + b7 * l01 + b8 * l02,
-            b6 * l01 + b7 * l11 + b8 * l12,
-            b6 * l02 + b7 * l12 + b8 * l22,
+        c00, c01, c02, c11, c12, c22 = congruence(
+            b0, b1, b2, b3, b4, b5, b6, b7, b8, l00, l01, l02, l11, l12, l22
         )
         s00, s01, s02, s11, s12, s22 = inverse_symmetric(
-            inertia[0, l] - (w0 * b0 + w1 * b1 + w2 * b2),
-            inertia[1, l] - (w0 * b3 + w1 * b4 + w2 * b5),
-            inertia[2, l] - (w0 * b6 + w1 * b7 + w2 * b8),
-            inertia[3, l] - (w3 * b3 + w4 * b4 + w5 * b5),
-            inertia[4, l] - (w3 * b6 + w4 * b7 + w5 * b8),
-            inertia[5, l] - (w6 * b6 + w7 * b7 + w8 * b8),
-        )
+            inertia[0, l] - c00, inertia[1, l] - c01, inertia[2, l] - c02,
+            inertia[3, l] - c11, inertia[4, l] - c12, inertia[5, l] - c22,
+        )  # fmt: skip
         fx, fy, fz = force[3, l], force[4, l], force[5, l]
-        nx = w0 * fx + w1 * fy + w2 * fz - force[0, l]
-        ny = w3 * fx + w4 * fy + w5 * fz - force[1, l]
-        nz = w6 * fx + w7 * fy + w8 * fz - force[2, l]
-        ax = s00 * nx + s01 * ny + s02 * nz
-        ay = s01 * nx + s11 * ny + s12 * nz
-        az = s02 * nx + s12 * ny + s22 * nz
-        fx += b0 * ax + b3 * ay + b6 * az
-        fy += b1 * ax + b4 * ay + b7 * az
-        fz += b2 * ax + b5 * ay + b8 * az
-        acceleration[0, l], acceleration[1, l], acceleration[2, l] = ax, ay, az
+        ux = l00 * fx + l01 * fy + l02 * fz
+        uy = l01 * fx + l11 * fy + l12 * fz
+        uz = l02 * fx + l12 * fy + l22 * fz
+        nx = b0 * ux + b1 * uy + b2 * uz - force[0, l]
+        ny = b3 * ux + b4 * uy + b5 * uz - force[1, l]
+        nz = b6 * ux + b7 * uy + b8 * uz - force[2, l]
+        wx = s00 * nx + s01 * ny + s02 * nz
+        wy = s01 * nx + s11 * ny + s12 * nz
+        wz = s02 * nx + s12 * ny + s22 * nz
+        fx += b0 * wx + b3 * wy + b6 * wz
+        fy += b1 * wx + b4 * wy + b7 * wz
+        fz += b2 * wx + b5 * wy + b8 * wz
+        acceleration[0, l], acceleration[1, l], acceleration[2, l] = wx, wy, wz
         acceleration[3, l] = -(l00 * fx + l01 * fy + l02 * fz)
         acceleration[4, l] = -(l01 * fx + l11 * fy + l12 * fz)
         acceleration[5, l] = -(l02 * fx + l12 * fy + l22 * fz)

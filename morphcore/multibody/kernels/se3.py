@@ -1,4 +1,4 @@
-"""The group SE(3) of poses: exponential, logarithm and their tangents, for beams in large rotation.
+"""The group SE(3) of poses: exponential, logarithm, inverse of their tangent, for beams in large rotation.
 
 A pose is a rotation R (3, 3), body components to reference components, with a position x (3,). A twist is
 [omega; v] in body components, angular part first, and so is the logarithm ``d`` of a relative pose: H_b = H_a
@@ -32,8 +32,6 @@ BERNOULLI = (
     -1.3954464685812522e-19,
 )
 LARGEST_ANGLE = 1.5  # rad, of one element's relative rotation
-LARGEST_ANGLE_SMALL = 0.05
-TERMS_SMALL, TERMS = 7, 18  # of T's series: 0.05^7 / 8! and 1.5^18 / 19! are below 1e-13
 
 
 @kernel
@@ -173,85 +171,6 @@ def inverse_tangent_coefficients(z):
             c4_z = c4_z * z + c4
             c4 = c4 * z + (k - 1) * BERNOULLI[k]
     return c2, c4, c2_z, c4_z
-
-
-@kernel
-def tangent_terms(d):
-    """How many terms of T's series reach rounding for this d."""
-    z = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    return TERMS_SMALL if z < LARGEST_ANGLE_SMALL * LARGEST_ANGLE_SMALL else TERMS
-
-
-@kernel
-def tangent(d, s, x, terms, scratch, out):
-    """out = T(s d) x by Horner's rule; scratch (6,)."""
-    for i in range(6):
-        out[i] = x[i]
-    for k in range(terms, 0, -1):
-        ad(d, out, scratch)
-        factor = s / (k + 1.0)
-        for i in range(6):
-            out[i] = x[i] - factor * scratch[i]
-
-
-@kernel
-def tangent_transposed(d, s, f, terms, scratch, out):
-    """out = T(s d)^T f; scratch (6,)."""
-    for i in range(6):
-        out[i] = f[i]
-    for k in range(terms, 0, -1):
-        ad_transposed(d, out, scratch)
-        factor = s / (k + 1.0)
-        for i in range(6):
-            out[i] = f[i] - factor * scratch[i]
-
-
-@kernel
-def tangent_with_rate(d, d_rate, s, x, x_rate, terms, scratch, out, out_rate):
-    """out = T(s d) x and out_rate, its time derivative; scratch (2, 6)."""
-    for i in range(6):
-        out[i] = x[i]
-        out_rate[i] = x_rate[i]
-    for k in range(terms, 0, -1):
-        factor = s / (k + 1.0)
-        ad(d, out_rate, scratch[0])
-        ad(d_rate, out, scratch[1])
-        for i in range(6):
-            out_rate[i] = x_rate[i] - factor * (scratch[0, i] + scratch[1, i])
-        ad(d, out, scratch[0])
-        for i in range(6):
-            out[i] = x[i] - factor * scratch[0, i]
-
-
-@kernel
-def inverse_tangent_transposed(d, f, scratch, even, odd):
-    """T(d)^-T f = even + odd, T(-d)^-T f = even - odd; scratch (2, 6)."""
-    z = -(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-    c2, c4, _, _ = inverse_tangent_coefficients(z)
-    ad_transposed(d, f, scratch[0])
-    ad_transposed(d, scratch[0], scratch[1])
-    for i in range(6):
-        odd[i] = 0.5 * scratch[0, i]
-        even[i] = f[i] + c2 * scratch[1, i]
-    ad_transposed(d, scratch[1], scratch[0])
-    ad_transposed(d, scratch[0], scratch[1])
-    for i in range(6):
-        even[i] += c4 * scratch[1, i]
-
-
-@kernel
-def inverse_tangent(d, x, sign, scratch, out):
-    """out = T(sign d)^-1 x with sign +1 or -1; scratch (2, 6)."""
-    z = -(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-    c2, c4, _, _ = inverse_tangent_coefficients(z)
-    ad(d, x, scratch[0])
-    ad(d, scratch[0], scratch[1])
-    for i in range(6):
-        out[i] = x[i] + 0.5 * sign * scratch[0, i] + c2 * scratch[1, i]
-    ad(d, scratch[1], scratch[0])
-    ad(d, scratch[0], scratch[1])
-    for i in range(6):
-        out[i] += c4 * scratch[1, i]
 
 
 @kernel
