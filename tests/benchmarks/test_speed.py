@@ -6,13 +6,13 @@ import pytest
 
 from morphcore.bench import Effort, run_benchmarks
 
-PROMISED = 1000.0  # times real time per core
+PROMISED = 3000.0  # times real time per core
 SWARM = Effort(particles=2500, rounds=1, singles=3, links=(3,), refinement=50)
 TRIES = 3  # a machine shared with others is slow at times; what it can do shows in its best
 
 
 @pytest.mark.slow
-def test_a_swarm_flies_a_thousand_times_faster_than_real_time() -> None:
+def test_a_swarm_flies_three_thousand_times_faster_than_real_time() -> None:
     """2,500 models of three links a wing through the three flights of constant rate, lattice included.
 
     On one core, at the shipped step, whose error on the four example flights is below 1e-4 rad.
