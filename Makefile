@@ -2,6 +2,8 @@
 # Needs Python 3.11 or newer, make, and a package index; no root, no compiler.
 
 SHELL := /bin/bash
+# processes start from byte code here as they do with users; a test machine may forbid to write it
+unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
 
 VENV := .venv

@@ -28,7 +28,8 @@ CANCELS = 10
 EFFECTIVE_S = 2.0
 NOISE_S = 3.0  # what a busy machine adds
 
-pytestmark = pytest.mark.timeout(600)  # the first identification on a machine also compiles the kernels
+# the first identification on a machine also compiles the kernels
+pytestmark = [pytest.mark.faults, pytest.mark.timeout(600)]
 
 
 @pytest.fixture
@@ -99,7 +100,6 @@ def test_a_killed_worker_with_short_leases(short_leases: LiveService) -> None:
     assert_recovery(short_leases, within_s=60.0)
 
 
-@pytest.mark.faults
 def test_a_killed_worker_as_shipped(shipped: LiveService) -> None:
     """With the leases that are shipped the job goes on within 90 s of the kill."""
     assert_recovery(shipped, within_s=PROMISED_S)
@@ -114,7 +114,6 @@ def ended_s(client: httpx.Client, job_id: str) -> float:
     return time.monotonic() - began
 
 
-@pytest.mark.faults
 def test_cancels_of_identifications(short_leases: LiveService) -> None:
     """A real search, cancelled at any moment of its life, ends soon with the best so far; its end, too."""
     rng = random.Random(5)

@@ -13,7 +13,7 @@ from tests.faults.ledger import undisturbed
 from tests.faults.rig import HEARTBEAT_S, LEASE_S, REAP_EVERY_S, Rig
 
 # the fast selection: one pair; the same faults and worse ones are tried on both in the other files
-pytestmark = pytest.mark.parametrize("pair", ["sqlite-embedded"], indirect=True)
+pytestmark = [pytest.mark.faults, pytest.mark.parametrize("pair", ["sqlite-embedded"], indirect=True)]
 
 STEPS = 40
 PAUSE_S = 0.1
