@@ -9,6 +9,7 @@ from morphcore.bench.swarm import flown
 from morphcore.identify.cost import shared_trims
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.flight import simulate
+from morphcore.warming import warm_up_further
 
 
 def single_flights(bench: Bench) -> Figures:
@@ -37,5 +38,6 @@ def single_flights(bench: Bench) -> Figures:
 def flexible_flight(bench: Bench) -> Figures:
     """The same flight of the flexible model, trim and all, once: it takes seconds, not milliseconds."""
     sample = bench.samples["train_rate_0.5"]
+    warm_up_further()
     seconds = bench.timed(lambda: simulate(bench.aircraft, bench.flight, sample, model="flexible"))
     return {"flight_s": sample.duration_s, "flexible_s": seconds}
