@@ -2,7 +2,7 @@
 
 The kernels run as plain Python on numbers that count (counted.py). Seconds depend on the machine and on who
 else uses it; these figures depend on the source alone, so a change that costs ten per cent shows as just
-that. What the compiler makes of the operations is looked at beside (assembly.py).
+that. What the compiler makes of the operations shows in kernel_alone.py.
 """
 
 from __future__ import annotations
