@@ -50,7 +50,7 @@ REQUIREMENTS = (
     Requirement("threads/speed_up", 1.8, at_least=True),
     Requirement("threads/speed_up_by_computing_time", 1.8, at_least=True),
     Requirement("memory/beyond_mb/as they are", 200.0),
-    Requirement("memory/beyond_mb/twice as long", 200.0),
+    Requirement("memory/beyond_mb/eight times as long", 200.0),
     Requirement("step_error/worst_rad", 1e-4),
     Requirement("start_up/job/wall_s", 0.5),
     Requirement("start_up/job/computing_s", 0.5),

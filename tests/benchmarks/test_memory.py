@@ -24,10 +24,11 @@ def test_a_stretched_flight_is_the_same_motion_slower() -> None:
 
 @pytest.mark.slow
 def test_a_swarm_of_2500_stays_under_200_mb_however_long_it_flies() -> None:
-    """One generation over the three flights, beyond the warmed-up process; twice as long costs no more.
+    """One generation over the three flights, beyond the warmed-up process; eight times as long adds little.
 
-    Only what is asked for is stored: with twice the rows to compare, twice the rows are. Ten per cent for
-    what the allocator keeps.
+    Only what is asked for is stored: with twice the rows to compare, twice the rows are. The hinge motion
+    that the swarm shares grows with the flight (about 2 % a length), and the peak of a process differs by a
+    tenth from run to run. A single number kept for every model and step would add 60 %.
     """
     found = swarm_memory(example_samples_dir(), 2500)
     print(found)
@@ -35,4 +36,4 @@ def test_a_swarm_of_2500_stays_under_200_mb_however_long_it_flies() -> None:
         pytest.skip(found["skipped"])
     beyond = found["beyond_mb"]
     assert beyond["as they are"] < ALLOWED_MB
-    assert beyond["twice as long"] < 1.1 * beyond["as they are"]
+    assert beyond["eight times as long"] < 1.4 * beyond["as they are"]
