@@ -10,11 +10,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 UV_INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt
 
+# two targets at once, both to their ends, each target's output in one piece where this make can do that
+SIDE_BY_SIDE = $(MAKE) --no-print-directory --keep-going --jobs=2 $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
+
 # a found `python3.11` may be a version manager's empty shim, so each candidate is asked to run
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-slow faults conformance bench check openapi format clean
+.PHONY: help setup demo serve test test-api test-library test-slow faults faults-postgres faults-others conformance bench check openapi format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -48,16 +51,35 @@ serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 	@exec $(BIN)/morphid serve
 
 test: setup  ## the tests (under 12 minutes on two cores)
-	@$(BIN)/pytest -q
+	@$(SIDE_BY_SIDE) test-api test-library
+	@$(BIN)/pytest -q $(API_TESTS:%=--ignore=%) $(LIBRARY_TESTS:%=--ignore=%)
+
+# the API loads no kernels and the library opens no sockets, so one waits while the other calculates; whole
+# services have both and run alone
+API_TESTS := tests/app tests/conformance
+LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
+	models multibody optimise paper samplefiles simulate)
+
+test-api:
+	@$(BIN)/pytest -q $(API_TESTS)
+
+test-library:
+	@$(BIN)/pytest -q $(LIBRARY_TESTS)
 
 test-slow: setup  ## the long proofs
 	@$(BIN)/pytest -q -m slow --timeout 1800
 
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
 	@# both pairs at the same time: most of it is waiting
-	@log=$$(mktemp); run="$(BIN)/pytest -q -s tests/faults -m= --timeout 900"; \
-		$$run -k "not postgres" >$$log 2>&1 & other=$$!; \
-		$$run -k postgres; one=$$?; wait $$other; two=$$?; cat $$log; rm -f $$log; exit $$((one + two))
+	@$(SIDE_BY_SIDE) faults-postgres faults-others
+
+FAULT_TESTS := $(BIN)/pytest -q -s tests/faults -m= --timeout 900
+
+faults-postgres:
+	@$(FAULT_TESTS) -k postgres
+
+faults-others:
+	@$(FAULT_TESTS) -k "not postgres"
 
 conformance: setup  ## one behaviour on SQLite and Postgres, embedded broker and Redis URL (MORPHID_TEST_*_URL)
 	@$(BIN)/pytest -q tests/conformance tests/app/jobs tests/app/test_database.py

@@ -12,15 +12,12 @@ from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_nor
 from morphcore.geometry.lattice import surface_pose
 from morphcore.lanes import ALONE, lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants, to_lanes
-from morphcore.models.kernels.chain import accelerations as accelerations_kernel
 from morphcore.models.kernels.layout import S_FREE
 from morphcore.simulate.batch import shared_numbers
+from morphcore.simulate.kernels.batch import rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
-from tests.kernels import door
 
 Array = NDArray[np.float64]
-
-accelerations = door(accelerations_kernel)
 
 
 @dataclass(frozen=True)
@@ -37,12 +34,13 @@ def lane_loads(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, state
     operators, strips = plan.table.between(0, 1)
     rows, columns = model.lattice.operator_shape
     scratch = np.zeros((model.scratch_rows, ALONE))
-    accelerations(
-        lane_type(ALONE),
-        model.surfaces, constants.ranges[0], shared_numbers(model), strips[0], plan.hinges[0],
-        plan.accelerations[0], operators[0], plan.wind_N[0], constants.rows[0], to_lanes(state[None])[0],
-        scratch,
-        np.zeros((columns, ALONE)), np.zeros((rows, ALONE)),
+    lanes = to_lanes(state[None])
+    rates_of_blocks(
+        lane_type(ALONE), 0, 1,
+        model.surfaces, constants.ranges, shared_numbers(model), strips, plan.hinges[:1],
+        plan.accelerations[0], operators, plan.wind_N[:1], constants.rows,
+        np.zeros((model.state_rows, ALONE)), lanes,
+        scratch, np.zeros((columns, ALONE)), np.zeros((rows, ALONE)), np.zeros_like(lanes),
     )  # fmt: skip
     twist = scratch[S_FREE : S_FREE + 6 * model.links, 0].reshape(-1, 6)
     wrench = scratch[S_FREE + 6 * model.links : S_FREE + 12 * model.links, 0].reshape(-1, 6)
