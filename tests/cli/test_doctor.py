@@ -28,6 +28,7 @@ from cli.doctor.findings import Finding, State, examined
 from cli.doctor.round import round_here, round_there
 from cli.exits import Exit
 from cli.supervisor import Supervisor
+from tests.waiting import until
 
 
 def states(findings: Iterator[Finding]) -> dict[str, State]:
@@ -258,13 +259,12 @@ def test_a_port_free_and_taken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_service_from_outside(live_service: Any) -> None:
     """A running service is sound from outside and holds its port; where there is none, that is found."""
-    found = states(remote.service(live_service.url, None))
-    deadline = time.monotonic() + 30.0
-    while found["workers"] is not State.OK:  # its worker may still be loading
-        assert time.monotonic() < deadline, found
-        time.sleep(0.5)
-        found = states(remote.service(live_service.url, None))
-    assert set(found.values()) == {State.OK}
+
+    def found() -> dict[str, State]:
+        return states(remote.service(live_service.url, None))
+
+    # its worker may still be loading
+    until(lambda: set(found().values()) == {State.OK}, 30.0, 0.5, seen=found)
     host, _, number = live_service.url.removeprefix("http://").partition(":")
     assert states(service.port(host, int(number))) == {"port": State.OK}
     assert states(round_there("http://127.0.0.1:1", None)) == {"service": State.FAIL}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -17,6 +16,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from tests.app.request_documents import simulate_document
 from tests.live import LiveService
+from tests.waiting import until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]  # may have to compile the kernels first
 
@@ -140,11 +140,8 @@ def test_one_trace_through_all_processes(
 ) -> None:
     """The spans that reach the collector hang together: caller, request, wait and attempt, phases."""
     assert job["status"] == "succeeded", live.logs()
-    deadline = time.monotonic() + 20.0
     wanted = {"POST /simulate", "wait in the queue", "attempt simulate"}
-    while not wanted <= collector.of_trace().keys():
-        assert time.monotonic() < deadline, collector.of_trace().keys()
-        time.sleep(0.1)
+    until(lambda: wanted <= collector.of_trace().keys(), seen=collector.of_trace)
     found = collector.of_trace()
     service, request = found["POST /simulate"]
     assert service == "morphid-api"

@@ -13,6 +13,7 @@ import pytest
 from app.jobs.records import JobStatus
 from tests.faults.posting import percentile
 from tests.faults.rig import Rig
+from tests.waiting import until
 
 EITHER = frozenset({"cancelled", "succeeded"})
 CANCELLED = frozenset({"cancelled"})
@@ -38,10 +39,7 @@ def cancel(rig: Rig, job_id: str) -> float:
 
 def until_running(rig: Rig, job_id: str) -> None:
     """Wait for a worker to begin the job."""
-    deadline = time.monotonic() + 60.0
-    while rig.job(job_id).status is JobStatus.QUEUED:
-        assert time.monotonic() < deadline, rig.last_words()
-        time.sleep(0.02)
+    until(lambda: rig.job(job_id).status is not JobStatus.QUEUED, 60.0, seen=rig.last_words)
 
 
 def cancel_in(rig: Rig, state: str, rng: random.Random) -> float:

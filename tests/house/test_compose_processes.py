@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +15,12 @@ import pytest
 import yaml
 
 from app.database import Database
-from app.jobs.records import JobStatus
+from app.jobs.records import Job, JobStatus
 from app.jobs.store import create_job, get_job
 from cli.broker import free_port, prepare_broker
 from cli.supervisor import ChildSpec, Supervisor
 from tests.servers.postgres import GivenPostgres
+from tests.waiting import until
 
 PORT_INSIDE = "8000"
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
@@ -72,10 +72,8 @@ class Composition:
 
     def until_healthy(self, name: str, within_s: float = 60.0) -> None:
         """Wait for a service's health."""
-        deadline = time.monotonic() + within_s
-        while not self.healthy(name):
-            assert time.monotonic() < deadline, self.supervisor.children[name].last_words(30)
-            time.sleep(0.3)
+        child = self.supervisor.children[name]
+        until(lambda: self.healthy(name), within_s, 0.3, seen=lambda: child.last_words(30))
 
 
 @pytest.fixture
@@ -110,12 +108,14 @@ def test_the_composed_service_works(composition: Composition, root: Path) -> Non
     with database.write() as connection:
         # no worker knows this operation: the row's end shows that beat, broker, worker and database connect
         job = create_job(connection, owner="local", operation="walk", request={})
-    deadline = time.monotonic() + 60.0
-    while not job.finished:
-        assert time.monotonic() < deadline, composition.supervisor.children["worker"].last_words(30)
-        time.sleep(0.3)
+
+    def now() -> Job:
         with database.read() as connection:
-            job = get_job(connection, "local", job.id)
+            return get_job(connection, "local", job.id)
+
+    worker = composition.supervisor.children["worker"]
+    until(lambda: now().finished, 60.0, 0.3, seen=lambda: worker.last_words(30))
+    job = now()
     database.dispose()
     assert job.status is JobStatus.FAILED
     assert (job.error or {})["code"] == "unknown_operation"

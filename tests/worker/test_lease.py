@@ -7,6 +7,7 @@ import time
 
 from app.database import Database
 from app.jobs.store import claim_job, request_cancel
+from tests.waiting import until
 from tests.worker.conftest import OWNER, Queue
 from worker.lease import StopReason, Vigil
 from worker.runner import never
@@ -74,8 +75,5 @@ def test_a_vanished_job_stops_the_work(queue: Queue, database: Database) -> None
     with vigil:
         with database.write() as connection:
             connection.execute(jobs.delete().where(jobs.c.id == job_id))
-        deadline = time.monotonic() + 5.0
-        while not vigil.should_stop():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        until(vigil.should_stop, 5.0)
         assert vigil.reason is StopReason.LOST

@@ -13,6 +13,7 @@ import pytest
 
 from tests.app.hostile.api_process import ApiProcess, Onlooker, api_process, read_all
 from tests.app.request_documents import identify_document
+from tests.waiting import until
 
 LIMIT_S = 1.0  # of headers, bodies and readers in these tests
 PATIENCE_S = 15.0  # the machine of the tests is a busy one
@@ -188,12 +189,12 @@ def test_many_slow_clients_hold_up_nobody(api: ApiProcess, kind: str) -> None:
         links = [stack.enter_context(api.connect()) for _ in range(SLOW)]
         for link in links:
             link.sendall(start)
-        alive = links
-        deadline = time.monotonic() + PATIENCE_S
-        while alive:
-            assert time.monotonic() < deadline, f"{len(alive)} are still there"
-            alive = [link for link in alive if not hung_up(link, piece)]
-            time.sleep(0.1)
+
+        def gone() -> bool:
+            links[:] = [link for link in links if not hung_up(link, piece)]
+            return not links
+
+        until(gone, PATIENCE_S, 0.1, seen=lambda: f"{len(links)} are still there")
     print(
         f"{kind}: {onlooker.answers} answers, slowest {1000 * onlooker.slowest_s:.0f} ms, "
         f"+{onlooker.grown_mib:.0f} MiB"
@@ -224,10 +225,8 @@ def test_one_connection_too_many_is_told_so(api: ApiProcess) -> None:
         answers = [api.raw(GET + b"\r\n") for _ in range(5)]
         assert problem(answers[-1]) == (503, "service_busy")
         assert b"retry-after" in answers[-1].lower()
-    deadline = time.monotonic() + PATIENCE_S
-    while api.raw(GET + b"Connection: close\r\n\r\n")[:12] != b"HTTP/1.1 200":
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    asked = GET + b"Connection: close\r\n\r\n"
+    until(lambda: api.raw(asked).startswith(b"HTTP/1.1 200"), PATIENCE_S, 0.1)
 
 
 GARBAGE: dict[str, tuple[bytes, int]] = {

@@ -16,6 +16,7 @@ import scipy.io
 
 from tests.app.hostile.api_process import MIB, ApiProcess, Onlooker, api_process
 from tests.app.hostile.bombs import BOMBS, NAMES, parquet
+from tests.waiting import until
 
 ANSWER_S = 40.0  # the wall limit of a parser is 20 s; the machine of the tests is a busy one
 GROWN_MIB = 64.0  # the largest upload here has 16 MB; what one reader would take is ten times as much
@@ -47,10 +48,7 @@ def upload(api: ApiProcess, content: bytes, filename: str) -> httpx.Response:
 
 def assert_no_process_left(api: ApiProcess) -> None:
     """Every parser was ended and reaped."""
-    deadline = time.monotonic() + 5.0
-    while api.children():
-        assert time.monotonic() < deadline, api.children()
-        time.sleep(0.05)
+    until(lambda: not api.children(), 5.0, seen=api.children)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from app.tables import jobs, workers
 from tests.app.jobs.test_retention import ended
 from tests.app.jobs.test_store import claimed, current, new_job
 from tests.app.running_service import DEAD_BROKER
+from tests.waiting import until
 
 WITHIN_S = 20.0
 
@@ -53,24 +54,20 @@ def test_reaps_while_no_worker_is_free(database: Database) -> None:
     claimed(database, job.id, lease_s=-1.0)
     messages = Messages()
     with upkeep(database, messages):
-        deadline = time.monotonic() + WITHIN_S
-        while job.id not in messages.sent:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        until(lambda: job.id in messages.sent, WITHIN_S)
     assert current(database, job.id).status == "queued"
 
 
 def test_forgets_in_the_background(database: Database) -> None:
     """What is older than the operator keeps disappears without anybody asking."""
     ended(database, days_ago=2.0)
+
+    def left() -> int:
+        with database.read() as session:
+            return len(session.execute(select(jobs.c.id)).all())
+
     with upkeep(database, Messages(), keep_jobs_days=1.0):
-        deadline = time.monotonic() + WITHIN_S
-        left = 1
-        while left:
-            assert time.monotonic() < deadline
-            with database.read() as session:
-                left = len(session.execute(select(jobs.c.id)).all())
-            time.sleep(0.02)
+        until(lambda: left() == 0, WITHIN_S)
 
 
 def test_a_database_that_is_away_ends_nothing(tmp_path_factory: pytest.TempPathFactory) -> None:

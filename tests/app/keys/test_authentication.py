@@ -19,6 +19,7 @@ from app.tables import api_keys
 from tests.app.key_holders import bearer, holder, make_key
 from tests.app.request_documents import simulate_document
 from tests.app.running_service import RunningService
+from tests.waiting import until
 
 FROM_PROXY = "X-Forwarded-For"  # the server believes its own machine: tests come from addresses of their own
 PATIENCE_S = 10.0
@@ -164,13 +165,12 @@ def test_the_last_use_is_seen(keyed_on_sqlite: RunningService) -> None:
     made = make_key(keyed_on_sqlite.database)
     with holder(keyed_on_sqlite, made.text) as client:
         assert client.get("/me").status_code == 200
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
+
+    def last_use() -> object:
         with keyed_on_sqlite.database.read() as session:
-            if repository.key_by_id(session, made.key.id).last_used_at is not None:
-                return
-        time.sleep(0.02)
-    pytest.fail("the last use was not noted")
+            return repository.key_by_id(session, made.key.id).last_used_at
+
+    until(last_use, PATIENCE_S)
 
 
 def test_guessing_is_limited(keyed_on_sqlite: RunningService) -> None:

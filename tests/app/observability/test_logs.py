@@ -17,6 +17,7 @@ import pytest
 from app.observability.context import bound
 from app.observability.logs import MAX_MESSAGE, make_handler
 from tests.app.running_service import RunningService
+from tests.waiting import until
 
 
 class Written:
@@ -36,6 +37,11 @@ class Written:
     def lines(self) -> list[dict[str, Any]]:
         """Each line as JSON."""
         return [json.loads(line) for line in self.text.splitlines()]
+
+    def wait_for(self, count: int) -> list[dict[str, Any]]:
+        """Wait until so many lines are there: a request's is written after its answer went out."""
+        until(lambda: len(self.lines) >= count, seen=lambda: self.text)
+        return self.lines
 
 
 @pytest.fixture
@@ -137,7 +143,7 @@ def test_each_request_leaves_a_line(service: RunningService, access: Written) ->
     service.client.get("/jobs/job_none?token=hush", headers={"X-Request-ID": "mine"})
     service.client.get("/livez")
     service.client.get("/jobs")
-    first, second = access.lines
+    first, second = access.wait_for(2)
     assert first["request_id"] == "mine"
     assert (first["route"], first["path"], first["status"]) == ("/jobs/{job_id}", "/jobs/job_none", 404)
     assert first["owner"] == "local"
@@ -151,11 +157,7 @@ def test_a_client_that_goes_away_is_told_of(service: RunningService, access: Wri
     job = service.client.post("/identify", json=_document()).json()["id"]
     with pytest.raises(httpx.ReadTimeout):
         httpx.get(f"{service.url}/jobs/{job}", headers={"Prefer": "wait=1"}, timeout=0.2)
-    for _ in range(100):
-        if len(access.lines) >= 2:
-            break
-        threading.Event().wait(0.05)
-    assert access.lines[-1]["route"] == "/jobs/{job_id}"
+    assert access.wait_for(2)[-1]["route"] == "/jobs/{job_id}"
 
 
 def _document() -> Any:

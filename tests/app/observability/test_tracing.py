@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import pytest
 from app.observability import tracing
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
+from tests.waiting import until
 from worker.telling import Phases, told
 
 pytest.importorskip("opentelemetry.sdk")
@@ -34,11 +34,11 @@ def spans() -> Iterator[Callable[[str], dict[str, Any]]]:
     assert tracing.start_tracing("test", "", exporter=exporter)
 
     def ended(name: str) -> dict[str, Any]:
-        deadline = time.monotonic() + SPAN_END_S
-        while name not in (found := {span.name: span for span in exporter.get_finished_spans()}):
-            assert time.monotonic() < deadline, f"no span {name!r} among {sorted(found)}"
-            time.sleep(0.01)
-        return found
+        def found() -> dict[str, Any]:
+            return {span.name: span for span in exporter.get_finished_spans()}
+
+        until(lambda: name in found(), SPAN_END_S, seen=found)
+        return found()
 
     yield ended
     tracing.stop_tracing()

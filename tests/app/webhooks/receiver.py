@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ssl
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import trustme
+
+from tests.waiting import until
 
 HOST = "hooks.example.test"  # what the certificate is made out to
 PLEASE_STOP_S = 5.0
@@ -52,10 +53,7 @@ class Receiver:
 
     def wait_for(self, count: int, within_s: float = 20.0) -> list[Received]:
         """Wait until so many requests have come."""
-        deadline = time.monotonic() + within_s
-        while len(self.received) < count:
-            assert time.monotonic() < deadline, f"{len(self.received)} of {count} came"
-            time.sleep(0.02)
+        until(lambda: len(self.received) >= count, within_s, seen=lambda: f"{len(self.received)} of {count}")
         return self.received
 
 

@@ -27,6 +27,7 @@ from tests.app.webhooks.hooks import (
     sender,
 )
 from tests.app.webhooks.receiver import Receiver, receiver, status
+from tests.waiting import until
 
 # what the database has no part in is proved on one of them
 on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
@@ -161,9 +162,7 @@ def test_two_senders_share_one_table(database: Database, there: Receiver) -> Non
     for one in both:
         one.start()
     there.wait_for(count, within_s=60.0)
-    deadline = time.monotonic() + 30.0
-    while deliveries(database, status="waiting") and time.monotonic() < deadline:
-        time.sleep(0.05)
+    until(lambda: not deliveries(database, status="waiting"), 30.0)
     for one in both:
         one.stop()
     rows = deliveries(database)
