@@ -120,13 +120,3 @@ def lattice_parts(
 def acting_circulation(circulation: Array, lag: Array) -> Array:
     """Circulations (r,) after Jones' lag, with both lag states (2, r)."""
     return np.asarray((1.0 - JONES_A1 - JONES_A2) * circulation + JONES_A1 * lag[0] + JONES_A2 * lag[1])
-
-
-def followed(lag: Array, before: Array, after: Array, lag_time: Array, step_s: float) -> Array:
-    """Lag states (2, r) after a step over which the circulation runs straight from ``before`` to ``after``.
-
-    The exact solution of T dz/dt = circulation - z.
-    """
-    z = step_s / lag_time
-    decay, mean = np.exp(-z), -np.expm1(-z) / z
-    return np.asarray(decay * lag + (mean - decay) * before + (1.0 - mean) * after)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore.aero.moving_lattice import MovingLattice, acting_circulation, followed
+from morphcore.aero.moving_lattice import MovingLattice
 from morphcore.aero.polar import steady_polar
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
@@ -101,20 +101,6 @@ def test_steady_loads_are_the_polars() -> None:
     steady = steady_polar(no_drag, 150.0, flight.air_density_kg_m3, alpha)
     np.testing.assert_allclose(total.sum(axis=0), steady.force_B, atol=1e-9 * steady.lift_n)
     np.testing.assert_allclose(moment.sum(axis=0), steady.moment_B, atol=1e-9 * steady.lift_n)
-
-
-def test_lag_follows_a_ramp_exactly() -> None:
-    """For a circulation that rises straight, one long step of the lag equals many short ones."""
-    times, before, after = np.array([[0.05], [0.01]]), np.array([1.0]), np.array([3.0])
-    start = np.array([[0.4], [0.9]])
-    once = followed(start, before, after, times, 0.1)
-    lag = start
-    for i in range(50):
-        ends = before + (after - before) * np.array([[i / 50.0], [(i + 1) / 50.0]])
-        lag = followed(lag, ends[0], ends[1], times, 0.1 / 50.0)
-    np.testing.assert_allclose(once, lag, rtol=1e-12)
-    # settled lag states change nothing: Jones' weights add up to one
-    np.testing.assert_allclose(acting_circulation(after, np.stack([after, after])), after, rtol=1e-15)
 
 
 def test_number_of_elements_is_checked() -> None:

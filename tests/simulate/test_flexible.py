@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from morphcore.aero.moving_lattice import acting_circulation
 from morphcore.errors import FlightDiverged, InvalidInput, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.flexible import Stepper
 from morphcore.simulate.flight import ModelChoice, Simulation, flight_steps, simulate
+from morphcore.simulate.kernels.flexible_step import lag_after
 from morphcore.simulate.schedule import ConstantRate, Hold, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.stopping import Interrupted
@@ -350,3 +353,20 @@ def test_a_hinge_beyond_its_range_is_refused() -> None:
             model="flexible",
             duration_s=2.5,
         )
+
+
+def test_lag_follows_a_ramp_exactly() -> None:
+    """For a circulation that rises straight, one long step of the lag equals many short ones."""
+    times, before, after = np.array([[0.05], [0.01]]), 1.0, 3.0
+    long, short = (Stepper(step_s).coefficients(times) for step_s in (0.1, 0.1 / 50.0))
+    for k, start in enumerate((0.4, 0.9)):
+        once = lag_after(start, before, after, long.decay[k, 0], long.mean[k, 0])
+        lag = start
+        for i in range(50):
+            ends = (before + (after - before) * share / 50.0 for share in (i, i + 1))
+            lag = lag_after(lag, *ends, short.decay[k, 0], short.mean[k, 0])
+        assert once == pytest.approx(lag, rel=1e-12)
+    # settled lag states change nothing: Jones' weights add up to one
+    circulation = np.array([after])
+    settled = acting_circulation(circulation, np.stack([circulation, circulation]))
+    np.testing.assert_allclose(settled, circulation, rtol=1e-15)

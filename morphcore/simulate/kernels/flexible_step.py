@@ -55,6 +55,15 @@ FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
 RECORD = 18  # numbers of a record before the tips: R_NB row by row, twist, position of the fuselage
 
 
+@inlined
+def lag_after(lag, before, after, decay, mean):
+    """A lag state after a step over which the circulation runs straight from ``before`` to ``after``.
+
+    The exact solution of T dz/dt = circulation - z. decay : exp(-h / T). mean : of the decay, over the step.
+    """
+    return decay * lag + (mean - decay) * before + (1.0 - mean) * after
+
+
 class Structure(NamedTuple):
     """Beams, bodies, roots and sections as their kernels take them, with scratch; see `multibody.beam`."""
 
@@ -354,8 +363,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
             before, after = state.circulation[q], trial.circulation[q]
             total = (1.0 - JONES_A1 - JONES_A2) * after
             for k in range(2):
-                decay, mean = rule.decay[k, q], rule.mean[k, q]
-                lag = decay * state.lag[k, q] + (mean - decay) * before + (1.0 - mean) * after
+                lag = lag_after(state.lag[k, q], before, after, rule.decay[k, q], rule.mean[k, q])
                 trial.lag[k, q] = lag
                 total += (JONES_A1 if k == 0 else JONES_A2) * lag
             scratch.acting[q] = total
