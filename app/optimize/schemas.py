@@ -11,7 +11,7 @@ from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
 from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
-from app.schemas.lattice import Lattice, StepS
+from app.schemas.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from app.schemas.parameters import EXAMPLE_PARAMETERS, KnownModel
 from app.schemas.search import WEEK_S, SwarmSearch
 from app.simulate.schemas import MAX_ELEMENTS
@@ -24,7 +24,7 @@ Weight = Annotated[float, Field(ge=0.0, le=1e6)]
 class SearchedModel(KnownModel):
     """The equivalent model that is searched with."""
 
-    step_s: StepS | None = None
+    step_s: StepS | None = Field(default=None, description=OWN_OR_CHOSEN)
 
 
 class Morph(Strict):

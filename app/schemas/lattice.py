@@ -28,6 +28,8 @@ class Lattice(Strict):
     core: VortexCore = VortexCore()
 
 
+CHOSEN = "Left out: the longest of 10, 5 and 2.5 ms that holds the attitude to 5e-5 rad."
+OWN_OR_CHOSEN = f"That of the identification, where it is known. {CHOSEN}"
 StepS = Annotated[float, Field(ge=0.0005, le=0.01)]  # of a search
 FlightStepS = Annotated[float, Field(ge=1e-5, le=0.02)]  # of one flight, which may be as exact as it likes
 Start = Literal["trim", "given"]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from app.schemas.fields import Identifier, Strict
-from app.schemas.lattice import FlightStepS, Lattice, Start, StepS
+from app.schemas.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -98,5 +98,5 @@ class KnownModel(Strict):
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     lattice: Lattice | None = None
-    step_s: FlightStepS | None = None
+    step_s: FlightStepS | None = Field(default=None, description=OWN_OR_CHOSEN)
     start: Start | None = None

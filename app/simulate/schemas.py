@@ -11,7 +11,7 @@ from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
 from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
-from app.schemas.lattice import FlightStepS, Lattice, Start
+from app.schemas.lattice import CHOSEN, FlightStepS, Lattice, Start
 from app.schemas.parameters import KnownModel
 from app.schemas.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
 from app.schemas.search import MAX_SEED
@@ -29,7 +29,7 @@ class RigidModel(Strict):
 
     kind: Literal["rigid"]
     lattice: Lattice | None = None
-    step_s: FlightStepS | None = None
+    step_s: FlightStepS | None = Field(default=None, description=CHOSEN)
     start: Start | None = None
 
 
@@ -45,7 +45,7 @@ class FlexibleModel(Strict):
     kind: Literal["flexible"]
     elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
     lattice: Lattice | None = None
-    step_s: FlightStepS | None = None
+    step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
     start: Start | None = None
 
 
@@ -110,7 +110,7 @@ class FlightCost(BaseModel):
     """What a simulation would take, to an order of magnitude."""
 
     rows: int = Field(description="Of the trajectory.")
-    steps: int = Field(description="Time steps.")
+    steps: int = Field(description="Time steps: of 10 ms where they are chosen, which may become a quarter.")
     flight_s: float = Field(description="Simulated time.")
     core_s: float = Field(description="Computing time on one core.")
 

@@ -25,7 +25,6 @@ from morphcore.optimise.settings import (
     schedule_search,
     weights_settings,
 )
-from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.request import flown_model
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
@@ -118,7 +117,7 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
         flexible=flexible_settings(fields.raw("flexible", {})),
         lattice=model.lattice,
         start=model.start,
-        step_s=STEP_S if model.step_s is None else model.step_s,
+        step_s=model.step_s,
     )
     fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()

@@ -37,8 +37,9 @@ from morphcore.optimise.search import SearchRun
 from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
 from morphcore.optimise.state import OptimisationState, Verified, decode, encode
 from morphcore.simulate.flight import flight_steps
-from morphcore.simulate.plan import STEP_S, CommonPath, common_path
+from morphcore.simulate.plan import CommonPath, common_path
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trim import StartMode
 from morphcore.steps import Step
 from morphcore.stopping import Stop
@@ -58,7 +59,8 @@ class ScheduleOptimisation:
     Parameters
     ----------
     model : one parameter set of the equivalent model. verify : fly the result in the flexible model, or not.
-    flexible : that model. lattice, start, step_s : how the rigid and the equivalent model fly.
+    flexible : that model. lattice, start, step_s : how the rigid and the equivalent model fly. None as the
+        longest step: the longest with which both fly the constant rate as exactly as `choose_step` demands.
 
     Raises
     ------
@@ -79,14 +81,14 @@ class ScheduleOptimisation:
         flexible: FlexibleSettings | None = None,
         lattice: LatticeSettings = DEFAULT_LATTICE,
         start: StartMode = "trim",
-        step_s: float = STEP_S,
+        step_s: float | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.aircraft, self.flight, self.parameters = aircraft, flight, model
         self.morph, self.limits, self.weights = morph, limits or Limits(), weights or Weights()
         self.search, self.verify = search or ScheduleSearch(), verify
         self.flexible = flexible or FlexibleSettings()
-        self.lattice, self.start, self.step_s = lattice, start, step_s
+        self.lattice, self.start, self._asked_step_s = lattice, start, step_s
         self._clock = clock
         if model.particles != 1:
             raise InvalidInput(
@@ -119,6 +121,20 @@ class ScheduleOptimisation:
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
         return common_path(self.chain("rigid")[0], *ends, may_halve=self.parameters.wing_sets == 1)
+
+    @cached_property
+    def step_s(self) -> float:
+        """The longest step, s, of the rigid and the equivalent model."""
+        if self._asked_step_s is not None:
+            return self._asked_step_s
+        constant = self.constant(self.morph.duration_s)
+        flight = [constant] * len(self.aircraft.surfaces), busiest_part([constant], self.times_s)
+        chains = [self.chain(name) for name in ("rigid", "equivalent")]
+        halved = self.parameters.wing_sets == 1
+        return min(
+            choose_step(model, [flight], batch, start=self.start, may_halve=halved).step_s
+            for model, batch in chains
+        )
 
     def chain(self, name: ModelName) -> tuple[ChainModel, ParameterBatch]:
         """One of the models that are searched with, and its parameters."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -15,7 +15,7 @@ from morphcore.aero.environment import Environment, air_velocity
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
-from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
+from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
@@ -23,6 +23,7 @@ from morphcore.simulate.flexible_flight import flexible_flight
 from morphcore.simulate.plan import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.record import FlightRecord, recorded_trajectory
 from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
@@ -45,10 +46,12 @@ class Simulation:
     of B).
     trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none
     of the flexible model).
+    step_s : the longest time step that was allowed, s.
     """
 
     trajectory: Trajectory
     trim: Trim
+    step_s: float
 
 
 @dataclass(frozen=True)
@@ -84,8 +87,9 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     model : "rigid", "flexible", or the parameters of one equivalent model (`parameters_from_document`,
         `physical_guess`).
     duration_s : s from time zero; of a sample flight, its own duration from its first time is the default.
-    output_step_s : s between the rows of the trajectory. step_s : longest time step, s; each model has its
-        own default.
+    output_step_s : s between the rows of the trajectory. step_s : longest time step, s; None: 1 ms of the
+        flexible model, of the others the longest of `step_choice.CANDIDATES_S` that holds the attitude to
+        `step_choice.TOLERANCE_RAD` in this flight's smooth air.
     start : "trim" for straight level flight of this model, "given" for the flight's measured start.
     environment : gust and turbulence on top of the flight's wind. rng : source of the turbulence.
     lattice : panels of each surface and core of their vortices.
@@ -122,25 +126,29 @@ def flight_steps(  # noqa: PLR0913 - as above
     stop: Stop | None = None,
 ) -> Iterator[FlightStep]:
     """Fly as `simulate` does, step by step: the fraction flown several times a second, the flight at last."""
-    fly, default_step_s = _flyer(aircraft, flight, model, lattice, elements)
-    step_s = default_step_s if step_s is None else step_s
-    times = _output_times(schedules, duration_s, output_step_s, step_s)
-    grid = time_grid(times, step_s)
+    flyer = _flyer(aircraft, flight, model, lattice, elements)
+    longest_s = flyer.step_s if step_s is None else step_s
+    times = _output_times(schedules, duration_s, output_step_s, longest_s)
+    grid = time_grid(times, longest_s)
     each = _per_surface(aircraft, schedules)
     _require_hinge_ranges(aircraft, each, grid.times_s)
-    air = None
-    if environment is not None:
-        steady = environment
-
-        def air(moments: Array) -> Array:
-            return air_velocity(steady, flight, moments, rng)
-
+    if step_s is None and flyer.chain is not None:
+        chain, batch = flyer.chain
+        hinged = [own for surface, own in zip(aircraft.surfaces, each, strict=True) if surface.hinge]
+        smooth = None if environment is None else replace(environment, turbulence=None)
+        longest_s = choose_step(
+            chain, [(each, busiest_part(hinged, times))], batch, start=start,
+            air_velocity_N=_air(smooth, flight, None), may_halve=batch.wing_sets == 1, stop=stop,
+        ).step_s  # fmt: skip
+        grid = time_grid(times, longest_s)
+    air = _air(environment, flight, rng)
     at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
-    for fraction, record in fly(each, grid, at, start=start, air_velocity_N=air, stop=stop):
+    for fraction, record in flyer.fly(each, grid, at, start=start, air_velocity_N=air, stop=stop):
         if record is None:
             yield FlightStep(fraction)
         else:
-            yield FlightStep(1.0, Simulation(recorded_trajectory(aircraft, times, record), record.trim))
+            flown = recorded_trajectory(aircraft, times, record)
+            yield FlightStep(1.0, Simulation(flown, record.trim, longest_s))
 
 
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
@@ -178,10 +186,21 @@ class _Fly(Protocol):
     ) -> Iterator[tuple[float, FlightRecord | None]]: ...
 
 
+@dataclass(frozen=True)
+class _Flyer:
+    """How a model flies.
+
+    step_s : its default. chain : model and parameters for which a step can be chosen, if they are such.
+    """
+
+    fly: _Fly
+    step_s: float
+    chain: tuple[ChainModel, ParameterBatch] | None = None
+
+
 def _flyer(
     aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: LatticeSettings, elements: int
-) -> tuple[_Fly, float]:
-    """How the chosen model flies, and its default time step, s."""
+) -> _Flyer:
     if isinstance(model, ParameterBatch):
         if model.particles != 1:
             raise InvalidInput(
@@ -189,18 +208,27 @@ def _flyer(
                 pointer="/model",
                 hint="choose one with ParameterBatch.select, or fly them together with fly_batch",
             )
-        return partial(chain_flight, chain_model(aircraft, flight, model.links, lattice), model), STEP_S
+        chain = chain_model(aircraft, flight, model.links, lattice)
+        return _Flyer(partial(chain_flight, chain, model), STEP_S, (chain, model))
     if model == "rigid":
         chain = chain_model(aircraft, flight, 1, lattice)
-        return partial(chain_flight, chain, physical_guess(chain)), STEP_S
+        batch = physical_guess(chain)
+        return _Flyer(partial(chain_flight, chain, batch), STEP_S, (chain, batch))
     if model == "flexible":
         beams = flexible_model(aircraft, flight, elements=elements, lattice=lattice)
-        return partial(flexible_flight, beams), FLEXIBLE_STEP_S
+        return _Flyer(partial(flexible_flight, beams), FLEXIBLE_STEP_S)
     raise InvalidInput(
         f"model is {model!r}",
         pointer="/model",
         hint='give "rigid", "flexible" or the parameters of an equivalent model',
     )
+
+
+def _air(
+    environment: Environment | None, flight: Flight, rng: np.random.Generator | None
+) -> Callable[[Array], Array] | None:
+    """Wind at some times beside the flight's own."""
+    return None if environment is None else lambda moments: air_velocity(environment, flight, moments, rng)
 
 
 def _output_times(

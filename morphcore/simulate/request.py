@@ -22,9 +22,7 @@ from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
-from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
-from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
 from morphcore.simulate.trajectory import Trajectory
@@ -59,7 +57,7 @@ class FlownModel:
     """What flies.
 
     parameters : of the equivalent model, a batch of one. elements : of each surface, in the flexible model.
-    step_s : longest time step, s; None: the model's own default.
+    step_s : longest time step, s; None: as `simulate` chooses it.
     """
 
     kind: Kind
@@ -76,15 +74,14 @@ class FlownModel:
             return self.parameters
         return "flexible" if self.kind == "flexible" else "rigid"
 
-    def to_document(self) -> Document:
-        """JSON form, with the step that holds."""
-        default_s = FLEXIBLE_STEP_S if self.kind == "flexible" else STEP_S
+    def to_document(self, step_s: float) -> Document:
+        """JSON form, with the longest step, s, that was flown."""
         return {
             "kind": self.kind,
             **({} if self.parameters is None else {"parameters": parameters_document(self.parameters)}),
             "lattice": self.lattice.to_document(),
             **({"elements": self.elements} if self.kind == "flexible" else {}),
-            "step_s": default_s if self.step_s is None else self.step_s,
+            "step_s": step_s,
             "start": self.start,
         }
 
@@ -115,7 +112,7 @@ class SimulationResult:
         flown, trim = self.trajectory, self.simulation.trim
         tips = {side: flown.extra.get(f"tip_{side}_z") for side in SIDES}
         return {
-            "model": self.model.to_document(),
+            "model": self.model.to_document(self.simulation.step_s),
             "trim": {
                 "alpha_rad": float(trim.alpha[0]),
                 "force_b_n": trim.force_B[0].tolist(),

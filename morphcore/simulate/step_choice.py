@@ -23,6 +23,7 @@ CANDIDATES_S = (0.01, 0.005, 0.0025)
 TOLERANCE_RAD = (
     5e-5  # half of what is asked: parameter sets of a search are stiffer and softer than the guess
 )
+LOOKED_AT_S = 60.0  # of a flight: an hour's in the finest steps would not fit into memory
 HALVED = 4.0 / 3.0  # of the difference between a step and its half: the error of a step of second order
 
 
@@ -88,6 +89,23 @@ def choose_step(
         if error <= tolerance_rad:
             return StepChoice(step_s, error, holds=True)
     return StepChoice(float(candidates_s[-1]), error, holds=False)
+
+
+def busiest_part(schedules: Sequence[Schedule], times_s: ArrayLike, longest_s: float = LOOKED_AT_S) -> Array:
+    """The output times that `choose_step` should look at: of a long flight those around its fastest morph.
+
+    Parameters
+    ----------
+    schedules : of the hinges. times_s : (k,), evenly spaced. longest_s : of the part, s.
+    """
+    times = np.asarray(times_s, dtype=np.float64)
+    rows = max(int(longest_s / (times[1] - times[0]) + 1e-9), 2)
+    if times.size <= rows + 1:
+        return times
+    rates = [np.abs(schedule.motion(times).rate) for schedule in schedules]
+    fastest = int(np.max(rates, axis=0).argmax()) if rates else 0
+    first = min(max(fastest - rows // 2, 0), times.size - rows - 1)
+    return times[first : first + rows + 1]
 
 
 @dataclass

@@ -32,6 +32,7 @@ from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.state import decode
 from morphcore.simulate.flight import FlightStep, simulate
 from morphcore.simulate.schedule import Spline
+from morphcore.simulate.step_choice import choose_step
 from morphcore.swarm import SwarmSettings
 from tests.identify.flights import EXAMPLES, reference_aircraft, reference_flight
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
@@ -406,3 +407,17 @@ def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
     assert steps["hybrid"].best_cost <= steps["pso"].best_cost
     assert steps["pso"].best_cost < 1.03 * steps["hybrid"].best_cost
     assert steps["hybrid"].flights < 0.2 * steps["pso"].flights
+
+
+def test_the_step_holds_for_both_models() -> None:
+    """The step is the longest with which both models fly the constant rate well enough, or the given one."""
+    jerk, limits = Morph(1.0, 0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
+    run = optimisation(jerk, limits, links=2)
+    flight = [run.constant(jerk.duration_s)] * len(run.aircraft.surfaces), run.times_s
+    alone = {}
+    for name in ("rigid", "equivalent"):
+        model, batch = run.chain(name)
+        alone[name] = choose_step(model, [flight], batch).step_s
+    assert alone["equivalent"] < alone["rigid"]
+    assert run.step_s == alone["equivalent"]
+    assert optimisation(jerk, limits, links=2, step_s=0.01).step_s == 0.01

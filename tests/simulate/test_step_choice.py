@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.frames import wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold
-from morphcore.simulate.step_choice import CANDIDATES_S, TOLERANCE_RAD, choose_step
+from morphcore.simulate.step_choice import CANDIDATES_S, TOLERANCE_RAD, busiest_part, choose_step
 from tests.models.chains import example_aircraft, example_flight
 from tests.simulate.flights import example_model, fly_trimmed, plan_of, sample, sample_schedules
 
@@ -94,3 +96,52 @@ def test_half_the_aircraft_chooses_what_the_whole_does():
     whole, half = (choose_step(model, [(SLOW, TIMES_S)], may_halve=halve) for halve in (False, True))
     assert half.step_s == whole.step_s
     assert half.error_rad == pytest.approx(whole.error_rad, rel=1e-4)
+
+
+def test_a_flight_chooses_its_step():
+    """A flight of which nobody gives the step holds 1e-4 rad where 10 ms do not; a given step stands."""
+
+    def flown(**options):
+        return simulate(example_aircraft(), example_flight(), HARD, duration_s=0.6, **options)
+
+    fine = flown(step_s=CANDIDATES_S[-1] / 8).trajectory.euler
+    chosen, given = flown(), flown(step_s=CANDIDATES_S[0])
+    assert (chosen.step_s, given.step_s) == (CANDIDATES_S[-1], CANDIDATES_S[0])
+    assert np.abs(given.trajectory.euler - fine).max() > 1e-4 > np.abs(chosen.trajectory.euler - fine).max()
+
+
+def test_turbulence_does_not_choose():
+    """The step is that of the smooth air: the same seed of turbulence gives the same air as a given step."""
+    air = Environment(CosineGust(3.0, 20.0, 0.1), DrydenTurbulence(5.0, 1.0))
+    both = [
+        simulate(
+            example_aircraft(),
+            example_flight(),
+            SLOW,
+            duration_s=0.6,
+            environment=air,
+            rng=np.random.default_rng(3),
+            step_s=step_s,
+        )
+        for step_s in (None, CANDIDATES_S[0])
+    ]
+    assert both[0].step_s == both[1].step_s
+    np.testing.assert_array_equal(both[0].trajectory.euler, both[1].trajectory.euler)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 40.0, 99.0])
+def test_of_a_long_flight_the_fastest_morph_is_looked_at(start_s):
+    """As much as asked for, around the fastest morph, out of the flight's own rows."""
+    times_s = np.linspace(0.0, 100.0, 1001)
+    slow, fast = ConstantRate(0.0, 0.1, 20.0, start_s=20.0), ConstantRate(0.0, 0.5, 0.5, start_s=start_s)
+    part = busiest_part([slow, fast], times_s, 10.0)
+    assert part[-1] - part[0] == pytest.approx(10.0)
+    assert part[0] <= start_s
+    assert part[-1] >= start_s + 0.5
+    assert np.isin(part, times_s).all()
+
+
+def test_short_flights_and_held_hinges_are_looked_at_from_their_start():
+    """A flight within the limit is looked at whole; without any hinge, the first part."""
+    np.testing.assert_array_equal(busiest_part(SLOW, TIMES_S), TIMES_S)
+    np.testing.assert_array_equal(busiest_part([], TIMES_S, 0.1), TIMES_S[:11])
