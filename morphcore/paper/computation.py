@@ -22,7 +22,9 @@ from morphcore.models.parameters_document import parameters_from_document
 from morphcore.paper.scenario import LINKS, PaperFlight, aircraft, flight, paper_flights, two_second_flight
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
+from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flight import ModelChoice, flight_steps
+from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import one_blas_thread, thread_count, use_threads
 
@@ -88,6 +90,7 @@ def _timed(
     steps = flight_steps(
         aircraft(), flight(), schedules, model=model, duration_s=each.duration_s,
         lattice=settings.lattice, elements=settings.elements,
+        step_s=FLEXIBLE_STEP_S if model == "flexible" else STEP_S,  # known: nobody has to look for it
     )  # fmt: skip
     next(steps)
     ready = time.thread_time()
