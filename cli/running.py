@@ -6,19 +6,17 @@ progress is shown, the first Ctrl-C asks for the best so far, a result and its f
 
 from __future__ import annotations
 
-import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import FrameType
 from typing import Any, NoReturn
 
 import typer
 
 from cli.exits import CommandError, Exit
 from cli.files import STANDARD_OUTPUT, require_file, save_files, write_json
+from cli.interrupt import first_interrupt
 from cli.request import Document, Request
 from cli.screen import Meter, exit_for, meter, print_job_error, print_json, stderr
 from cli.service import Service
@@ -77,7 +75,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
     pace = Pace(time.monotonic)
     try:
         work = find_operation(request.operation)(request.body(sample_document), threads)
-        with _first_interrupt() as interrupted:
+        with first_interrupt() as interrupted:
             try:
                 for step in work.steps(None, interrupted):
                     checkpoint = step.checkpoint
@@ -106,7 +104,7 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
         return {"name": path.stem, "role": role, "trajectory_id": service.upload(path)["id"]}
 
     job = service.submit(request.operation, request.body(uploaded))
-    with _first_interrupt() as interrupted:
+    with first_interrupt() as interrupted:
         cancelled = False
         for seen in service.watch(job["id"]):
             job = seen
@@ -175,28 +173,3 @@ def sample_document(path: Path, role: str) -> Document:
         "theta_rad": trajectory.theta.tolist(),
         "psi_rad": trajectory.psi.tolist(),
     }
-
-
-class _Interrupt:
-    def __init__(self) -> None:
-        self.seen = False
-
-    def __call__(self) -> bool:
-        return self.seen
-
-
-@contextmanager
-def _first_interrupt() -> Iterator[_Interrupt]:
-    """Note the first Ctrl-C instead of dying of it; the second one kills as ever."""
-    interrupt = _Interrupt()
-    before = signal.getsignal(signal.SIGINT)
-
-    def note(_number: int, _frame: FrameType | None) -> None:
-        interrupt.seen = True
-        signal.signal(signal.SIGINT, before)
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield interrupt
-    finally:
-        signal.signal(signal.SIGINT, before)

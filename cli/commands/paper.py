@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from rich.table import Table
 from cli.commands import options
 from cli.exits import CommandError, Exit
 from cli.files import writing
+from cli.interrupt import first_interrupt
 from cli.screen import meter, print_json, reports_errors, short, stdout
 
 if TYPE_CHECKING:
@@ -66,15 +68,20 @@ def paper(
 def _work_off(runner: StageRunner) -> None:
     """Run all stages under a progress bar; Ctrl-C leaves what is done."""
     try:
-        with meter() as bar:
-            for step in runner.steps():
+        with meter() as bar, first_interrupt() as interrupted, closing(runner.steps()) as steps:
+            for step in steps:
                 bar.show({"fraction": step.fraction, "phase": step.title, "message": step.message})
-    except KeyboardInterrupt:
-        raise CommandError(
-            "stopped",
-            code=Exit.INTERRUPTED,
-            hint=f"the same command goes on from where it was; stages are in {runner.folder}",
-        ) from None
+                if interrupted():
+                    break
+            else:
+                return
+    except KeyboardInterrupt:  # the second one, which does not wait for the step's end
+        pass
+    raise CommandError(
+        "stopped",
+        code=Exit.INTERRUPTED,
+        hint=f"the same command goes on from where it was; stages are in {runner.folder}",
+    )
 
 
 def _samples(folder: Path | None) -> Path | None:

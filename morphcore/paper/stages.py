@@ -139,7 +139,7 @@ class StageRunner:
         """The key of a stage."""
         return self._keys[name]
 
-    def steps(self) -> Iterator[StageStep]:
+    def steps(self) -> Generator[StageStep]:
         """Do what is not done yet. A step that is interrupted leaves its last checkpoint behind."""
         self.folder.mkdir(parents=True, exist_ok=True)
         total = sum(stage.expected_s for stage in self.stages)

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -26,18 +26,24 @@ MOST_QUICK_S = 300.0
 
 
 class PlayedRunner:
-    """A runner whose stages are all done, or that Ctrl-C reaches."""
+    """A runner whose stages are all done, or that Ctrl-C reaches once or twice."""
 
-    def __init__(self, folder: Path, *, interrupted: bool = False) -> None:
+    def __init__(self, folder: Path, interrupts: int = 0) -> None:
         self.folder = folder
         self.finished = made_up.finished()
-        self._interrupted = interrupted
+        self.closed = False
+        self._interrupts = interrupts
 
-    def steps(self) -> Iterator[StageStep]:
-        """Tell one step, then end or be interrupted."""
-        yield StageStep("truth", "six flexible flights", 0.5, "0.2 rad/s")
-        if self._interrupted:
-            raise KeyboardInterrupt
+    def steps(self) -> Generator[StageStep]:
+        """Tell two steps, with Ctrl-C before the second."""
+        try:
+            yield StageStep("truth", "six flexible flights", 0.5, "0.2 rad/s")
+            for _ in range(self._interrupts):
+                os.kill(os.getpid(), signal.SIGINT)
+            yield StageStep("truth", "six flexible flights", 0.6, "0.5 rad/s")
+            assert not self._interrupts, "worked on"
+        finally:
+            self.closed = True  # here the real one keeps its checkpoint
 
 
 @pytest.fixture
@@ -47,7 +53,7 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[PaperSettings]:
 
     def play(settings: PaperSettings, folder: Path) -> PlayedRunner:
         seen.append(settings)
-        return PlayedRunner(folder, interrupted=folder.name == "interrupted")
+        return PlayedRunner(folder)
 
     monkeypatch.setattr(morphcore.paper, "paper_runner", play)
     return seen
@@ -73,12 +79,17 @@ def test_the_table_shows_asked_and_measured(asked_for: list[PaperSettings], tmp_
     assert asked_for[0].samples is not None
 
 
-def test_ctrl_c_says_how_to_go_on(asked_for: list[PaperSettings], tmp_path: Path) -> None:
-    """Exit code 130, and the sentence that the same command goes on."""
-    ended = RUNNER.invoke(app, ["paper", "--out", str(tmp_path / "interrupted")])
+@pytest.mark.parametrize("interrupts", [1, 2])
+def test_ctrl_c_says_how_to_go_on(interrupts: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Exit code 130 and the sentence that the same command goes on, after one Ctrl-C or a second one."""
+    runner = PlayedRunner(tmp_path, interrupts)
+    monkeypatch.setattr(morphcore.paper, "paper_runner", lambda *_: runner)
+    before = signal.getsignal(signal.SIGINT)
+    ended = RUNNER.invoke(app, ["paper", "--out", str(tmp_path)])
     assert ended.exit_code == Exit.INTERRUPTED
     assert "goes on from where it was" in ended.stderr
-    assert len(asked_for) == 1
+    assert runner.closed
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_a_folder_without_samples_is_refused(tmp_path: Path) -> None:
