@@ -60,10 +60,10 @@ API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
 	models multibody optimise paper samplefiles simulate)
 
-test-api:
+test-api: setup
 	@$(BIN)/pytest -q $(API_TESTS)
 
-test-library:
+test-library: setup
 	@$(BIN)/pytest -q $(LIBRARY_TESTS)
 
 test-slow: setup  ## the long proofs
@@ -75,10 +75,10 @@ faults: setup  ## kill, stop, fill and mislead every process, on both pairs of d
 
 FAULT_TESTS := $(BIN)/pytest -q -s tests/faults -m= --timeout 900
 
-faults-postgres:
+faults-postgres: setup
 	@$(FAULT_TESTS) -k postgres
 
-faults-others:
+faults-others: setup
 	@$(FAULT_TESTS) -k "not postgres"
 
 conformance: setup  ## one behaviour on SQLite and Postgres, embedded broker and Redis URL (MORPHID_TEST_*_URL)

@@ -208,12 +208,10 @@ def _flyer(
                 pointer="/model",
                 hint="choose one with ParameterBatch.select, or fly them together with fly_batch",
             )
-        chain = chain_model(aircraft, flight, model.links, lattice)
-        return _Flyer(partial(chain_flight, chain, model), STEP_S, (chain, model))
+        return _chain_flyer(chain_model(aircraft, flight, model.links, lattice), model)
     if model == "rigid":
         chain = chain_model(aircraft, flight, 1, lattice)
-        batch = physical_guess(chain)
-        return _Flyer(partial(chain_flight, chain, batch), STEP_S, (chain, batch))
+        return _chain_flyer(chain, physical_guess(chain))
     if model == "flexible":
         beams = flexible_model(aircraft, flight, elements=elements, lattice=lattice)
         return _Flyer(partial(flexible_flight, beams), FLEXIBLE_STEP_S)
@@ -222,6 +220,10 @@ def _flyer(
         pointer="/model",
         hint='give "rigid", "flexible" or the parameters of an equivalent model',
     )
+
+
+def _chain_flyer(chain: ChainModel, batch: ParameterBatch) -> _Flyer:
+    return _Flyer(partial(chain_flight, chain, batch), STEP_S, (chain, batch))
 
 
 def _air(
