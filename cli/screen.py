@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from cli.exits import CommandError, Exit
+from cli.exits import CommandError, Exit, package_missing
 
 Document = Mapping[str, Any]
 P = ParamSpec("P")
@@ -57,11 +57,14 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
         try:
             return command(*args, **kwargs)
         except CommandError as error:
-            if kwargs.get("as_json") or str(kwargs.get("json_out")) == "-":
-                sys.stderr.write(json.dumps(error.to_document()) + "\n")
-            else:
-                _print_error(error)
-            raise typer.Exit(int(error.code)) from None
+            refusal = error
+        except ModuleNotFoundError as error:
+            refusal = package_missing(error)
+        if kwargs.get("as_json") or str(kwargs.get("json_out")) == "-":
+            sys.stderr.write(json.dumps(refusal.to_document()) + "\n")
+        else:
+            _print_error(refusal)
+        raise typer.Exit(int(refusal.code))
 
     return wrapped
 

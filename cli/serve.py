@@ -129,29 +129,23 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
 
 
 def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
-    command = [
-        *(sys.executable, "-m", "app.http.server"),
-        *("--host", host, "--port", str(port)),
-    ]
+    command = _python("app.http.server", "--host", host, "--port", str(port))
     return ChildSpec(name="api", command=command, environment=environment)
 
 
 def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
-    command = [
-        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "worker"),
-        *("--queues", "morphid", "--concurrency", str(workers), "--prefetch-multiplier", "1"),
-        *("--without-gossip", "--without-mingle"),
-    ]
+    command = _python("worker.process", "worker", "--concurrency", str(workers))
     return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
 
 
 def _beat(environment: dict[str, str]) -> ChildSpec:
     # not inside the worker: nobody would notice its death, and no lost job would be found any more
-    command = [
-        *(sys.executable, "-m", "celery", "--quiet", "--app", "worker.celery_app:app", "beat"),
-        *("--scheduler", "celery.beat:Scheduler", "--pidfile", ""),  # nothing on disk that a kill could spoil
-    ]
-    return ChildSpec(name="beat", command=command, environment=environment)
+    return ChildSpec(name="beat", command=_python("worker.process", "beat"), environment=environment)
+
+
+def _python(module: str, *arguments: str) -> list[str]:
+    """Run one of our modules; nothing is imported from the working folder (-P), whatever lies there."""
+    return [sys.executable, "-P", "-m", module, *arguments]
 
 
 def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, str]:

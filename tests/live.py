@@ -14,6 +14,7 @@ from typing import Any
 from app.database import Database
 
 ROOT = Path(__file__).resolve().parent.parent
+MORPHID = Path(sys.executable).with_name("morphid")  # the command, as it is installed
 
 
 @dataclass
@@ -24,19 +25,22 @@ class LiveService:
     ----------
     data_dir : its database, queue and logs.
     environment : variables set on top of this process's.
+    morphid : the command.
+    folder : working folder.
     """
 
     data_dir: Path
     environment: dict[str, str] = field(default_factory=dict)
+    morphid: Path = MORPHID
+    folder: Path = ROOT
     url: str = ""
     children: dict[str, int] = field(default_factory=dict)
 
     def start(self) -> LiveService:
         """Start it and wait until it is ready."""
-        command = [sys.executable, "-m", "cli.main", "serve", "--json", "--port", "0"]
         self.process = subprocess.Popen(
-            [*command, "--data-dir", str(self.data_dir)],
-            cwd=ROOT,
+            [str(self.morphid), "serve", "--json", "--port", "0", "--data-dir", str(self.data_dir)],
+            cwd=self.folder,
             env={**os.environ, **self.environment},
             stdout=subprocess.PIPE,
             text=True,

@@ -1,7 +1,6 @@
 """The Celery application of the workers: messages are wake-up hints, the job table is the truth.
 
-Started as ``celery --app worker.celery_app:app worker --queues morphid`` by `morphid serve` and
-docker-compose.yml.
+`worker.process` starts it, for `morphid serve` and docker-compose.yml.
 """
 
 from __future__ import annotations

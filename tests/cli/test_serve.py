@@ -14,8 +14,11 @@ import httpx
 import psutil
 import pytest
 
+from app.jobs.store import create_job, get_job
 from cli.exits import Exit
 from tests.live import ROOT, LiveService
+from tests.servers.hostile_folder import HostileFolder
+from tests.waiting import until
 
 
 def serve(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -43,6 +46,27 @@ def test_an_open_address_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     ended = serve("--host", "0.0.0.0", "--port", "0", "--data-dir", str(tmp_path))  # noqa: S104 - refused
     assert ended.returncode == Exit.USAGE
     assert "other machines" in ended.stderr
+
+
+def test_nothing_of_the_working_folder_is_imported(tmp_path: Path) -> None:
+    """A working folder with the user's own app/, worker/ and numpy.py serves like any other: a job ends."""
+    hostile = HostileFolder(tmp_path / "hostile")
+    service = LiveService(tmp_path / "var", folder=hostile.path).start()
+    try:
+        database = service.database()
+        with database.write() as session:
+            # no worker knows this operation: the row's end shows that broker, worker and database have met
+            job = create_job(session, owner="local", operation="walk", request={})
+
+        def ended() -> bool:
+            with database.read() as session:
+                return get_job(session, "local", job.id).finished
+
+        until(ended, 60.0, 0.2, seen=service.logs)
+        database.dispose()
+    finally:
+        service.stop()
+    assert hostile.imported() == []
 
 
 def test_an_unwritable_folder_gives_a_sentence(tmp_path: Path) -> None:

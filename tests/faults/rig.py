@@ -35,7 +35,7 @@ OWNER = "local"
 LEASE_S, HEARTBEAT_S, REAP_EVERY_S, REPUBLISH_AFTER_S = 2.0, 0.5, 1.0, 2.0
 NOTE_EVERY_S = 1.0
 OURS = {
-    "worker.celery_app:app": "tests.faults.walk_worker:app",
+    "worker.process": "tests.faults.walk_process",
     "app.main:create_app": "tests.faults.walk_api:create_app",
     "app.http.server": "tests.faults.walk_api",
 }

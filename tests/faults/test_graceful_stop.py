@@ -47,7 +47,7 @@ def worker_pid(live: LiveService) -> int:
     deadline = time.monotonic() + 30.0
     while True:
         for child in psutil.Process(live.process.pid).children():
-            if "worker.celery_app:app" in " ".join(child.cmdline()) and "worker" in child.cmdline():
+            if child.cmdline()[3:5] == ["worker.process", "worker"]:
                 return child.pid
         assert time.monotonic() < deadline
         time.sleep(0.1)

@@ -1,0 +1,43 @@
+"""Run a worker or the beat: ``python -P -m worker.process worker`` (or ``beat``), then options of Celery's.
+
+Celery's own command puts the working folder on the import path, where a user's own package ``app`` or ``worker``
+may lie. This entry point does not, and ``-P`` keeps Python from doing it.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Final
+
+# imported before Celery looks for its tasks: what is loaded already is not looked for in the working folder
+from worker import tasks  # noqa: F401
+from worker.celery_app import QUEUE, app
+
+COMMANDS: Final = {
+    "worker": (
+        *("worker", "--queues", QUEUE, "--prefetch-multiplier", "1"),
+        *("--without-gossip", "--without-mingle"),  # workers meet in the job table, not through the broker
+    ),
+    # the schedule stays in memory: nothing on disk that a kill could spoil
+    "beat": ("beat", "--scheduler", "celery.beat:Scheduler", "--pidfile", ""),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run until SIGTERM and return the exit code.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        ``worker`` or ``beat``, then more of Celery's options for it; the command line's when left out.
+    """
+    role, *options = sys.argv[1:] if arguments is None else arguments
+    if role not in COMMANDS:
+        sys.stderr.write(f"unknown role {role!r}: one of {', '.join(COMMANDS)}\n")
+        return 2
+    code: int | None = app.start(["--quiet", *COMMANDS[role], *options])
+    return code or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
