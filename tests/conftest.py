@@ -8,11 +8,19 @@ from pathlib import Path
 
 import pytest
 
+from tests.compilation import compile_before
 from tests.live import LiveService
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def pytest_runtestloop(session: pytest.Session) -> None:
+    """Compile first: the time limit of a test does not run yet."""
+    if not session.config.option.collectonly:
+        reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+        compile_before(session, print if reporter is None else reporter.write_line)
 
 
 @pytest.fixture(scope="session")

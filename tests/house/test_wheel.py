@@ -106,7 +106,7 @@ def installation(root: Path, examples: Path, tmp_path_factory: pytest.TempPathFa
 
 
 def test_the_base_installation_computes(installation: Installation) -> None:
-    """Without the server's packages all operations run, in a folder with modules of the same names as ours."""
+    """Without the server's packages all operations run, in a folder with modules named like ours."""
     installation.run("identify", *FLIGHT, *SAMPLES, *SMALL, "--links", "1", *SEARCH, "--json", "out.json")
     found = json.loads((installation.folder.path / "out.json").read_text())
     assert found["model"]["links_per_wing"] == 1
@@ -128,7 +128,7 @@ def test_what_needs_the_server_says_so(installation: Installation) -> None:
 
 
 def test_the_server_installation_serves(installation: Installation, tmp_path: Path) -> None:
-    """With the extra, `morphid serve` in that folder runs a job of the command's; nothing there is imported."""
+    """With the extra, `morphid serve` in that folder runs a job; nothing in the folder is imported."""
     installation.install("[server]")
     service = LiveService(
         tmp_path / "var", morphid=installation.morphid, folder=installation.folder.path
