@@ -32,7 +32,7 @@ def needs_kernels(paths: Iterable[Path]) -> bool:
 
 
 def fingerprint() -> str:
-    """Name the compiled code: the compiler, its cache's folder, and the sources as the compiler tells them apart."""
+    """Name the compiled code: the compiler, its cache, and the sources as the compiler tells them apart."""
     sources = sorted(path for path in (ROOT / "morphcore").rglob("*.py") if "kernels" in path.parts)
     parts = [version("numba"), platform.python_version(), os.environ.get("NUMBA_CACHE_DIR", "")]
     for path in sources:

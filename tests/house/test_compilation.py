@@ -32,7 +32,7 @@ def session_of(memory: Memory, *files: str) -> Any:
 
 
 def test_kernels_are_compiled_once_before_the_tests_that_need_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A cold clone compiles before its first test, the next run does not; an empty cache folder does again."""
+    """A cold clone compiles before its first test, the next run does not; an empty cache does again."""
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     memory, said, compiled = Memory(), [], []
 
