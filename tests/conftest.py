@@ -8,11 +8,21 @@ from pathlib import Path
 
 import pytest
 
+from tests import loopback_only
 from tests.live import LiveService
 
+loopback_only.stay_here()
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(autouse=True)
+def _nothing_leaves_this_machine() -> Iterator[None]:
+    """Fail the test in which, or before which, a thread wanted to talk to another machine."""
+    yield
+    seen, loopback_only.refused[:] = list(loopback_only.refused), []
+    assert not seen, f"tests talk to this machine alone: {seen}"
 
 
 @pytest.fixture(scope="session")
