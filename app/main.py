@@ -61,19 +61,21 @@ def routed_app() -> FastAPI:
     return app
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
+def create_app(settings: Settings | None = None, *, sending: SenderSettings | None = None) -> FastAPI:
     """Build the service; database and messages are opened when it starts.
 
     Parameters
     ----------
     settings : Settings, optional
         Those of the environment when left out.
+    sending : SenderSettings, optional
+        How webhooks are sent; as `settings` say when left out.
     """
     chosen = settings or load_settings()
     if settings is None:  # a process of its own, not a guest in another's
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
-    app.router.lifespan_context = _lifespan(chosen)
+    app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
     install_problem_handlers(app, known_fields=lambda: _request_fields(app))
     limits = BodyLimits(
         chosen.max_body_bytes, chosen.body_grace_s, max_total_bytes=16 * chosen.max_body_bytes
@@ -98,7 +100,13 @@ def _request_fields(app: FastAPI) -> list[str]:
     return sorted(names)
 
 
-def _lifespan(settings: Settings) -> Any:
+def _sending(settings: Settings) -> SenderSettings:
+    return SenderSettings(
+        AddressPolicy(allow_private=settings.webhook_allow_private, dial_only=settings.webhook_hosts)
+    )
+
+
+def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         start_tracing("morphid-api", settings.traces)
@@ -110,14 +118,21 @@ def _lifespan(settings: Settings) -> Any:
         keys = KeyRing(database, afterwards)
         parsers = ParserPool(settings.parsers, Limits(settings.parser_memory_bytes))
         app.state.service = Service(
-            settings, database, publisher, watcher, QueueView(), keys, afterwards, parsers
+            settings,
+            database,
+            publisher,
+            watcher,
+            QueueView(),
+            keys,
+            afterwards,
+            parsers,
+            sending.policy,
         )
         app.state.health = Health(database, settings)
         afterwards.start()
         publisher.start()
         watcher.start()
-        policy = AddressPolicy(allow_private=settings.webhook_allow_private)
-        sender = WebhookSender(database, SenderSettings(policy))
+        sender = WebhookSender(database, sending)
         sender.start()
         upkeep = Upkeep(database, publisher, settings)
         upkeep.start()

@@ -118,6 +118,11 @@ class Settings(BaseSettings):
         default=False,
         description="For development: webhooks may go to private addresses, and by http to loopback.",
     )
+    webhook_dial_only: str = Field(
+        default="",
+        description="Hosts that webhooks may go to, as URLs name them, `host` or `host:port`, with commas "
+        "between; no other is looked up or connected to. Empty: any.",
+    )
 
     log_format: Literal["text", "json"] = Field(
         default="text", description="Lines for eyes, or one JSON object per line for machines."
@@ -184,13 +189,23 @@ class Settings(BaseSettings):
     @property
     def host_names(self) -> frozenset[str]:
         """Names that the operator allows in the Host header."""
-        names = (name.strip().lower() for name in self.allowed_hosts.split(","))
-        return frozenset(name for name in names if name)
+        return _listed(self.allowed_hosts)
+
+    @property
+    def webhook_hosts(self) -> frozenset[str]:
+        """Hosts that webhooks may go to; empty: any."""
+        return _listed(self.webhook_dial_only)
 
     @property
     def uses_sqlite(self) -> bool:
         """Whether the job store is an SQLite file."""
         return self.database_url.startswith("sqlite")
+
+
+def _listed(text: str) -> frozenset[str]:
+    """Names that stand in `text` with commas between."""
+    names = (name.strip().lower() for name in text.split(","))
+    return frozenset(name for name in names if name)
 
 
 def load_settings(**overrides: object) -> Settings:

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from tests import loopback_only
 from tests.compilation import compile_before
 from tests.live import LiveService
 
+loopback_only.stay_here()
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,6 +23,14 @@ def pytest_runtestloop(session: pytest.Session) -> None:
     if not session.config.option.collectonly:
         reporter = session.config.pluginmanager.get_plugin("terminalreporter")
         compile_before(session, print if reporter is None else reporter.write_line)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_leaves_this_machine() -> Iterator[None]:
+    """Fail the test in which, or before which, a thread wanted to talk to another machine."""
+    yield
+    seen, loopback_only.refused[:] = list(loopback_only.refused), []
+    assert not seen, f"tests talk to this machine alone: {seen}"
 
 
 @pytest.fixture(scope="session")

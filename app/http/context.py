@@ -19,6 +19,7 @@ from app.keys.keyring import KeyRing
 from app.keys.records import Quota, Scope
 from app.parsing.pool import ParserPool
 from app.settings import Settings
+from app.webhooks.addresses import AddressPolicy
 
 LOCAL_OWNER = "local"  # everyone, where no keys are demanded
 CALLER = "morphid.caller"  # where the gate leaves the caller in a request's scope
@@ -41,6 +42,7 @@ class Service:
     keys: KeyRing
     afterwards: Afterwards
     parsers: ParserPool
+    webhook_policy: AddressPolicy
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,22 @@ NEVER = tuple(
 
 
 class AddressRefused(Exception):
-    """The address is not one that webhooks are sent to; the message says why."""
+    """The address is not one that webhooks are sent to; the message says why.
+
+    Parameters
+    ----------
+    hint : str
+        What to do about it.
+    """
+
+    def __init__(
+        self, sentence: str, hint: str = "Give an https address that can be reached from the public internet."
+    ) -> None:
+        super().__init__(sentence, hint)
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 def is_public(address: Address) -> bool:
@@ -126,10 +141,13 @@ class AddressPolicy:
         For development on one machine: loopback and private networks too, and ``http`` to loopback.
     resolve : callable
         ``(host, port) -> addresses``; raises OSError for a name that is not known.
+    dial_only : frozenset of str
+        ``host`` or ``host:port``, as a URL names them: no other is looked up or connected to. Empty: any.
     """
 
     allow_private: bool = False
     resolve: Resolver = look_up
+    dial_only: frozenset[str] = frozenset()
 
     def check_url(self, url: str) -> SplitResult:
         """Check what can be seen without a look-up.
@@ -156,7 +174,16 @@ class AddressPolicy:
         if port is not None and port < LOWEST_PORT and port != (443 if parts.scheme == "https" else 80):
             raise AddressRefused(f"The port must be 443, or {LOWEST_PORT} and above.")
         self._check_host(host)
+        self._check_named(host, port or (443 if parts.scheme == "https" else 80))
         return parts
+
+    def _check_named(self, host: str, port: int) -> None:
+        name = f"[{host}]" if ":" in host else host
+        if self.dial_only and not self.dial_only & {name, f"{name}:{port}"}:
+            raise AddressRefused(
+                "This service sends webhooks to chosen hosts alone, and this is none of them.",
+                "Ask the operator to name the host in MORPHID_WEBHOOK_DIAL_ONLY.",
+            )
 
     def _check_host(self, host: str) -> None:
         try:

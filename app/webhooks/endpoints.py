@@ -23,7 +23,6 @@ from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
 from app.webhooks import repository, service
-from app.webhooks.addresses import AddressPolicy
 from app.webhooks.schemas import (
     EXAMPLE_WEBHOOK,
     Delivery,
@@ -52,7 +51,7 @@ def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) 
 
     Messages follow Standard Webhooks. Each end of a job is sent at least once, in no fixed order.
     """
-    service.check_address(AddressPolicy(allow_private=app.settings.webhook_allow_private), request.url)
+    service.check_address(app.webhook_policy, request.url)
     with app.database.write() as session:
         made = service.create(session, caller.owner, request)
         note(session, caller, Action.WEBHOOK_CREATE, made.id)

@@ -54,8 +54,7 @@ def check_address(policy: AddressPolicy, url: str) -> None:
     try:
         policy.check_now(url)
     except AddressRefused as error:
-        hint = "Give an https address that can be reached from the public internet."
-        raise InvalidRequest.of([Fault("address_refused", str(error), "/url", hint)]) from None
+        raise InvalidRequest.of([Fault("address_refused", str(error), "/url", error.hint)]) from None
 
 
 def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:

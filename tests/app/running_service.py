@@ -18,8 +18,11 @@ from app.jobs import store
 from app.jobs.records import Claim
 from app.main import create_app
 from app.settings import Settings
+from app.webhooks.sender import SenderSettings
+from tests.app.webhooks.receiver import TO_LOOPBACK
 
 DEAD_BROKER = "redis://127.0.0.1:1/0"  # nothing listens there: every test runs with the broker away
+TO_RECEIVERS_HERE = SenderSettings(TO_LOOPBACK)
 START_S = 20.0
 
 
@@ -51,11 +54,17 @@ class RunningService:
 
 
 @contextmanager
-def running_service(settings: Settings) -> Iterator[RunningService]:
-    """Serve until the block ends."""
-    config = guarded_config(
-        create_app(settings), settings, port=0, log_level="error", timeout_graceful_shutdown=2
-    )
+def running_service(
+    settings: Settings, sending: SenderSettings | None = TO_RECEIVERS_HERE
+) -> Iterator[RunningService]:
+    """Serve until the block ends.
+
+    Parameters
+    ----------
+    sending : how webhooks are sent; as the settings say when None.
+    """
+    app = create_app(settings, sending=sending)
+    config = guarded_config(app, settings, port=0, log_level="error", timeout_graceful_shutdown=2)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()

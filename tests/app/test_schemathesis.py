@@ -33,6 +33,7 @@ from app.settings import Settings
 from tests.app.request_documents import RESULT
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.app.tenants import Tenant, client_json, new_tenant, replenish, short_requests
+from tests.app.webhooks.receiver import NOBODY
 
 SEED = int(os.environ.get("MORPHID_FUZZ_SEED", "20260401"))
 QUICK, LONG = 6, 50  # examples of each kind for each operation
@@ -282,7 +283,7 @@ def spoil(examples: int, operations: list[Operation], ours: Tenant, theirs: Tena
     documents |= {f"/validate{path}": document for path, document in documents.items()}
     documents |= {
         "/trajectories": flight,
-        "/webhooks": {"url": "https://93.184.216.34/", "events": ["job.failed"]},
+        "/webhooks": {"url": NOBODY, "events": ["job.failed"]},
     }
     for path, document in documents.items():
         operation = by_path["POST", path]

@@ -1,6 +1,6 @@
 """Both pairs: SQLite and Postgres, the embedded broker and one behind a Redis URL.
 
-``MORPHID_TEST_DATABASE_URL`` and ``MORPHID_TEST_BROKER_URL`` put servers of the reader's own in the place of
+``MORPHID_TEST_DATABASE_URL`` and ``MORPHID_TEST_BROKER_URL`` put servers of this machine in the place of
 the second ones: a Postgres database whose user may create databases, and an empty Redis database.
 """
 

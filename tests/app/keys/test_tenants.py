@@ -24,6 +24,7 @@ from tests.app.request_documents import (
     study_document,
 )
 from tests.app.running_service import RunningService
+from tests.app.webhooks.receiver import NOBODY
 
 NOBODYS = {
     "job_id": "job_01k0c3v9fh8x2m4n6p8q0r2s4t",
@@ -64,7 +65,7 @@ def tenants(keyed_service: RunningService) -> Iterator[Tenants]:
             "job_id": job,
             "model_id": owner.get(f"/jobs/{job}").json()["model_id"],
             "trajectory_id": made(owner.post("/trajectories", json=flight)),
-            "webhook_id": made(owner.post("/webhooks", json={"url": "https://93.184.216.34/hook"})),
+            "webhook_id": made(owner.post("/webhooks", json={"url": NOBODY})),
         }
         yield Tenants(owner, stranger, things)
 

@@ -14,15 +14,13 @@ from app.database import Database
 from app.jobs import store
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import repository
-from app.webhooks.addresses import AddressPolicy
 from app.webhooks.posting import Patience
 from app.webhooks.schemas import EVERY_EVENT
 from app.webhooks.sender import SenderSettings, WebhookSender
 from app.webhooks.signature import new_secret
-from tests.app.webhooks.receiver import at_loopback
+from tests.app.webhooks.receiver import TO_LOOPBACK
 
 OWNER = "local"
-HERE = AddressPolicy(allow_private=True, resolve=at_loopback)
 
 
 @dataclass
@@ -81,7 +79,7 @@ def hook_row(database: Database, hook_id: str) -> Any:
 def sender(database: Database, **settings: Any) -> WebhookSender:
     """A sender to whom loopback is the internet."""
     chosen: dict[str, Any] = {
-        "policy": HERE,
+        "policy": TO_LOOPBACK,
         "patience": Patience(2.0, 2.0, 4.0),
         "poll_s": 0.02,
         "rng": Random(1),

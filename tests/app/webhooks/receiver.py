@@ -11,9 +11,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import trustme
 
+from app.webhooks.addresses import AddressPolicy
 from tests.waiting import until
 
 HOST = "hooks.example.test"  # what the certificate is made out to
+NOBODY = f"https://{HOST}:1024/hook"  # nothing listens there
 PLEASE_STOP_S = 5.0
 
 
@@ -129,3 +131,6 @@ class Authority:
 def at_loopback(_host: str, _port: int) -> list[str]:
     """Resolve every name to this machine."""
     return ["127.0.0.1"]
+
+
+TO_LOOPBACK = AddressPolicy(allow_private=True, resolve=at_loopback)  # as if loopback were the internet

@@ -14,13 +14,12 @@ from app.webhooks import deliveries as sql
 from app.webhooks.outbox import forget_before, new_delivery
 from app.webhooks.schemas import Message
 from tests.app.webhooks.hooks import OWNER, deliveries, ended_job, new_hook, new_job
-
-URL = "https://example.com/"
+from tests.app.webhooks.receiver import NOBODY
 
 
 def test_an_end_makes_one_delivery(database: Database) -> None:
     """Each way in which a worker ends a job is told once, in the documented form."""
-    hook_id = new_hook(database, URL)
+    hook_id = new_hook(database, NOBODY)
     error = {"code": "diverged", "detail": "x" * 9000, "hint": "h", "extra": [1]}
     result = {"model": {"links_per_wing": 3}, "fit": []}
     for status, end in (
@@ -42,7 +41,7 @@ def test_an_end_makes_one_delivery(database: Database) -> None:
 
 def test_ends_without_a_worker_are_told_too(database: Database) -> None:
     """A queued job that is cancelled, a job whose workers all died, one given back while it was cancelled."""
-    new_hook(database, URL)
+    new_hook(database, NOBODY)
     cancelled, lost, released = (new_job(database) for _ in range(3))
     with database.write() as session:
         store.request_cancel(session, OWNER, cancelled)
@@ -61,10 +60,10 @@ def test_ends_without_a_worker_are_told_too(database: Database) -> None:
 
 def test_only_who_asked_is_told(database: Database) -> None:
     """Other owners, other events and disabled webhooks get nothing; nor does any change but the end."""
-    new_hook(database, URL, owner="another")
-    new_hook(database, URL, events=["job.failed"])
-    disabled = new_hook(database, URL)
-    wanted = {new_hook(database, URL, events=["job.succeeded"]), new_hook(database, URL)}
+    new_hook(database, NOBODY, owner="another")
+    new_hook(database, NOBODY, events=["job.failed"])
+    disabled = new_hook(database, NOBODY)
+    wanted = {new_hook(database, NOBODY, events=["job.succeeded"]), new_hook(database, NOBODY)}
     with database.write() as session:
         sql.disable(session, disabled, "a test")
         claim = store.claim_job(
@@ -80,7 +79,7 @@ def test_only_who_asked_is_told(database: Database) -> None:
 
 def test_no_end_no_delivery(database: Database) -> None:
     """A transaction that is rolled back leaves neither; a stale worker's end tells nothing."""
-    new_hook(database, URL)
+    new_hook(database, NOBODY)
     job_id = new_job(database)
     with database.write() as session:
         claim = store.claim_job(session, job_id, "w")
@@ -98,7 +97,7 @@ def test_no_end_no_delivery(database: Database) -> None:
 
 def test_two_deliveries_of_one_end_cannot_be(database: Database) -> None:
     """The table itself refuses a second delivery of a job to a webhook; tests may be many."""
-    hook_id = new_hook(database, URL)
+    hook_id = new_hook(database, NOBODY)
     with database.write() as session:
         for _ in range(2):
             session.execute(insert(webhook_deliveries).values(new_delivery(hook_id, "webhook.test", {})))
@@ -113,7 +112,7 @@ def test_two_deliveries_of_one_end_cannot_be(database: Database) -> None:
 
 def test_old_deliveries_are_forgotten(database: Database) -> None:
     """Retention takes what ended before its time, and never what still waits."""
-    hook_id = new_hook(database, URL)
+    hook_id = new_hook(database, NOBODY)
     old, young, waiting = (ended_job(database) for _ in range(3))
     with database.write() as session:
         for job_id, finished_at in ((old, 1000.0), (young, 3000.0)):

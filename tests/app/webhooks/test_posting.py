@@ -14,9 +14,8 @@ from standardwebhooks import Webhook, WebhookVerificationError
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Patience, Poster
 from app.webhooks.signature import new_secret, signed_headers
-from tests.app.webhooks.receiver import HOST, Authority, Receiver, at_loopback, receiver, status
+from tests.app.webhooks.receiver import HOST, TO_LOOPBACK, Authority, Receiver, at_loopback, receiver, status
 
-HERE = AddressPolicy(allow_private=True, resolve=at_loopback)  # as if loopback were the internet
 BODY = b'{"type":"webhook.test"}'
 
 
@@ -34,7 +33,10 @@ def server(authority: Authority) -> Iterator[Receiver]:
 
 
 def post(
-    url: str, authority: Authority | None, policy: AddressPolicy = HERE, patience: Patience | None = None
+    url: str,
+    authority: Authority | None,
+    policy: AddressPolicy = TO_LOOPBACK,
+    patience: Patience | None = None,
 ) -> Answer:
     """Post once, believing `authority` or the usual ones."""
 
