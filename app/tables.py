@@ -264,9 +264,14 @@ webhooks = Table(
     Column("id", String(64), primary_key=True),
     Column("owner", String(64), nullable=False),
     Column("url", String(2000), nullable=False),
+    Column("destination", String(300), nullable=False, server_default=""),  # scheme, host and port of the url
     Column("events", JSON, nullable=False),  # event types that are sent
     Column("secret", String(128), nullable=False),  # signing needs it in clear; shown once, when it is made
-    Column("failures", Integer, nullable=False),  # deliveries that were given up, one after the other
+    Column("failures", Integer, nullable=False),  # tries that failed, one after the other
+    # of the destination, and so the same in every row of one owner's webhooks to it
+    Column("sending_until", Double, nullable=False, server_default=ZERO),  # lease of the try under way
+    Column("paused_until", Double, nullable=False, server_default=ZERO),  # after a failure
+    Column("verified_at", Double),  # when the receiver answered the challenge; None: nothing else is sent
     Column("disabled_at", Double),
     Column("disabled_reason", String(200)),
     Column("created_at", Double, nullable=False),

@@ -38,8 +38,6 @@ class SenderSettings:
         Time between two looks at the table, s.
     most_at_once, most_per_owner : int
         Deliveries under way, in all and of one owner.
-    disable_after : int
-        Given-up deliveries in a row that disable a webhook.
     """
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
@@ -48,7 +46,6 @@ class SenderSettings:
     poll_s: float = 1.0
     most_at_once: int = 16
     most_per_owner: int = 4
-    disable_after: int = 5
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
@@ -157,7 +154,7 @@ class WebhookSender:
         body = json_bytes(dispatch.payload)
         headers = signed_headers(dispatch.secret, dispatch.id, dispatch.at, body)
         try:
-            answer = await poster.post(dispatch.url, headers, body)
+            answer = await poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
             status = await asyncio.to_thread(self._settle, dispatch, answer)
         except SQLAlchemyError as error:
             # the claim's lease ends, and the delivery is sent again under the same id
@@ -172,7 +169,6 @@ class WebhookSender:
                 dispatch,
                 answer,
                 rng=self._settings.rng,
-                disable_after=self._settings.disable_after,
                 clock=self._settings.clock,
             )
 

@@ -14,7 +14,7 @@ import pytest
 from app.database import Database
 from app.webhooks import deliveries as sql
 from app.webhooks.deliveries import LEASE_S, MAX_CLAIMS
-from app.webhooks.repository import delete_webhook, enable_webhook
+from app.webhooks.repository import delete_webhook
 from app.webhooks.retries import DELAYS_S, JITTER, MAX_TRIES
 from tests.app.webhooks.hooks import (
     OWNER,
@@ -63,7 +63,7 @@ def test_a_delivery_is_sent_once(database: Database, there: Receiver) -> None:
 
 
 def test_failures_are_tried_again_on_schedule(database: Database, there: Receiver) -> None:
-    """Each failure waits for its delay, keeps the id and the body, and the last gives up."""
+    """Each failure waits for its delay, keeps the id and the body; the last gives up and disables."""
     there.answer = answer_with(500)  # type: ignore[assignment]
     clock = HandClock()
     hook_id = new_hook(database, there.url())
@@ -82,7 +82,9 @@ def test_failures_are_tried_again_on_schedule(database: Database, there: Receive
     assert len({(item.headers["webhook-id"], item.body) for item in there.received}) == 1
     times = [int(item.headers["webhook-timestamp"]) for item in there.received]
     assert times == sorted(set(times))  # each try is signed for its own time
-    assert hook_row(database, hook_id).failures == 1
+    hook = hook_row(database, hook_id)
+    assert (hook.failures, hook.disabled_at) == (MAX_TRIES, pytest.approx(clock.now))
+    assert f"{MAX_TRIES} tries in a row failed" in hook.disabled_reason
     clock.turn(1e6)
     assert send_due(database, clock=clock) == 0
 
@@ -115,41 +117,6 @@ def test_gone_disables_at_once(database: Database, there: Receiver) -> None:
     row = hook_row(database, hook_id)
     assert row.disabled_at is not None
     assert "410" in row.disabled_reason
-
-
-@on_sqlite
-def test_repeated_failure_disables_and_enabling_forgives(database: Database) -> None:
-    """After so many given-up deliveries in a row the webhook is disabled; enabled, it starts anew."""
-    clock = HandClock()
-    hook_id = new_hook(database, UNREACHABLE)
-    for _ in range(2):
-        ended_job(database)
-    for _ in range(MAX_TRIES):
-        clock.turn(8 * 3600.0)
-        assert send_due(database, clock=clock, disable_after=2) == 2
-    row = hook_row(database, hook_id)
-    assert (row.failures, row.disabled_at) == (2, pytest.approx(clock.now))
-    assert "2 deliveries in a row" in row.disabled_reason
-    with database.write() as session:
-        shown = enable_webhook(session, OWNER, hook_id)
-    assert (shown.failures, shown.disabled_at, shown.disabled_reason) == (0, None, None)
-    ended_job(database)
-    assert len(deliveries(database, status="waiting")) == 1
-
-
-@on_sqlite
-def test_a_success_ends_the_row_of_failures(database: Database, there: Receiver) -> None:
-    """Given-up deliveries count only while none succeeds between them."""
-    clock = HandClock()
-    hook_id = new_hook(database, there.url())
-    for code in (500, 204, 500):
-        there.answer = answer_with(code)  # type: ignore[assignment]
-        ended_job(database)
-        for _ in range(MAX_TRIES):
-            clock.turn(8 * 3600.0)
-            send_due(database, clock=clock, disable_after=2)
-    row = hook_row(database, hook_id)
-    assert (row.failures, row.disabled_at) == (1, None)
 
 
 def test_two_senders_share_one_table(database: Database, there: Receiver) -> None:
@@ -209,7 +176,7 @@ def test_late_news_change_nothing(database: Database) -> None:
     late, current = claims
     settings = sender(database)._settings
     with database.write() as session:
-        options = {"rng": settings.rng, "disable_after": 1, "clock": clock}
+        options = {"rng": settings.rng, "clock": clock}
         assert sql.settle(session, late, sql.Answer(410, "Gone."), **options) is None
         assert sql.settle(session, current, sql.Answer(204), **options) == "delivered"
 
@@ -247,7 +214,7 @@ def test_a_slow_receiver_does_not_hold_up_other_owners(database: Database, there
         running = sender(database, most_at_once=6, most_per_owner=3)
         running.start()
         there.wait_for(1)
-        assert len(stuck.received) <= 3
+        assert len(stuck.received) == 1
         hold.set()
         running.stop()
 
