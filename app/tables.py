@@ -296,6 +296,7 @@ webhook_deliveries = Table(
     Column("finished_at", Double),
     Index("ix_webhook_deliveries_status_next_at", "status", "next_at"),
     Index("ix_webhook_deliveries_webhook_id_id", "webhook_id", "id"),
+    Index("ix_webhook_deliveries_webhook_id_status_next_at_id", "webhook_id", "status", "next_at", "id"),
     Index("ix_webhook_deliveries_status_finished_at", "status", "finished_at"),  # retention
     UniqueConstraint("webhook_id", "job_id"),  # a job ends once: one delivery of it per webhook
 )

@@ -10,12 +10,13 @@ nothing but a success. Locks are taken in one order, the webhooks of a destinati
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from random import Random
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, func, select, update
+from sqlalchemy import ColumnElement, Row, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
@@ -75,7 +76,11 @@ class Dispatch:
 
 
 def due(
-    session: Session, limit: int, per_owner: int, busy: Collection[str] = (), clock: Clock = database_time
+    session: Session,
+    limit: int,
+    per_owner: int,
+    under_way: Mapping[str, int] | None = None,
+    clock: Clock = database_time,
 ) -> list[Due]:
     """Deliveries whose time has come, the longest waiting of each free destination.
 
@@ -83,31 +88,34 @@ def due(
     ----------
     per_owner : int
         At most so many of one owner: many slow receivers do not hold up the others.
-    busy
-        Owners who have as many under way as they may.
+    under_way
+        Number of deliveries that are of those already, by owner.
     """
     table, now = webhook_deliveries, clock()
-    order = (table.c.next_at, table.c.id)
-    rank = func.row_number().over(partition_by=(webhooks.c.owner, webhooks.c.destination), order_by=order)
-    waiting = (
-        select(table.c.id, table.c.fence, table.c.next_at, webhooks.c.owner, webhooks.c.destination)
-        .add_columns(rank.label("rank"))
-        .join(webhooks, webhooks.c.id == table.c.webhook_id)
+    its_time = (table.c.status == WAITING, table.c.next_at <= now)
+    # one step down an index for each webhook, however much waits for it, and one in all when nothing does
+    first = select(table.c.id).where(table.c.webhook_id == webhooks.c.id, *its_time)
+    first = first.order_by(table.c.next_at, table.c.id).limit(1).correlate(webhooks)
+    free = (
+        select(webhooks.c.owner, webhooks.c.destination, first.scalar_subquery().label("first"))
         .where(
-            table.c.status == WAITING,
-            table.c.next_at <= now,
             webhooks.c.sending_until <= now,
             webhooks.c.paused_until <= now,
-            webhooks.c.owner.not_in(busy),
+            select(table.c.id).where(*its_time).exists(),
         )
         .subquery()
     )
-    place = func.row_number().over(partition_by=waiting.c.owner, order_by=(waiting.c.next_at, waiting.c.id))
-    firsts = select(waiting, place.label("place")).where(waiting.c.rank == 1).subquery()
     rows = session.execute(
-        select(firsts).where(firsts.c.place <= per_owner).order_by(firsts.c.next_at, firsts.c.id).limit(limit)
+        select(table.c.id, table.c.fence, free.c.owner, free.c.destination)
+        .join(free, free.c.first == table.c.id)
+        .order_by(table.c.next_at, table.c.id)
     )
-    return [Due(row.id, row.fence, row.owner, row.destination) for row in rows]
+    owners, chosen = Counter(under_way), dict[tuple[str, str], Due]()
+    for row in rows:
+        if (row.owner, row.destination) not in chosen and owners[row.owner] < per_owner:
+            owners[row.owner] += 1
+            chosen[row.owner, row.destination] = Due(*row)
+    return list(chosen.values())[:limit]
 
 
 def claim(

@@ -137,18 +137,12 @@ class WebhookSender:
     def _take(self, room: int, under_way: Counter[str]) -> list[Dispatch]:
         """Look, and only when there is something to send, write."""
         chosen = self._settings
-        busy = [owner for owner, count in under_way.items() if count >= chosen.most_per_owner]
         with self._database.read() as session:
-            found = deliveries.due(session, room, chosen.most_per_owner, busy, chosen.clock)
-        mine = []
-        for item in found:
-            if under_way[item.owner] < chosen.most_per_owner:
-                under_way[item.owner] += 1
-                mine.append(item)
-        if not mine:
+            found = deliveries.due(session, room, chosen.most_per_owner, under_way, chosen.clock)
+        if not found:
             return []
         with self._database.write() as session:
-            return deliveries.claim(session, mine, chosen.lease_s, chosen.clock)
+            return deliveries.claim(session, found, chosen.lease_s, chosen.clock)
 
     async def _deliver(self, poster: Poster, dispatch: Dispatch) -> None:
         body = json_bytes(dispatch.payload)

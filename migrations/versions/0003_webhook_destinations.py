@@ -12,6 +12,8 @@ down_revision = "0002"
 branch_labels = None
 depends_on = None
 
+INDEX = "ix_webhook_deliveries_webhook_id_status_next_at_id"
+
 
 def upgrade() -> None:
     """Apply; webhooks that are there already have shown that somebody wants their messages."""
@@ -20,6 +22,7 @@ def upgrade() -> None:
         column = sa.Column(name, sa.Double(), nullable=False, server_default=sa.text("0"))
         op.add_column("webhooks", column)
     op.add_column("webhooks", sa.Column("verified_at", sa.Double()))
+    op.create_index(INDEX, "webhook_deliveries", ["webhook_id", "status", "next_at", "id"])
     webhooks = sa.table(
         "webhooks", *(sa.column(name) for name in ("id", "url", "destination", "verified_at", "created_at"))
     )
@@ -38,5 +41,6 @@ def _destination(url: str) -> str:
 
 def downgrade() -> None:
     """Undo."""
+    op.drop_index(INDEX, table_name="webhook_deliveries")
     for name in ("verified_at", "paused_until", "sending_until", "destination"):
         op.drop_column("webhooks", name)

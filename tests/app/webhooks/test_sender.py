@@ -146,17 +146,17 @@ def test_a_claim_is_one_senders(database: Database) -> None:
     ended_job(database)
     clock.turn(60.0)
     with database.read() as session:
-        seen = sql.due(session, 10, 4, (), clock)
+        seen = sql.due(session, 10, 4, {}, clock)
     with database.write() as session:
         (crashed,) = sql.claim(session, seen, LEASE_S, clock)
     with database.write() as session:
         assert sql.claim(session, seen, LEASE_S, clock) == []
     clock.turn(LEASE_S - 1.0)
     with database.read() as session:
-        assert sql.due(session, 10, 4, (), clock) == []
+        assert sql.due(session, 10, 4, {}, clock) == []
     clock.turn(2.0)
     with database.read() as session:
-        again = sql.due(session, 10, 4, (), clock)
+        again = sql.due(session, 10, 4, {}, clock)
     with database.write() as session:
         (second,) = sql.claim(session, again, LEASE_S, clock)
     assert (second.id, second.tries, second.fence) == (crashed.id, 2, 2)
@@ -171,7 +171,7 @@ def test_late_news_change_nothing(database: Database) -> None:
     claims = []
     for _ in range(2):
         with database.write() as session:
-            claims += sql.claim(session, sql.due(session, 10, 4, (), clock), LEASE_S, clock)
+            claims += sql.claim(session, sql.due(session, 10, 4, {}, clock), LEASE_S, clock)
         clock.turn(LEASE_S + 1.0)
     late, current = claims
     settings = sender(database)._settings
@@ -191,7 +191,7 @@ def test_a_delivery_that_kills_its_senders_ends(database: Database) -> None:
     for _ in range(MAX_CLAIMS + 3):
         clock.turn(LEASE_S + 1.0)
         with database.write() as session:
-            claims += len(sql.claim(session, sql.due(session, 10, 4, (), clock), LEASE_S, clock))
+            claims += len(sql.claim(session, sql.due(session, 10, 4, {}, clock), LEASE_S, clock))
     assert claims == MAX_CLAIMS
     assert [row.status for row in deliveries(database)] == ["given_up"]
 
