@@ -227,6 +227,20 @@ class WebhookDisabled(Conflict):
         )
 
 
+class WebhookPending(Conflict):
+    """A webhook whose receiver has not answered the challenge is sent nothing else."""
+
+    code = "webhook_pending"
+    title = "The webhook is pending"
+
+    def __init__(self, webhook_id: str) -> None:
+        super().__init__(
+            f"The receiver of webhook {webhook_id} has not answered the challenge yet.",
+            "#path/webhook_id",
+            "Have it answer with the challenge; POST /webhooks/{id}/enable sends another.",
+        )
+
+
 class Unauthorized(ServiceError):
     """No key, or one that does not open: unknown, expired and revoked keys are all told the same."""
 

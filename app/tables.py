@@ -264,9 +264,14 @@ webhooks = Table(
     Column("id", String(64), primary_key=True),
     Column("owner", String(64), nullable=False),
     Column("url", String(2000), nullable=False),
+    Column("destination", String(300), nullable=False, server_default=""),  # scheme, host and port of the url
     Column("events", JSON, nullable=False),  # event types that are sent
     Column("secret", String(128), nullable=False),  # signing needs it in clear; shown once, when it is made
-    Column("failures", Integer, nullable=False),  # deliveries that were given up, one after the other
+    Column("failures", Integer, nullable=False),  # tries that failed, one after the other
+    # of the destination, and so the same in every row of one owner's webhooks to it
+    Column("sending_until", Double, nullable=False, server_default=ZERO),  # lease of the try under way
+    Column("paused_until", Double, nullable=False, server_default=ZERO),  # after a failure
+    Column("verified_at", Double),  # when the receiver answered the challenge; None: nothing else is sent
     Column("disabled_at", Double),
     Column("disabled_reason", String(200)),
     Column("created_at", Double, nullable=False),
@@ -291,6 +296,7 @@ webhook_deliveries = Table(
     Column("finished_at", Double),
     Index("ix_webhook_deliveries_status_next_at", "status", "next_at"),
     Index("ix_webhook_deliveries_webhook_id_id", "webhook_id", "id"),
+    Index("ix_webhook_deliveries_webhook_id_status_next_at_id", "webhook_id", "status", "next_at", "id"),
     Index("ix_webhook_deliveries_status_finished_at", "status", "finished_at"),  # retention
     UniqueConstraint("webhook_id", "job_id"),  # a job ends once: one delivery of it per webhook
 )

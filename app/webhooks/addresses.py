@@ -116,6 +116,13 @@ def _in_own_thread(resolve: Resolver, host: str, port: int) -> Future[list[str]]
     return future
 
 
+def destination_of(url: str) -> str:
+    """Scheme, host and port of a URL that was checked: what is reached or not, whatever the path."""
+    parts = urlsplit(url)
+    port = parts.port or (443 if parts.scheme == "https" else 80)
+    return f"{parts.scheme}://{(parts.hostname or '').rstrip('.')}:{port}"
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """An address that may be connected to.

@@ -1,22 +1,27 @@
 """SQL of the sender: claims with a fence and a lease, and what became of a try.
 
+A claim takes a delivery and, with it, its destination: scheme, host and port, of one owner. There is one try
+under way for each, and after a failure it is left alone for a while, whatever else waits for it. Another
+owner's deliveries to the same place go their own way: nobody can silence another's receiver.
+
 Any number of senders may share the table: a claim is a compare-and-set on the fence, and a stale claim writes
-nothing but a success. Locks are taken in one order, the webhook before its deliveries.
+nothing but a success. Locks are taken in one order, the webhooks of a destination before their deliveries.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from random import Random
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, func, select, update
+from sqlalchemy import ColumnElement, Row, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
 from app.tables import webhook_deliveries, webhooks
-from app.webhooks.outbox import DELIVERED, GIVEN_UP, WAITING
+from app.webhooks.outbox import CHALLENGE_EVENT, DELIVERED, GIVEN_UP, WAITING
 from app.webhooks.posting import Answer
 from app.webhooks.retries import MAX_TRIES, next_delay_s
 
@@ -37,6 +42,7 @@ class Due:
     id: str
     fence: int
     owner: str
+    destination: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,7 @@ class Dispatch:
     id: str
     webhook_id: str
     owner: str
+    destination: str
     url: str
     secret: str
     payload: Document
@@ -61,140 +68,165 @@ class Dispatch:
     fence: int
     at: float
 
+    @property
+    def challenge(self) -> str | None:
+        """What the receiver must answer with; None where any 2xx will do."""
+        asked = self.payload["type"] == CHALLENGE_EVENT
+        return str(self.payload["data"]["challenge"]) if asked else None
+
 
 def due(
-    session: Session, limit: int, per_owner: int, busy: Collection[str] = (), clock: Clock = database_time
+    session: Session,
+    limit: int,
+    per_owner: int,
+    under_way: Mapping[str, int] | None = None,
+    clock: Clock = database_time,
 ) -> list[Due]:
-    """Deliveries whose time has come, the longest waiting first.
+    """Deliveries whose time has come, the longest waiting of each free destination.
 
     Parameters
     ----------
     per_owner : int
-        At most so many of one owner: thousands that wait for a slow receiver do not hold up the others.
-    busy
-        Owners who have as many under way as they may.
+        At most so many of one owner: many slow receivers do not hold up the others.
+    under_way
+        Number of deliveries that are of those already, by owner.
     """
-    table = webhook_deliveries
-    rank = func.row_number().over(partition_by=webhooks.c.owner, order_by=(table.c.next_at, table.c.id))
-    waiting = (
-        select(table.c.id, table.c.fence, table.c.next_at, webhooks.c.owner, rank.label("rank"))
-        .join(webhooks, webhooks.c.id == table.c.webhook_id)
-        .where(table.c.status == WAITING, table.c.next_at <= clock(), webhooks.c.owner.not_in(busy))
+    table, now = webhook_deliveries, clock()
+    its_time = (table.c.status == WAITING, table.c.next_at <= now)
+    # one step down an index for each webhook, however much waits for it, and one in all when nothing does
+    first = select(table.c.id).where(table.c.webhook_id == webhooks.c.id, *its_time)
+    first = first.order_by(table.c.next_at, table.c.id).limit(1).correlate(webhooks)
+    free = (
+        select(webhooks.c.owner, webhooks.c.destination, first.scalar_subquery().label("first"))
+        .where(
+            webhooks.c.sending_until <= now,
+            webhooks.c.paused_until <= now,
+            select(table.c.id).where(*its_time).exists(),
+        )
         .subquery()
     )
     rows = session.execute(
-        select(waiting.c.id, waiting.c.fence, waiting.c.owner)
-        .where(waiting.c.rank <= per_owner)
-        .order_by(waiting.c.next_at, waiting.c.id)
-        .limit(limit)
+        select(table.c.id, table.c.fence, free.c.owner, free.c.destination)
+        .join(free, free.c.first == table.c.id)
+        .order_by(table.c.next_at, table.c.id)
     )
-    return [Due(row.id, row.fence, row.owner) for row in rows]
+    owners, chosen = Counter(under_way), dict[tuple[str, str], Due]()
+    for row in rows:
+        if (row.owner, row.destination) not in chosen and owners[row.owner] < per_owner:
+            owners[row.owner] += 1
+            chosen[row.owner, row.destination] = Due(*row)
+    return list(chosen.values())[:limit]
 
 
 def claim(
     session: Session, chosen: Collection[Due], lease_s: float = LEASE_S, clock: Clock = database_time
 ) -> list[Dispatch]:
-    """Take those of the chosen deliveries that no other sender has taken since."""
-    taken = []
+    """Take those of the chosen deliveries that no other sender has taken since, and their destinations."""
     # in one order for all senders: none waits for another in a ring
-    for seen in sorted(chosen, key=lambda item: item.id):
-        row = session.execute(
-            update(webhook_deliveries)
-            .where(
-                webhook_deliveries.c.id == seen.id,
-                webhook_deliveries.c.fence == seen.fence,
-                webhook_deliveries.c.status == WAITING,
-            )
-            .values(
-                fence=seen.fence + 1,
-                attempt=webhook_deliveries.c.attempt + 1,
-                next_at=clock() + lease_s,
-            )
-            .returning(
-                webhook_deliveries.c.webhook_id,
-                webhook_deliveries.c.payload,
-                webhook_deliveries.c.attempt,
-                clock().label("at"),
-            )
-        ).one_or_none()
-        if row is None:
-            continue
-        hook = session.execute(
-            select(webhooks.c.url, webhooks.c.secret, webhooks.c.disabled_at).where(
-                webhooks.c.id == row.webhook_id
-            )
-        ).one()
-        if hook.disabled_at is not None:  # its job ended in the moment in which the webhook was disabled
-            _give_up(session, webhook_deliveries.c.id == seen.id, DISABLED, clock)
-            continue
-        if row.attempt > MAX_CLAIMS:
-            _give_up(session, webhook_deliveries.c.id == seen.id, NEVER_SETTLED, clock)
-            continue
-        taken.append(
-            Dispatch(
-                id=seen.id,
-                webhook_id=row.webhook_id,
-                owner=seen.owner,
-                url=hook.url,
-                secret=hook.secret,
-                payload=row.payload,
-                tries=row.attempt,
-                fence=seen.fence + 1,
-                at=row.at,
-            )
+    inorder = sorted(chosen, key=lambda item: (item.owner, item.destination))
+    return [taken for seen in inorder if (taken := _claim(session, seen, lease_s, clock)) is not None]
+
+
+def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatch | None:
+    hooks = _locked(session, seen.owner, seen.destination)
+    now = float(session.scalar(select(clock())) or 0.0)
+    if any(now < hook.sending_until or now < hook.paused_until for hook in hooks.values()):
+        return None
+    row = session.execute(
+        update(webhook_deliveries)
+        .where(
+            webhook_deliveries.c.id == seen.id,
+            webhook_deliveries.c.fence == seen.fence,
+            webhook_deliveries.c.status == WAITING,
         )
-    return taken
+        .values(
+            fence=seen.fence + 1,
+            attempt=webhook_deliveries.c.attempt + 1,
+            next_at=now + lease_s,
+        )
+        .returning(
+            webhook_deliveries.c.webhook_id,
+            webhook_deliveries.c.type,
+            webhook_deliveries.c.payload,
+            webhook_deliveries.c.attempt,
+        )
+    ).one_or_none()
+    if row is None:
+        return None
+    hook = hooks[row.webhook_id]
+    closed = hook.disabled_at is not None or (hook.verified_at is None and row.type != CHALLENGE_EVENT)
+    if closed or row.attempt > MAX_CLAIMS:
+        # closed: its job ended in the moment in which the webhook was disabled
+        _give_up(session, webhook_deliveries.c.id == seen.id, DISABLED if closed else NEVER_SETTLED, clock)
+        return None
+    _set_hooks(session, hooks, sending_until=now + lease_s)
+    return Dispatch(
+        id=seen.id,
+        webhook_id=row.webhook_id,
+        owner=seen.owner,
+        destination=seen.destination,
+        url=hook.url,
+        secret=hook.secret,
+        payload=row.payload,
+        tries=row.attempt,
+        fence=seen.fence + 1,
+        at=now,
+    )
 
 
 def settle(
-    session: Session,
-    dispatch: Dispatch,
-    answer: Answer,
-    *,
-    rng: Random,
-    disable_after: int,
-    clock: Clock = database_time,
+    session: Session, dispatch: Dispatch, answer: Answer, *, rng: Random, clock: Clock = database_time
 ) -> str | None:
-    """Write what became of a try: delivered, to be tried again, or given up.
-
-    Parameters
-    ----------
-    disable_after : int
-        The webhook is disabled when so many deliveries in a row were given up.
+    """Write what became of a try: delivered, to be tried again, or given up; and free the destination.
 
     Returns
     -------
     str or None
         The delivery's status now; None when the claim is stale, and nothing was written.
     """
-    hook = session.execute(
-        select(webhooks.c.failures, webhooks.c.disabled_at)
-        .where(webhooks.c.id == dispatch.webhook_id)
-        .with_for_update(key_share=True)  # jobs that end at this moment need not wait
-    ).one_or_none()
-    if hook is None:
-        return None  # deleted, and its deliveries with it
-    if answer.delivered:
-        written = _write(session, dispatch, answer, DELIVERED, None, clock)
-        if written and hook.failures:
-            _set_hook(session, dispatch.webhook_id, failures=0)
-        return DELIVERED if written else None
-    delay_s = None if answer.gone else next_delay_s(dispatch.tries, answer.retry_after_s, rng)
-    if delay_s is not None:
-        return WAITING if _write(session, dispatch, answer, WAITING, clock() + delay_s, clock) else None
-    if not _write(session, dispatch, answer, GIVEN_UP, None, clock):
+    hooks = _locked(session, dispatch.owner, dispatch.destination)
+    hook = hooks.get(dispatch.webhook_id)
+    if hook is None:  # deleted, and its deliveries with it
+        _set_hooks(session, hooks, sending_until=0.0)
         return None
-    _count_failure(session, dispatch.webhook_id, hook, answer, disable_after, clock)
-    return GIVEN_UP
+    if answer.delivered:
+        if not _write(session, dispatch, answer, DELIVERED, None, clock):
+            return None
+        _set_hooks(session, hooks, sending_until=0.0, paused_until=0.0)
+        verified = {} if dispatch.challenge is None else {"verified_at": clock()}
+        _set_hooks(session, [hook.id], failures=0, **verified)
+        return DELIVERED
+    delay_s = None if answer.gone else next_delay_s(dispatch.tries, answer.retry_after_s, rng)
+    status, next_at = (GIVEN_UP, None) if delay_s is None else (WAITING, clock() + delay_s)
+    if not _write(session, dispatch, answer, status, next_at, clock):
+        return None
+    pause_s = None if answer.gone else next_delay_s(hook.failures + 1, answer.retry_after_s, rng)
+    _set_hooks(session, hooks, sending_until=0.0, paused_until=clock() + (pause_s or 0.0))
+    _count_failure(session, hooks, hook, answer, clock)
+    return status
+
+
+def _locked(session: Session, owner: str, destination: str) -> dict[str, Row[Any, Any]]:
+    """An owner's webhooks to a destination, by id, locked but for jobs that end at this moment."""
+    rows = session.execute(
+        select(webhooks)
+        .where(webhooks.c.owner == owner, webhooks.c.destination == destination)
+        .order_by(webhooks.c.id)
+        .with_for_update(key_share=True)
+    )
+    return {row.id: row for row in rows}
 
 
 def release(session: Session, dispatch: Dispatch, clock: Clock = database_time) -> None:
     """Give a claim back: the sender stops before it knows the answer. The try is not counted."""
-    session.execute(
+    hooks = _locked(session, dispatch.owner, dispatch.destination)
+    given_back = session.execute(
         update(webhook_deliveries)
         .where(*_held(dispatch), webhook_deliveries.c.status == WAITING)
         .values(next_at=clock(), attempt=webhook_deliveries.c.attempt - 1)
     )
+    if given_back.rowcount:
+        _set_hooks(session, hooks, sending_until=0.0)
 
 
 def _held(dispatch: Dispatch) -> tuple[ColumnElement[bool], ...]:
@@ -226,33 +258,47 @@ def _write(
 
 
 def _count_failure(
-    session: Session,
-    webhook_id: str,
-    hook: Row[Any, Any],
-    answer: Answer,
-    disable_after: int,
-    clock: Clock,
+    session: Session, hooks: dict[str, Row[Any, Any]], tried: Row[Any, Any], answer: Answer, clock: Clock
 ) -> None:
-    failures = hook.failures + 1
-    _set_hook(session, webhook_id, failures=failures)
-    if hook.disabled_at is not None:
-        return
-    if answer.gone:
-        disable(session, webhook_id, GONE_REASON, clock)
-    elif failures >= disable_after:
-        reason = f"{failures} deliveries in a row were given up; the last: {answer.error}"
-        disable(session, webhook_id, reason, clock)
+    """Count a failed try, and disable whose count is full.
+
+    An answer is one webhook's own. Where there was none, the destination failed, and with it every webhook
+    that has something to send there: a dead host with twenty webhooks is tried no oftener than with one.
+    """
+    failed = {tried.id}
+    if answer.status is None:
+        failed |= set(
+            session.scalars(
+                select(webhook_deliveries.c.webhook_id)
+                .distinct()
+                .where(webhook_deliveries.c.webhook_id.in_(hooks), webhook_deliveries.c.status == WAITING)
+            )
+        )
+    _set_hooks(session, failed, failures=webhooks.c.failures + 1)
+    for hook in (hooks[name] for name in sorted(failed)):
+        if hook.disabled_at is not None:
+            continue
+        if answer.gone:
+            disable(session, hook.id, GONE_REASON, clock)
+        elif hook.failures + 1 >= MAX_TRIES:
+            reason = f"{hook.failures + 1} tries in a row failed; the last: {answer.error}"
+            disable(session, hook.id, reason, clock)
 
 
 def disable(session: Session, webhook_id: str, reason: str, clock: Clock = database_time) -> None:
     """Send nothing more to a webhook; what waits for it is given up."""
-    _set_hook(session, webhook_id, disabled_at=clock(), disabled_reason=reason[:200])
+    _set_hooks(session, [webhook_id], disabled_at=clock(), disabled_reason=reason[:200])
+    give_up_waiting(session, webhook_id, DISABLED, clock)
+
+
+def give_up_waiting(session: Session, webhook_id: str, why: str, clock: Clock = database_time) -> None:
+    """Give up what waits for a webhook."""
     lock_waiting(session, webhook_id)
-    _give_up(session, webhook_deliveries.c.webhook_id == webhook_id, DISABLED, clock)
+    _give_up(session, webhook_deliveries.c.webhook_id == webhook_id, why, clock)
 
 
-def _set_hook(session: Session, webhook_id: str, **values: object) -> None:
-    session.execute(update(webhooks).where(webhooks.c.id == webhook_id).values(**values))
+def _set_hooks(session: Session, ids: Iterable[str], **values: object) -> None:
+    session.execute(update(webhooks).where(webhooks.c.id.in_(list(ids))).values(**values))
 
 
 def lock_waiting(session: Session, webhook_id: str) -> list[str]:

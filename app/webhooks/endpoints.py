@@ -16,6 +16,7 @@ from app.errors import (
     UnsupportedMediaType,
     WebhookDisabled,
     WebhookNotFound,
+    WebhookPending,
 )
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.json_body import JsonRoute
@@ -25,6 +26,8 @@ from app.keys.records import Scope
 from app.webhooks import repository, service
 from app.webhooks.schemas import (
     EXAMPLE_WEBHOOK,
+    Challenge,
+    ChallengeAnswer,
     Delivery,
     DeliveryPage,
     Message,
@@ -49,6 +52,7 @@ WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
 def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) -> NewWebhook:
     """Register an address; the answer holds the secret that signs every message, this once.
 
+    The webhook is `pending` until its receiver has answered the `webhook.challenge` that it is sent at once.
     Messages follow Standard Webhooks. Each end of a job is sent at least once, in no fixed order.
     """
     service.check_address(app.webhook_policy, request.url)
@@ -98,7 +102,10 @@ def delete_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) ->
     responses=documented(InvalidRequest, WebhookNotFound),
 )
 def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> Webhook:
-    """Send to a webhook again that was disabled. Jobs that ended meanwhile are not told: list them."""
+    """Challenge the receiver of a disabled or pending webhook anew; with its answer the webhook is enabled.
+
+    Jobs that ended meanwhile are not told: list them.
+    """
     with app.database.write() as session:
         enabled = service.enable(session, caller.owner, webhook_id)
         note(session, caller, Action.WEBHOOK_UPDATE, webhook_id)
@@ -110,7 +117,7 @@ def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) ->
     operation_id="test_webhook",
     summary="Send a test message",
     status_code=202,
-    responses=documented(InvalidRequest, WebhookNotFound, WebhookDisabled),
+    responses=documented(InvalidRequest, WebhookNotFound, WebhookDisabled, WebhookPending),
 )
 def test_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Delivery:
     """Send a `webhook.test` message within a few seconds; see the deliveries for what became of it."""
@@ -151,3 +158,16 @@ messages = APIRouter(tags=["webhooks"])  # not served: what receivers are sent, 
 )
 def job_ended(message: Message) -> None:
     """Sent to webhooks by Standard Webhooks: `webhook-id`, `webhook-timestamp` and `webhook-signature`."""
+
+
+@messages.post(
+    "webhook_challenge",
+    operation_id="webhook_challenge",
+    summary="Do you want these messages?",
+    responses={
+        200: {"description": "The challenge as it came: the webhook is enabled."},
+        "default": {"description": "Not answered: it is sent again. 410 disables the webhook."},
+    },
+)
+def webhook_challenge(message: Challenge) -> ChallengeAnswer:  # type: ignore[empty-body]
+    """Sent, signed like every message, before a webhook is sent anything else."""

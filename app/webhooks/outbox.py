@@ -5,6 +5,7 @@ Imported by the job store, and so by workers: nothing here speaks HTTP.
 
 from __future__ import annotations
 
+import secrets
 from typing import Any
 
 from sqlalchemy import Row, delete, insert, select
@@ -20,7 +21,9 @@ DELIVERED = "delivered"
 GIVEN_UP = "given_up"
 
 TEST_EVENT = "webhook.test"
+CHALLENGE_EVENT = "webhook.challenge"
 JOB_EVENTS = tuple(f"job.{status}" for status in FINISHED)
+CHALLENGE_BYTES = 24
 MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
 
 
@@ -38,7 +41,11 @@ def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
     # key share: a webhook that is being deleted at this moment must not take the job's end down with it
     hooks = session.execute(
         select(webhooks.c.id, webhooks.c.events)
-        .where(webhooks.c.owner == row.owner, webhooks.c.disabled_at.is_(None))
+        .where(
+            webhooks.c.owner == row.owner,
+            webhooks.c.verified_at.is_not(None),
+            webhooks.c.disabled_at.is_(None),
+        )
         .order_by(webhooks.c.id)
         .with_for_update(read=True, key_share=True)
     ).all()
@@ -67,10 +74,20 @@ def new_delivery(webhook_id: str, event: str, payload: Document, *, job_id: str 
     }
 
 
-def note_test(session: Session, webhook_id: str, at: float) -> str:
+def note_test(session: Session, webhook_id: str) -> str:
     """Write a test delivery and return its id."""
-    payload = {"type": TEST_EVENT, "timestamp": moment(at).isoformat(), "data": {"webhook_id": webhook_id}}
-    values = new_delivery(webhook_id, TEST_EVENT, payload)
+    return _note(session, webhook_id, TEST_EVENT, {})
+
+
+def note_challenge(session: Session, webhook_id: str) -> str:
+    """Write a delivery that the receiver must answer before it is sent anything else; return its id."""
+    return _note(session, webhook_id, CHALLENGE_EVENT, {"challenge": secrets.token_urlsafe(CHALLENGE_BYTES)})
+
+
+def _note(session: Session, webhook_id: str, event: str, data: Document) -> str:
+    at = moment(session.execute(select(database_time())).scalar_one())
+    payload = {"type": event, "timestamp": at.isoformat(), "data": {"webhook_id": webhook_id, **data}}
+    values = new_delivery(webhook_id, event, payload)
     session.execute(insert(webhook_deliveries).values(values))
     return str(values["id"])
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import ssl
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MAX_ANSWER_BYTES = 64 * 1024  # read so that the receiver can finish its sentence, and thrown away
 MAX_ADDRESSES = 3  # of a name, tried one after the other
 GONE = 410
+NOT_ECHOED = "The receiver did not answer with the challenge."
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +55,20 @@ class Answer:
     @property
     def delivered(self) -> bool:
         """Whether the receiver took the message."""
-        return self.status is not None and 200 <= self.status < 300
+        return self.status is not None and self.error is None
 
     @property
     def gone(self) -> bool:
         """Whether the receiver wants no more messages."""
         return self.status == GONE
+
+
+@dataclass(slots=True)
+class _Heard:
+    """What a receiver has said so far."""
+
+    answer: Answer | None = None
+    content: bytearray = field(default_factory=bytearray)
 
 
 class Poster:
@@ -106,39 +116,48 @@ class Poster:
             )
         return self._client
 
-    async def post(self, url: str, headers: Mapping[str, str], body: bytes) -> Answer:
-        """Send one message; every failure is an answer, never an exception."""
+    async def post(
+        self, url: str, headers: Mapping[str, str], body: bytes, *, challenge: str | None = None
+    ) -> Answer:
+        """Send one message; every failure is an answer, never an exception.
+
+        Parameters
+        ----------
+        challenge : str, optional
+            The message is taken only by a receiver that answers ``{"challenge": "..."}`` with this text.
+        """
         import httpx
 
-        seen: list[Answer] = []
+        heard = _Heard()
         failure: Exception | None = None
         try:
             async with asyncio.timeout(self._patience.total_s):
                 target = await self._policy.target(url)
-                await self._to_first(target, headers, body, seen)
+                await self._to_first(target, headers, body, heard)
         except (AddressRefused, OSError, ValueError, httpx.HTTPError, httpx.InvalidURL) as error:
             failure = error
-        if seen:  # also of a receiver that said its status, and then dripped or broke off
-            return seen[0]
-        return Answer(None, "No address was tried." if failure is None else _why(failure))
+        if heard.answer is None:
+            return Answer(None, "No address was tried." if failure is None else _why(failure))
+        # also of a receiver that said its status, and then dripped or broke off
+        if challenge is not None and heard.answer.delivered and not _echoes(heard.content, challenge):
+            return replace(heard.answer, error=NOT_ECHOED)
+        return heard.answer
 
-    async def _to_first(
-        self, target: Target, headers: Mapping[str, str], body: bytes, seen: list[Answer]
-    ) -> None:
+    async def _to_first(self, target: Target, headers: Mapping[str, str], body: bytes, heard: _Heard) -> None:
         """Send to the first of the checked addresses that lets itself be connected to."""
         import httpx
 
         chosen = target.addresses[:MAX_ADDRESSES]
         for position, address in enumerate(chosen):
             try:
-                return await self._exchange(target, address, headers, body, seen)
+                return await self._exchange(target, address, headers, body, heard)
             except (httpx.ConnectError, httpx.ConnectTimeout):
                 if position == len(chosen) - 1:
                     raise
         return None
 
     async def _exchange(
-        self, target: Target, address: str, headers: Mapping[str, str], body: bytes, seen: list[Answer]
+        self, target: Target, address: str, headers: Mapping[str, str], body: bytes, heard: _Heard
     ) -> None:
         import httpx
 
@@ -161,14 +180,22 @@ class Poster:
             status = response.status_code
             asked = parse_retry_after(response.headers.get("retry-after"), time.time())
             error = None if 200 <= status < 300 else f"The receiver answered {status}."
-            seen.append(Answer(status, error, asked))
-            size = 0
+            heard.answer = Answer(status, error, asked)
             async for piece in response.aiter_raw():
-                size += len(piece)
-                if size > MAX_ANSWER_BYTES:
+                heard.content += piece
+                if len(heard.content) > MAX_ANSWER_BYTES:
                     break
         finally:
             await response.aclose()
+
+
+def _echoes(content: bytearray, challenge: str) -> bool:
+    """Whether an answer is a JSON object with the challenge in it."""
+    try:
+        told = json.loads(content)
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(told, dict) and told.get("challenge") == challenge
 
 
 def _why(failure: Exception) -> str:

@@ -6,21 +6,25 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Row, delete, func, insert, select, update
+from sqlalchemy import Column, ColumnElement, Row, delete, func, insert, select, update
 
-from app.database import Session, database_time
+from app.database import Session, database_time, insert_new
 from app.errors import WebhookNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment, optional_moment
-from app.tables import webhook_deliveries, webhooks
-from app.webhooks.deliveries import lock_waiting
+from app.tables import owners, webhook_deliveries, webhooks
+from app.webhooks.addresses import destination_of
+from app.webhooks.deliveries import give_up_waiting, lock_waiting
 from app.webhooks.outbox import WAITING
+
+REOPENED = "A new challenge took its place."
 
 COLUMNS = (
     webhooks.c.id,
     webhooks.c.url,
     webhooks.c.events,
     webhooks.c.failures,
+    webhooks.c.verified_at,
     webhooks.c.disabled_at,
     webhooks.c.disabled_reason,
     webhooks.c.created_at,
@@ -35,6 +39,7 @@ class StoredWebhook:
     url: str
     events: list[str]
     failures: int
+    verified_at: datetime | None
     disabled_at: datetime | None
     disabled_reason: str | None
     created_at: datetime
@@ -62,6 +67,7 @@ def _webhook(row: Row[*tuple[Any, ...]]) -> StoredWebhook:
         url=row.url,
         events=row.events,
         failures=row.failures,
+        verified_at=optional_moment(row.verified_at),
         disabled_at=optional_moment(row.disabled_at),
         disabled_reason=row.disabled_reason,
         created_at=moment(row.created_at),
@@ -69,13 +75,22 @@ def _webhook(row: Row[*tuple[Any, ...]]) -> StoredWebhook:
 
 
 def insert_webhook(session: Session, owner: str, url: str, events: list[str], secret: str) -> StoredWebhook:
-    """Store a webhook whose address was checked."""
+    """Store a webhook whose address was checked and whose receiver has not answered yet."""
+    destination = destination_of(url)
+    others = (webhooks.c.owner == owner, webhooks.c.destination == destination)
+
+    def of_others(column: Column[float]) -> ColumnElement[float]:
+        return func.coalesce(select(func.max(column)).where(*others).scalar_subquery(), 0.0)
+
     row = session.execute(
         insert(webhooks)
         .values(
             id=new_identifier("hook"),
             owner=owner,
             url=url,
+            destination=destination,
+            sending_until=of_others(webhooks.c.sending_until),
+            paused_until=of_others(webhooks.c.paused_until),
             events=events,
             secret=secret,
             failures=0,
@@ -87,7 +102,9 @@ def insert_webhook(session: Session, owner: str, url: str, events: list[str], se
 
 
 def count_webhooks(session: Session, owner: str) -> int:
-    """Count the owner's webhooks."""
+    """Count the owner's webhooks; until the transaction ends nobody else counts or makes any of them."""
+    session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
+    session.execute(select(owners.c.owner).where(owners.c.owner == owner).with_for_update())
     count = session.scalar(select(func.count()).select_from(webhooks).where(webhooks.c.owner == owner))
     return count or 0
 
@@ -131,8 +148,8 @@ def delete_webhook(session: Session, owner: str, webhook_id: str) -> None:
     session.execute(delete(webhooks).where(webhooks.c.id == webhook_id, webhooks.c.owner == owner))
 
 
-def enable_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebhook:
-    """Send to a webhook again, and forget its failures.
+def reopen_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebhook:
+    """Forget a webhook's failures and its receiver's answer; what still waits for it is given up.
 
     Raises
     ------
@@ -142,11 +159,12 @@ def enable_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebho
     row = session.execute(
         update(webhooks)
         .where(webhooks.c.id == webhook_id, webhooks.c.owner == owner)
-        .values(failures=0, disabled_at=None, disabled_reason=None)
+        .values(failures=0, paused_until=0.0, verified_at=None, disabled_at=None, disabled_reason=None)
         .returning(*COLUMNS)
     ).one_or_none()
     if row is None:
         raise WebhookNotFound(webhook_id)
+    give_up_waiting(session, webhook_id, REOPENED)
     return _webhook(row)
 
 

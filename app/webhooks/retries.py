@@ -1,4 +1,9 @@
-"""When a delivery that failed is tried again."""
+"""When a delivery that failed is tried again, and how long its destination is left alone.
+
+Both wait by the same table, a delivery by its own tries and a destination by the failures in a row. Nothing
+is sent to a destination while it waits, so a dead one sees no more than `MAX_TRIES` tries, however many jobs
+end, and is given up after 18 minutes.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,10 @@ from datetime import UTC
 from email.utils import parsedate_to_datetime
 from random import Random
 
-DELAYS_S = (5.0, 30.0, 120.0, 600.0, 3600.0, 6 * 3600.0)  # after the first try, the second, ...
-MAX_TRIES = len(DELAYS_S) + 1
+DELAYS_S = (5.0, 30.0, 120.0, 300.0, 600.0)  # after the first try, the second, ...
+MAX_TRIES = len(DELAYS_S) + 1  # of a delivery; so many failures in a row disable a webhook
 JITTER = 0.2  # of the delay either way: a receiver that comes back is not met by all at once
-MAX_RETRY_AFTER_S = 6 * 3600.0  # a receiver may ask for patience, but not for ever
+MAX_RETRY_AFTER_S = 600.0  # a receiver may ask for patience, but not for ever
 
 
 def next_delay_s(tries: int, retry_after_s: float | None, rng: Random) -> float | None:
@@ -18,7 +23,7 @@ def next_delay_s(tries: int, retry_after_s: float | None, rng: Random) -> float 
     Parameters
     ----------
     tries : int
-        How often the delivery was tried, at least 1.
+        How often the delivery was tried, or its destination failed in a row, at least 1.
     retry_after_s : float or None
         What the receiver asked for; it can only make the time longer.
     """

@@ -11,8 +11,10 @@ from app.jobs.schemas import EXAMPLE_ID
 from app.schemas.fields import Strict
 
 EXAMPLE_WEBHOOK = "hook_01k0c3v9fh8x2m4n6p8q0r2s4t"
+EXAMPLE_CHALLENGE = "pJ5mXw0cQ1l3nR8tZ2vB7dK4sY6uE9hA"
 EXAMPLE_URL = "https://example.com/hooks/morphid"
 JobEvent = Literal["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
+WebhookStatus = Literal["pending", "enabled", "disabled"]
 DeliveryStatus = Literal["waiting", "delivered", "given_up"]
 EVERY_EVENT: list[JobEvent] = ["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
 
@@ -44,10 +46,14 @@ class Webhook(BaseModel):
     id: str = Field(examples=[EXAMPLE_WEBHOOK])
     url: str = Field(examples=[EXAMPLE_URL])
     events: list[JobEvent]
-    enabled: bool
+    status: WebhookStatus = Field(
+        description="`pending` until the receiver has answered the challenge; only `enabled` ones are told "
+        "of jobs."
+    )
+    enabled: bool = Field(description="Whether `status` is `enabled`.")
     disabled_at: datetime | None
     disabled_reason: str | None = Field(description="Why nothing is sent any more; enable it when mended.")
-    failures: int = Field(description="Deliveries that were given up since the last success.")
+    failures: int = Field(description="Tries that failed since the last success.")
     created_at: datetime
 
 
@@ -73,8 +79,8 @@ class Delivery(BaseModel):
         description="The `webhook-id` header, the same in every try.",
         examples=["msg_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
-    type: str = Field(examples=["job.succeeded", "webhook.test"])
-    job_id: str | None = Field(examples=[EXAMPLE_ID], description="null for a test.")
+    type: str = Field(examples=["job.succeeded", "webhook.challenge", "webhook.test"])
+    job_id: str | None = Field(examples=[EXAMPLE_ID], description="null for a challenge or a test.")
     status: DeliveryStatus
     tries: int
     response_status: int | None = Field(description="HTTP status of the last answer.")
@@ -116,6 +122,27 @@ class MessageData(BaseModel):
     error: MessageError | None
     model_id: str | None
     links: MessageLinks
+
+
+class ChallengeData(BaseModel):
+    """What the receiver must answer with."""
+
+    webhook_id: str = Field(examples=[EXAMPLE_WEBHOOK])
+    challenge: str = Field(examples=[EXAMPLE_CHALLENGE])
+
+
+class Challenge(BaseModel):
+    """What a new or disabled webhook is sent before anything else."""
+
+    type: Literal["webhook.challenge"]
+    timestamp: datetime
+    data: ChallengeData
+
+
+class ChallengeAnswer(BaseModel):
+    """What a receiver answers that wants the messages."""
+
+    challenge: str = Field(examples=[EXAMPLE_CHALLENGE])
 
 
 class Message(BaseModel):

@@ -38,8 +38,6 @@ class SenderSettings:
         Time between two looks at the table, s.
     most_at_once, most_per_owner : int
         Deliveries under way, in all and of one owner.
-    disable_after : int
-        Given-up deliveries in a row that disable a webhook.
     """
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
@@ -48,7 +46,6 @@ class SenderSettings:
     poll_s: float = 1.0
     most_at_once: int = 16
     most_per_owner: int = 4
-    disable_after: int = 5
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
@@ -140,24 +137,18 @@ class WebhookSender:
     def _take(self, room: int, under_way: Counter[str]) -> list[Dispatch]:
         """Look, and only when there is something to send, write."""
         chosen = self._settings
-        busy = [owner for owner, count in under_way.items() if count >= chosen.most_per_owner]
         with self._database.read() as session:
-            found = deliveries.due(session, room, chosen.most_per_owner, busy, chosen.clock)
-        mine = []
-        for item in found:
-            if under_way[item.owner] < chosen.most_per_owner:
-                under_way[item.owner] += 1
-                mine.append(item)
-        if not mine:
+            found = deliveries.due(session, room, chosen.most_per_owner, under_way, chosen.clock)
+        if not found:
             return []
         with self._database.write() as session:
-            return deliveries.claim(session, mine, chosen.lease_s, chosen.clock)
+            return deliveries.claim(session, found, chosen.lease_s, chosen.clock)
 
     async def _deliver(self, poster: Poster, dispatch: Dispatch) -> None:
         body = json_bytes(dispatch.payload)
         headers = signed_headers(dispatch.secret, dispatch.id, dispatch.at, body)
         try:
-            answer = await poster.post(dispatch.url, headers, body)
+            answer = await poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
             status = await asyncio.to_thread(self._settle, dispatch, answer)
         except SQLAlchemyError as error:
             # the claim's lease ends, and the delivery is sent again under the same id
@@ -172,7 +163,6 @@ class WebhookSender:
                 dispatch,
                 answer,
                 rng=self._settings.rng,
-                disable_after=self._settings.disable_after,
                 clock=self._settings.clock,
             )
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from sqlalchemy import select
-
-from app.database import Session, database_time
-from app.errors import Fault, InvalidRequest, TooManyWebhooks, WebhookDisabled
+from app.database import Session
+from app.errors import Fault, InvalidRequest, TooManyWebhooks, WebhookDisabled, WebhookPending
 from app.webhooks import repository
 from app.webhooks.addresses import AddressPolicy, AddressRefused
-from app.webhooks.outbox import note_test
+from app.webhooks.outbox import note_challenge, note_test
 from app.webhooks.repository import StoredDelivery, StoredWebhook
-from app.webhooks.schemas import Delivery, DeliveryPage, NewWebhook, Webhook, WebhookList, WebhookRequest
+from app.webhooks.schemas import (
+    Delivery,
+    DeliveryPage,
+    NewWebhook,
+    Webhook,
+    WebhookList,
+    WebhookRequest,
+    WebhookStatus,
+)
 from app.webhooks.signature import new_secret
 
 MAX_WEBHOOKS = 20  # of one owner
@@ -21,12 +27,19 @@ def _shown(hook: StoredWebhook) -> Webhook:
         id=hook.id,
         url=hook.url,
         events=hook.events,
-        enabled=hook.disabled_at is None,
+        status=_status(hook),
+        enabled=_status(hook) == "enabled",
         disabled_at=hook.disabled_at,
         disabled_reason=hook.disabled_reason,
         failures=hook.failures,
         created_at=hook.created_at,
     )
+
+
+def _status(hook: StoredWebhook) -> WebhookStatus:
+    if hook.disabled_at is not None:
+        return "disabled"
+    return "pending" if hook.verified_at is None else "enabled"
 
 
 def _shown_delivery(delivery: StoredDelivery) -> Delivery:
@@ -58,7 +71,7 @@ def check_address(policy: AddressPolicy, url: str) -> None:
 
 
 def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
-    """Store a webhook and make its secret.
+    """Store a webhook, make its secret, and have its receiver challenged.
 
     Raises
     ------
@@ -68,6 +81,7 @@ def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
         raise TooManyWebhooks(MAX_WEBHOOKS)
     secret = new_secret()
     stored = repository.insert_webhook(session, owner, request.url, list(request.events), secret)
+    note_challenge(session, stored.id)
     return NewWebhook(**_shown(stored).model_dump(), secret=secret)
 
 
@@ -82,8 +96,12 @@ def get(session: Session, owner: str, webhook_id: str) -> Webhook:
 
 
 def enable(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """Send to a webhook again."""
-    return _shown(repository.enable_webhook(session, owner, webhook_id))
+    """Challenge the receiver of a disabled or pending webhook anew; leave an enabled one as it is."""
+    hook = repository.get_webhook(session, owner, webhook_id)
+    if _status(hook) != "enabled":
+        hook = repository.reopen_webhook(session, owner, webhook_id)
+        note_challenge(session, webhook_id)
+    return _shown(hook)
 
 
 def test(session: Session, owner: str, webhook_id: str) -> Delivery:
@@ -91,12 +109,14 @@ def test(session: Session, owner: str, webhook_id: str) -> Delivery:
 
     Raises
     ------
-    WebhookDisabled
+    WebhookDisabled, WebhookPending
     """
-    hook = repository.get_webhook(session, owner, webhook_id)
-    if hook.disabled_at is not None:
+    status = _status(repository.get_webhook(session, owner, webhook_id))
+    if status == "disabled":
         raise WebhookDisabled(webhook_id)
-    delivery_id = note_test(session, webhook_id, session.execute(select(database_time())).scalar_one())
+    if status == "pending":
+        raise WebhookPending(webhook_id)
+    delivery_id = note_test(session, webhook_id)
     return _shown_delivery(repository.get_delivery(session, delivery_id))
 
 

@@ -22,7 +22,9 @@ from app.webhooks.sender import SenderSettings
 from tests.app.webhooks.receiver import TO_LOOPBACK
 
 DEAD_BROKER = "redis://127.0.0.1:1/0"  # nothing listens there: every test runs with the broker away
-TO_RECEIVERS_HERE = SenderSettings(TO_LOOPBACK)
+NOTHING_IS_SENT = SenderSettings(
+    TO_LOOPBACK, poll_s=3600.0
+)  # addresses are checked, as if loopback were public
 START_S = 20.0
 
 
@@ -55,13 +57,13 @@ class RunningService:
 
 @contextmanager
 def running_service(
-    settings: Settings, sending: SenderSettings | None = TO_RECEIVERS_HERE
+    settings: Settings, sending: SenderSettings | None = NOTHING_IS_SENT
 ) -> Iterator[RunningService]:
     """Serve until the block ends.
 
     Parameters
     ----------
-    sending : how webhooks are sent; as the settings say when None.
+    sending : how webhooks are sent; as the settings say when None, and not at all when left out.
     """
     app = create_app(settings, sending=sending)
     config = guarded_config(app, settings, port=0, log_level="error", timeout_graceful_shutdown=2)

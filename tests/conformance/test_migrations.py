@@ -8,6 +8,9 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import JSON, Column, Engine, LargeBinary, MetaData, Table, insert, select
 
 from app.database import Database, downgrade, migration_config, upgrade
+from app.tables import webhooks
+from app.webhooks.addresses import destination_of
+from app.webhooks.repository import list_webhooks
 
 KEY = "k"  # every row's, so that foreign keys hold
 STATUS = {"jobs": "queued", "job_chunks": "open"}  # what check constraints allow
@@ -83,3 +86,20 @@ def test_rows_outlive_every_migration(database_url: str) -> None:
         downgrade(database_url, "base")
         assert tables_of(database.engine) == [], "the way down leaves nothing"
         database.dispose()
+
+
+def test_webhooks_of_before_need_no_challenge(database_url: str) -> None:
+    """Webhooks that were there before receivers had to answer go on being sent to."""
+    upgrade(database_url, "0002")
+    database = Database(database_url)
+    row = {"id": "hook_1", "owner": "me", "url": "https://example.com:8443/x", "events": ["job.failed"]}
+    with database.engine.begin() as connection:
+        (table,) = (table for table in tables_of(database.engine) if table.name == "webhooks")
+        connection.execute(insert(table).values(**row, secret="whsec_x", failures=0, created_at=7.0))
+    upgrade(database_url)
+    with database.read() as session:
+        (found,) = list_webhooks(session, "me")
+        destination = session.scalar(select(webhooks.c.destination))
+    database.dispose()
+    assert found.verified_at == found.created_at
+    assert destination == destination_of(row["url"])

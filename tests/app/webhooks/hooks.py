@@ -6,14 +6,17 @@ import asyncio
 import time
 from dataclasses import dataclass, field
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 
-from sqlalchemy import ColumnElement, literal, select
+from sqlalchemy import ColumnElement, literal, select, update
 
-from app.database import Database
+from app.database import Database, database_time
+from app.identifiers import new_identifier
 from app.jobs import store
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import repository
+from app.webhooks.outbox import note_challenge, note_end
 from app.webhooks.posting import Patience
 from app.webhooks.schemas import EVERY_EVENT
 from app.webhooks.sender import SenderSettings, WebhookSender
@@ -39,9 +42,18 @@ class HandClock:
 
 
 def new_hook(database: Database, url: str, *, owner: str = OWNER, events: list[str] | None = None) -> str:
-    """Store a webhook, unchecked, and return its id."""
+    """Store a webhook, unchecked, whose receiver is known to want its messages; return its id."""
     with database.write() as session:
         hook = repository.insert_webhook(session, owner, url, list(events or EVERY_EVENT), new_secret())
+        session.execute(update(webhooks).where(webhooks.c.id == hook.id).values(verified_at=database_time()))
+    return hook.id
+
+
+def challenged_hook(database: Database, url: str, *, owner: str = OWNER) -> str:
+    """Store a webhook whose receiver has yet to answer; return its id."""
+    with database.write() as session:
+        hook = repository.insert_webhook(session, owner, url, list(EVERY_EVENT), new_secret())
+        note_challenge(session, hook.id)
     return hook.id
 
 
@@ -59,6 +71,22 @@ def ended_job(database: Database, status: str = "succeeded", owner: str = OWNER,
         assert claim is not None
         assert store.finish_job(session, claim, status, **end)
     return job_id
+
+
+def many_ends(database: Database, count: int, owner: str = OWNER) -> None:
+    """Let so many jobs end, as far as the outbox sees of it."""
+    with database.write() as session:
+        for _ in range(count):
+            row: Any = SimpleNamespace(
+                id=new_identifier("job"),
+                owner=owner,
+                operation="identify",
+                status="succeeded",
+                finished_at=time.time(),
+                error=None,
+                model_id=None,
+            )
+            note_end(session, row)
 
 
 def deliveries(database: Database, **equal: Any) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import ssl
 import threading
 from collections.abc import Callable, Iterator
@@ -36,6 +37,10 @@ class Receiver:
     ----------
     answer : callable
         ``(handler, number of the request)``: sends the answer.
+    received, challenges : list
+        What came; challenges are kept apart, and answered as documented.
+    answers_challenges : bool
+        Where it is False they are messages like others.
     connections : int
         Accepted, whatever came of them.
     """
@@ -43,6 +48,8 @@ class Receiver:
     port: int = 0
     scheme: str = "https"
     received: list[Received] = field(default_factory=list)
+    challenges: list[Received] = field(default_factory=list)
+    answers_challenges: bool = True
     connections: int = 0
     answer: Callable[[BaseHTTPRequestHandler, int], None] = field(
         default=lambda handler, _: status(handler, 204)
@@ -68,6 +75,25 @@ def status(handler: BaseHTTPRequestHandler, code: int, **headers: str) -> None:
     handler.end_headers()
 
 
+def content(handler: BaseHTTPRequestHandler, sent: bytes) -> None:
+    """Answer 200 with these bytes."""
+    handler.send_response(200)
+    handler.send_header("Content-Length", str(len(sent)))
+    handler.end_headers()
+    handler.wfile.write(sent)
+
+
+def answer_json(handler: BaseHTTPRequestHandler, document: object) -> None:
+    """Answer 200 with a JSON document."""
+    content(handler, json.dumps(document).encode())
+
+
+def challenge_in(body: bytes) -> str | None:
+    """The challenge of a message that is one."""
+    message = json.loads(body)
+    return message["data"]["challenge"] if message["type"] == "webhook.challenge" else None
+
+
 @contextmanager
 def receiver(tls: ssl.SSLContext | None = None) -> Iterator[Receiver]:
     """Run a receiver on loopback while the block lasts."""
@@ -77,7 +103,12 @@ def receiver(tls: ssl.SSLContext | None = None) -> Iterator[Receiver]:
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers.get("Content-Length", "0")))
             headers = {name.lower(): value for name, value in self.headers.items()}
-            state.received.append(Received(self.path, headers, body))
+            came = Received(self.path, headers, body)
+            if state.answers_challenges and (challenge := challenge_in(body)) is not None:
+                state.challenges.append(came)
+                answer_json(self, {"challenge": challenge})
+                return
+            state.received.append(came)
             state.answer(self, len(state.received))
 
         def log_message(self, *_words: object) -> None:

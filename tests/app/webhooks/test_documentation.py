@@ -11,10 +11,13 @@ from typing import Any
 import pytest
 from standardwebhooks import Webhook
 
-from app.webhooks.retries import DELAYS_S, MAX_TRIES
+from app.database import Database
+from app.webhooks.retries import DELAYS_S, MAX_RETRY_AFTER_S, MAX_TRIES
 from app.webhooks.sender import SenderSettings
 from app.webhooks.service import MAX_WEBHOOKS
 from app.webhooks.signature import new_secret, signed_headers
+from tests.app.webhooks.hooks import challenged_hook, deliveries, hook_row, many_ends, send_due
+from tests.app.webhooks.receiver import content, receiver
 
 PAPER = Path(__file__).resolve().parents[3] / "docs" / "webhooks.md"
 BODY = b'{"type":"job.succeeded"}'
@@ -28,16 +31,17 @@ def text() -> str:
 
 
 @pytest.fixture(scope="module")
-def verified() -> Any:
-    """The function that the paper shows."""
-    (example,) = re.findall(r"```python\n(.*?)```", PAPER.read_text(encoding="utf-8"), flags=re.DOTALL)
+def examples() -> dict[str, Any]:
+    """The functions that the paper shows, by name."""
     names: dict[str, Any] = {}
-    exec(compile(example, PAPER.name, "exec"), names)  # noqa: S102 - our own text
-    return names["verified"]
+    for example in re.findall(r"```python\n(.*?)```", PAPER.read_text(encoding="utf-8"), flags=re.DOTALL):
+        exec(compile(example, PAPER.name, "exec"), names)  # noqa: S102 - our own text
+    return names
 
 
-def test_the_example_verifies_what_is_sent(verified: Any) -> None:
+def test_the_example_verifies_what_is_sent(examples: dict[str, Any]) -> None:
     """The example takes our headers and those of the standard's own library, and nothing else."""
+    verified = examples["verified"]
     secret, now = new_secret(), time.time()
     ours = signed_headers(secret, "msg_1", now, BODY)
     theirs = Webhook(secret).sign("msg_1", datetime.now(UTC), BODY.decode())
@@ -49,18 +53,35 @@ def test_the_example_verifies_what_is_sent(verified: Any) -> None:
     assert not verified(secret, signed_headers(secret, "msg_1", now - 1000.0, BODY), BODY)
 
 
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_the_example_answers_the_challenge(database: Database, examples: dict[str, Any]) -> None:
+    """A receiver that answers as the paper shows has its webhook enabled, and then gets the ends of jobs."""
+    with receiver() as there:
+        there.answers_challenges = False
+        there.answer = lambda handler, _: content(handler, examples["answer"](there.received[-1].body))
+        hook_id = challenged_hook(database, there.url())
+        send_due(database)
+        assert hook_row(database, hook_id).verified_at is not None
+        many_ends(database, 1)
+        send_due(database)
+    assert [row.status for row in deliveries(database)] == ["delivered"] * 2
+
+
 def test_the_figures_are_the_codes(text: str) -> None:
     """Delays, tries and limits in the paper are those of the code."""
     (listed,) = re.findall(r"tried again after (.*?) \(", text)
     delays = [float(number) * WORDS_S[unit] for number, unit in re.findall(r"(\d+) (s|min|h)\b", listed)]
     assert tuple(delays) == DELAYS_S
-    assert f"after the {('', 'first', '', '', '', '', '', 'seventh')[MAX_TRIES]} try" in text
+    assert MAX_TRIES == 6
+    assert MAX_RETRY_AFTER_S == 600.0
     assert f"An owner may have {MAX_WEBHOOKS}." in text
     settings = SenderSettings()
-    assert (settings.disable_after, settings.most_at_once, settings.most_per_owner) == (5, 16, 4)
+    assert (settings.most_at_once, settings.most_per_owner) == (16, 4)
     assert settings.patience.total_s == 10.0
     for words in (
-        "five messages in a row",
+        "after the sixth try",
+        "up to 10 min",
+        "Six failed tries in a row",
         "Sixteen messages at once, four of one owner",
         "within ten seconds",
     ):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,7 @@ from standardwebhooks import Webhook
 from app.settings import Settings, UnsafeSettings, load_settings
 from app.tables import audit_log
 from app.webhooks.addresses import AddressPolicy
-from app.webhooks.schemas import Message
+from app.webhooks.schemas import Challenge, Message
 from app.webhooks.sender import SenderSettings
 from app.webhooks.service import MAX_WEBHOOKS
 from tests.app.calls import fault, post
@@ -28,6 +31,14 @@ def new(service: RunningService, **document: object) -> Document:
     answer = post(service, "/webhooks", {"url": NOBODY, **document})
     assert answer.status_code == 201, answer.text
     made: Document = answer.json()
+    return made
+
+
+def enabled(service: RunningService, url: str) -> Document:
+    """Register a webhook and wait until its receiver has answered the challenge."""
+    made = new(service, url=url)
+    assert (made["status"], made["enabled"]) == ("pending", False)
+    until(lambda: service.client.get(f"/webhooks/{made['id']}").json()["status"] == "enabled")
     return made
 
 
@@ -115,7 +126,7 @@ def test_anothers_webhook_is_not_there(any_service: RunningService) -> None:
 
 def test_deliveries_come_in_pages(any_service: RunningService) -> None:
     """Pages of deliveries, newest first, hold each once."""
-    hook_id = new(any_service)["id"]
+    hook_id = new_hook(any_service.database, NOBODY)
     jobs = {ended_job(any_service.database) for _ in range(5)}
     seen: list[Document] = []
     cursor = ""
@@ -146,7 +157,7 @@ def development(tmp_path: Path) -> Iterator[RunningService]:
 def test_a_jobs_end_arrives(development: RunningService) -> None:
     """From the end of a job, by the sender of the running service, to a receiver that verifies it."""
     with receiver() as there:
-        made = new(development, url=there.url())
+        made = enabled(development, there.url())
         job_id = ended_job(development.database)
         (got,) = there.wait_for(1)
         message = Message.model_validate(Webhook(made["secret"]).verify(got.body, got.headers))
@@ -154,10 +165,43 @@ def test_a_jobs_end_arrives(development: RunningService) -> None:
         assert development.client.get(message.data.links.self).json()["status"] == "succeeded"
 
 
+def test_a_new_webhook_is_told_nothing_until_its_receiver_answers(development: RunningService) -> None:
+    """The challenge is signed; ends before its answer are not kept, no test is sent, asking anew helps."""
+    with receiver() as there:
+        there.answers_challenges = False
+        made = new(development, url=there.url())
+        ended_job(development.database)
+        (got,) = there.wait_for(1)
+        challenge = Challenge.model_validate(Webhook(made["secret"]).verify(got.body, got.headers))
+        assert challenge.data.webhook_id == made["id"]
+        path = f"/webhooks/{made['id']}"
+        until(lambda: development.client.get(path).json()["failures"] == 1)
+        assert development.client.get(path).json()["status"] == "pending"
+        problem = fault(development.client.post(f"{path}/test"), 409)
+        assert (problem["code"], problem["pointer"]) == ("webhook_pending", "#path/webhook_id")
+        there.answers_challenges = True
+        assert development.client.post(f"{path}/enable").json()["status"] == "pending"
+        until(lambda: development.client.get(path).json()["status"] == "enabled")
+        (answered,) = there.challenges
+        assert answered.headers["webhook-id"] != got.headers["webhook-id"]
+        job_id = ended_job(development.database)
+        until(lambda: len(there.received) == 2)
+        assert json.loads(there.received[1].body)["data"]["id"] == job_id
+        assert development.client.post(f"{path}/enable").json()["status"] == "enabled"  # nothing to ask
+
+
+def test_the_limit_holds_under_parallel_posts(any_service: RunningService) -> None:
+    """Sixty posts at once make as many webhooks as one may have, and refuse the rest as documented."""
+    with ThreadPoolExecutor(60) as pool:
+        answers = list(pool.map(lambda _: post(any_service, "/webhooks", {"url": NOBODY}), range(60)))
+    assert Counter(answer.status_code for answer in answers) == {201: MAX_WEBHOOKS, 409: 60 - MAX_WEBHOOKS}
+    assert len(any_service.client.get("/webhooks").json()["webhooks"]) == MAX_WEBHOOKS
+
+
 def test_a_test_message_arrives(development: RunningService) -> None:
     """A test is signed like any other message, and its fate can be read; a disabled webhook gets none."""
     with receiver() as there:
-        made = new(development, url=there.url())
+        made = enabled(development, there.url())
         sent = development.client.post(f"/webhooks/{made['id']}/test")
         assert sent.status_code == 202
         (got,) = there.wait_for(1)
@@ -175,18 +219,22 @@ def test_a_test_message_arrives(development: RunningService) -> None:
 
 
 def test_disabled_webhooks_are_told_and_enabled(any_service: RunningService) -> None:
-    """Why a webhook is disabled can be read; no test is sent to it until it is enabled."""
+    """Why a webhook is disabled can be read; no test is sent to it; enabled, it is challenged anew."""
     from app.webhooks.deliveries import disable
 
     hook_id = new(any_service)["id"]
     with any_service.database.write() as session:
         disable(session, hook_id, "The receiver answered 410.")
     shown = any_service.client.get(f"/webhooks/{hook_id}").json()
-    assert (shown["enabled"], shown["disabled_reason"]) == (False, "The receiver answered 410.")
+    assert (shown["status"], shown["enabled"], shown["disabled_reason"]) == (
+        "disabled",
+        False,
+        "The receiver answered 410.",
+    )
     answer = any_service.client.post(f"/webhooks/{hook_id}/test")
     assert fault(answer, 409)["code"] == "webhook_disabled"
     enabled = any_service.client.post(f"/webhooks/{hook_id}/enable").json()
-    assert (enabled["enabled"], enabled["disabled_at"], enabled["failures"]) == (True, None, 0)
+    assert (enabled["status"], enabled["disabled_at"], enabled["failures"]) == ("pending", None, 0)
 
 
 def test_private_addresses_are_for_one_machine() -> None:
