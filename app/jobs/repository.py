@@ -13,7 +13,15 @@ from app.documents import unpacked_json
 from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
 from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
-from app.tables import STATUSES, artifacts, idempotency_keys, job_events, job_results, jobs
+from app.tables import (
+    STATUSES,
+    artifacts,
+    idempotency_keys,
+    job_events,
+    job_requests,
+    job_results,
+    jobs,
+)
 
 EVERY_STATUS = (None,)
 ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
@@ -132,6 +140,24 @@ def result_json(session: Session, owner: str, job_id: str) -> bytes | None:
     if row is None:
         raise JobNotFound(job_id)
     return None if row.document is None else unpacked_json(row.document)
+
+
+def request_json(session: Session, owner: str, job_id: str) -> bytes:
+    """Return the JSON text of a job's request, every sample and model inline.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    """
+    document = session.execute(
+        select(job_requests.c.document)
+        .join(jobs, jobs.c.id == job_requests.c.job_id)
+        .where(jobs.c.id == job_id, jobs.c.owner == owner)
+    ).scalar_one_or_none()
+    if document is None:
+        raise JobNotFound(job_id)
+    return unpacked_json(document)
 
 
 def list_artifacts(session: Session, owner: str, job_id: str) -> list[StoredArtifact]:
