@@ -101,7 +101,7 @@ def changed(document: Document, changes: Iterable[str]) -> Document:
             value = text
         try:
             _put(document, [_unescaped(token) for token in pointer.split("/")[1:]], value)
-        except (LookupError, ValueError, TypeError):
+        except (LookupError, ValueError, TypeError, AttributeError):
             raise CommandError(
                 f"--set {change}: the request has no place {pointer}",
                 code=Exit.INVALID_INPUT,
