@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import URL, Double, Engine, Table, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine import Connection
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
 
+from app.database_errors import DatabaseTrouble, trouble_of
+from app.private_files import close_to_others, make_private_folder, touch_private
+from app.reserve import Reserve
+
 # What store and repository functions work in: a Core connection inside a transaction. Not the ORM's session:
 # nothing here maps classes to tables, and importing the ORM costs 0.3 s at every start.
 Session = Connection
+Answer = TypeVar("Answer")
 
 BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
+JOURNAL_LIMIT_BYTES = 16 * 2**20  # SQLite: a longer journal is cut when it is begun anew
 BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
 CONNECT_TIMEOUT_S = 5
 POSTGRES_PATIENCE = {
@@ -78,15 +85,21 @@ def normal_url(url: str) -> str:
 
 
 def make_engine(url: str) -> Engine:
-    """Open an engine for `url`; an SQLite file's folder is made when it is missing."""
+    """Open an engine for `url`; an SQLite file and its folder are made, for this user alone, when missing."""
     parsed = make_url(normal_url(url))
     if parsed.get_backend_name() != "sqlite":
         return create_engine(
             parsed, pool_pre_ping=True, pool_size=20, max_overflow=40, connect_args=_postgres_link(parsed)
         )
-    if parsed.database and parsed.database != ":memory:":
-        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+    file = _sqlite_file(parsed)
+    if file is not None:
+        make_private_folder(file.parent)
     engine = create_engine(parsed, pool_size=20, max_overflow=40)
+
+    @event.listens_for(engine, "do_connect")
+    def _before_connect(*_how: Any) -> None:
+        if file is not None:
+            _keep_private(file)
 
     @event.listens_for(engine, "connect")
     def _on_connect(connection: Any, _record: Any) -> None:
@@ -94,7 +107,9 @@ def make_engine(url: str) -> Engine:
         connection.isolation_level = None
         cursor = connection.cursor()
         cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
+        cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")  # holds for a new file: before anything is in it
         cursor.execute("PRAGMA journal_mode = WAL")
+        cursor.execute(f"PRAGMA journal_size_limit = {JOURNAL_LIMIT_BYTES}")
         cursor.execute("PRAGMA synchronous = FULL")  # an accepted job survives a power cut, not only a crash
         cursor.execute("PRAGMA foreign_keys = ON")
         cursor.close()
@@ -105,6 +120,21 @@ def make_engine(url: str) -> Engine:
         connection.exec_driver_sql(f"BEGIN {mode}")
 
     return engine
+
+
+def _sqlite_file(url: URL) -> Path | None:
+    named = url.database or ":memory:"
+    return None if named == ":memory:" or named.startswith("file:") else Path(named)
+
+
+def _keep_private(file: Path) -> None:
+    """Make the database's file before SQLite does: its journals get the same mode, from their first byte."""
+    with suppress(OSError):  # SQLite then says itself what is wrong
+        touch_private(file)
+        for suffix in ("-wal", "-shm"):
+            journal = file.with_name(file.name + suffix)
+            if journal.exists():
+                close_to_others(journal)
 
 
 def _postgres_link(url: URL) -> dict[str, Any]:
@@ -122,11 +152,19 @@ class Database:
     ----------
     url : str
         SQLAlchemy URL, ``sqlite:///...`` or ``postgresql://...``.
+
+    Attributes
+    ----------
+    reserve : Reserve or None
+        Room for `write_even_if_full`; None where there is no file of ours.
     """
 
     def __init__(self, url: str) -> None:
         self.url = normal_url(url)
         self.engine = make_engine(url)
+        parsed = make_url(self.url)
+        file = _sqlite_file(parsed) if parsed.get_backend_name() == "sqlite" else None
+        self.reserve = None if file is None else Reserve(file)
         # SQLite: a transaction that will write takes the write lock at once; upgrading later may fail
         self._writer = self.engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"})
 
@@ -135,6 +173,27 @@ class Database:
         """A transaction that is committed at the end of the block, or rolled back by an exception."""
         with self._writer.begin() as session:
             yield session
+
+    def write_even_if_full(self, write: Callable[[Session], Answer]) -> Answer:
+        """Run a small write in a transaction of its own, on a full disk with room from the reserve.
+
+        For what people need most when the disk is full: to cancel, to delete, to have a job end. `write` is
+        called again when it did not fit.
+        """
+        lent = False
+        while True:
+            try:
+                with self.write() as session:
+                    answer = write(session)
+            except DBAPIError as error:
+                full = trouble_of(error) is DatabaseTrouble.FULL
+                if not full or self.reserve is None or not self.reserve.lend():
+                    raise
+                lent = True
+            else:
+                if lent and self.reserve is not None:
+                    self.reserve.take_back()
+                return answer
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -169,19 +228,24 @@ def schema_revision(session: Session) -> str | None:
 
 def upgrade(url: str, revision: str = "head") -> None:
     """Migrate the database at `url` up to `revision`; safe when several processes start at once."""
+    from app.disk_space import make_shrinkable  # lazy: it stands on this module
     from migrations import HEAD
 
     if revision == "head":
         database = Database(url)
         try:
             with database.read() as session:
-                if schema_revision(session) == HEAD:
-                    return
+                current = schema_revision(session) == HEAD
+            if current:
+                make_shrinkable(database)
+                return
         finally:
             database.dispose()
     from alembic import command  # lazy: most starts have nothing to migrate
 
     command.upgrade(migration_config(url), revision)
+    if revision == "head":
+        upgrade(url)
 
 
 def downgrade(url: str, revision: str) -> None:

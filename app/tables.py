@@ -68,11 +68,17 @@ jobs = Table(
     Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work lies in job_chunks
     Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
     Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
-    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),  # request, result and files
+    Column(
+        "size_bytes", BigInteger, nullable=False, server_default=ZERO
+    ),  # request, result, files; events too at the end
     Column("label", String(100)),  # the owner's own word, to find the job again
     CheckConstraint("status IN ({})".format(", ".join(f"'{name}'" for name in STATUSES)), name="status"),
     Index("ix_jobs_owner_id", "owner", "id"),
+    # a list is the owner's, newest first: whatever it is filtered by, the rows of a page lie side by side
+    Index("ix_jobs_owner_status_id", "owner", "status", "id"),
+    Index("ix_jobs_owner_operation_status_id", "owner", "operation", "status", "id"),
     Index("ix_jobs_owner_label_id", "owner", "label", "id"),
+    Index("ix_jobs_owner_created_at_id", "owner", "created_at", "id"),
     Index("ix_jobs_status_published_at", "status", "published_at"),
     Index("ix_jobs_status_lease_until", "status", "lease_until"),
     Index("ix_jobs_status_finished_at", "status", "finished_at"),  # retention, and how long jobs take
@@ -210,7 +216,10 @@ models = Table(
     Column("links_per_wing", Integer),
     Column("document", LargeBinary, nullable=False),  # deflated JSON: model, aircraft, flight, fit
     Column("created_at", Double, nullable=False),
+    Column("key_id", String(64)),  # of the job that identified it: a model counts in the same quota
+    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Index("ix_models_owner_id", "owner", "id"),
+    Index("ix_models_key_id", "key_id"),
     Index("ix_models_job_id", "job_id"),
 )
 

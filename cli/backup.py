@@ -11,11 +11,11 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.private_files import close_to_others, make_private_folder, open_private, touch_private
 from cli.exits import CommandError, Exit
 
 PAGES_AT_ONCE = 1000  # 4 MB between two looks at writers that wait
 BUSY_S = 30.0
-PRIVATE = 0o600  # webhook secrets and everybody's samples are in it
 LOCK_NAME = "serve.lock"  # of `morphid serve`
 
 
@@ -61,7 +61,7 @@ def backup(url: str, target: Path) -> Backup:
     growing = target.with_name(target.name + ".part")
     with _sentences(target):
         growing.unlink(missing_ok=True)
-        growing.touch(PRIVATE)
+        touch_private(growing)  # webhook secrets and everybody's samples are in it
         try:
             with (
                 closing(sqlite3.connect(source, timeout=BUSY_S)) as live,
@@ -93,16 +93,17 @@ def restore(url: str, source: Path) -> Backup:
         raise CommandError(f"there is no file {source}", code=Exit.INVALID_INPUT)
     with _sentences(source):
         found = inspected(source)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_private_folder(target.parent)
     growing = target.with_name(target.name + ".part")
     with _nobody_serves(target), _sentences(target):
         growing.unlink(missing_ok=True)
-        growing.touch(PRIVATE)
+        touch_private(growing)
         with closing(sqlite3.connect(source)) as copy, closing(sqlite3.connect(growing)) as new:
             copy.backup(new)
         _to_disk(growing)
         if target.exists():
             _fold_journal(target)
+            close_to_others(target)
             target.replace(target.with_name(target.name + ".before-restore"))
         for suffix in ("-wal", "-shm"):  # of the former file: with the new one they would spoil it
             target.with_name(target.name + suffix).unlink(missing_ok=True)
@@ -169,7 +170,7 @@ def _nobody_serves(target: Path) -> Iterator[None]:
         code=Exit.ENVIRONMENT,
         hint="end it first: a running service must not lose its file",
     )
-    with (target.parent / LOCK_NAME).open("a") as lock:
+    with open_private(target.parent / LOCK_NAME, "a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

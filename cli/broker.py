@@ -11,6 +11,7 @@ import socket
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.private_files import close_to_others, make_private_folder
 from cli.exits import CommandError, Exit
 from cli.supervisor import ChildSpec
 
@@ -86,7 +87,8 @@ def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> B
     preferred_port : taken when it is free.
     """
     home = data_dir / "broker"
-    home.mkdir(parents=True, exist_ok=True)
+    make_private_folder(home)
+    close_to_others(home)
     port = free_port(preferred_port)
     password = secrets.token_urlsafe(24)
     settings = {

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import copy
+import json
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from cli.exits import CommandError, Exit
 from cli.files import read_json
 
 Document = dict[str, Any]
@@ -67,3 +70,62 @@ class Request:
             if option:
                 return option
         return ""
+
+
+def changed(document: Document, changes: Iterable[str]) -> Document:
+    """Give a request with other values at some places.
+
+    Parameters
+    ----------
+    changes : ``pointer=value`` each; the value is JSON, or a text where it is none.
+
+    Raises
+    ------
+    CommandError : a change has another form, or leads to a place that the request cannot have.
+
+    Examples
+    --------
+    >>> changed({"search": {"seed": 1}}, ["/search/seed=2", "/search/method=cma"])
+    {'search': {'seed': 2, 'method': 'cma'}}
+    """
+    document = copy.deepcopy(document)
+    for change in changes:
+        pointer, equals, text = change.partition("=")
+        if not pointer.startswith("/") or not equals:
+            raise CommandError(
+                f"--set {change}: this is no POINTER=VALUE", code=Exit.USAGE, hint="--set /search/seed=2"
+            )
+        try:
+            value = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        try:
+            _put(document, [_unescaped(token) for token in pointer.split("/")[1:]], value)
+        except (LookupError, ValueError, TypeError, AttributeError):
+            raise CommandError(
+                f"--set {change}: the request has no place {pointer}",
+                code=Exit.INVALID_INPUT,
+                hint="objects are named and list items counted from 0, as in /samples/0/role",
+            ) from None
+    return document
+
+
+def _put(document: Any, tokens: Sequence[str], value: Any) -> None:
+    *parents, last = tokens
+    place = document
+    for token in parents:
+        place = place[_index(token)] if isinstance(place, list) else place.setdefault(token, {})
+    if not isinstance(place, dict | list):
+        raise TypeError(last)
+    place[_index(last) if isinstance(place, list) else last] = value
+
+
+def _index(token: str) -> int:
+    if not token.isascii() or not token.isdigit():
+        raise ValueError(token)
+    return int(token)
+
+
+def _unescaped(token: str) -> str:
+    """Undo the escapes of RFC 6901."""
+    return token.replace("~1", "/").replace("~0", "~")

@@ -16,9 +16,11 @@ from urllib.request import urlopen
 
 from rich.console import Console
 
+from app.private_files import OTHERS, close_to_others, make_private_folder, open_private
 from cli.broker import LOOPBACK, Broker, free_port, prepare_broker
 from cli.exits import CommandError, Exit
 from cli.migrate import upgrade_to
+from cli.screen import stderr
 from cli.supervisor import Child, ChildSpec, Supervisor
 
 BROKER_WITHIN_S = 10.0
@@ -170,8 +172,9 @@ def _own_data_dir(data_dir: Path) -> Iterator[Path]:
     """Make the data directory and hold it alone."""
     home = data_dir.expanduser().resolve()
     try:
-        home.mkdir(parents=True, exist_ok=True)
-        lock = (home / LOCK_NAME).open("a")
+        make_private_folder(home)
+        _close_to_others(home)
+        lock = open_private(home / LOCK_NAME, "a")
     except OSError as error:
         raise CommandError(
             f"the data directory {home} cannot be written: {error.strerror}",
@@ -188,6 +191,22 @@ def _own_data_dir(data_dir: Path) -> Iterator[Path]:
                 hint="end it first, or choose another: morphid serve --data-dir DIR",
             ) from None
         yield home
+
+
+def _close_to_others(home: Path) -> None:
+    """Let nobody else look into a data directory that is ours; say what is done with one that exists.
+
+    One that holds other things, such as a home directory, is somebody else's to close. What we write there is
+    private all the same.
+    """
+    names = {path.name for path in home.iterdir()}
+    if not home.stat().st_mode & OTHERS:
+        return
+    if (not names or LOCK_NAME in names) and close_to_others(home):
+        said = f"the data directory {home} was open to other users; it is yours alone now"
+    else:
+        said = f"other users may list {home}, not read what MorphID writes there; chmod 700 closes it"
+    stderr().print(f"morphid: {said}", markup=False, soft_wrap=True)
 
 
 def _api_port(host: str, port: int) -> int:

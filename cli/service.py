@@ -77,6 +77,10 @@ class Service:
         """Give the result of a finished job."""
         return self._document("GET", f"/jobs/{job_id}/result")
 
+    def request(self, job_id: str) -> Document:
+        """Give what was asked for when a job was posted."""
+        return self._document("GET", f"/jobs/{job_id}/request")
+
     def watch(self, job_id: str, *, poll_s: float = POLL_S) -> Iterator[Document]:
         """Give the job again and again until it is finished; wait for a service that restarts meanwhile."""
         patience_until = time.monotonic() + PATIENCE_S

@@ -15,6 +15,8 @@ from pathlib import Path
 from types import FrameType
 from typing import IO
 
+from app.private_files import PRIVATE_UMASK, close_to_others, make_private_folder, open_private
+
 FIRST_PAUSE_S = 0.5  # before the first restart: long enough to free a port, short enough to go unnoticed
 LONGEST_PAUSE_S = 30.0
 HEALTHY_AFTER_S = 60.0  # a child that lived this long starts again with the first pause
@@ -77,6 +79,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 text=True,
                 start_new_session=True,
+                umask=PRIVATE_UMASK,  # what it writes by itself, such as the broker's journal, is nobody else's
                 preexec_fn=_die_with_parent if sys.platform == "linux" else None,  # noqa: PLW1509 - no threads here
             )
         if self.spec.stdin_text is not None and self._process.stdin is not None:
@@ -137,9 +140,10 @@ class Child:
                 os.killpg(self._process.pid, signal.SIGKILL)
 
     def _open_log(self) -> IO[str]:
-        self.log_path.parent.mkdir(parents=True, exist_ok=True)
+        make_private_folder(self.log_path.parent)
+        close_to_others(self.log_path.parent)
         too_long = self.log_path.exists() and self.log_path.stat().st_size > LOG_LIMIT_BYTES
-        return self.log_path.open("w" if too_long else "a")
+        return open_private(self.log_path, "w" if too_long else "a")
 
 
 class Supervisor:

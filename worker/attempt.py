@@ -221,31 +221,38 @@ class Attempt(Patient):
             self._persist(lambda connection: release_job(connection, self._claim))
             return Ending.RELEASED
         if reason is StopReason.CANCEL:
-            return self._finish(JobStatus.CANCELLED, outcome=self._best_so_far())
+            return self._end(JobStatus.CANCELLED)
         if reason is StopReason.DEADLINE:
             hint = (
                 "raise search.max_seconds, or ask for less: fewer particles, generations or links, "
                 "a shorter flight"
             )
             error = _error("deadline_exceeded", "the job did not end before its deadline", hint=hint)
-            return self._finish(JobStatus.EXPIRED, outcome=self._best_so_far(), error=error)
+            return self._end(JobStatus.EXPIRED, error)
         raise StaleClaim
 
     def _fail(self, error: Document) -> Ending:
         log.warning("job %s failed: %s", self._claim.job_id, error)
         self._vigil.heed()
-        best = self._best_so_far()
-        # as much of the best as there is room for: with its files, without, only why the job failed
-        choices = [] if best is None else [best, Outcome(best.document)]
         try:
-            for outcome in choices:
-                try:
-                    return self._finish(JobStatus.FAILED, outcome=outcome, error=error)
-                except StorageFull:
-                    log.warning("job %s: no room for what it leaves", self._claim.job_id)
-            return self._finish(JobStatus.FAILED, error=error)
+            return self._end(JobStatus.FAILED, error)
         except (StaleClaim, StorageFull):
             return Ending.ABANDONED  # without room for a sentence the reaper tries it later
+
+    def _end(self, status: JobStatus, error: Document | None = None) -> Ending:
+        """End early, with as much of the best so far as there is room for: with its files, without, nothing.
+
+        Raises
+        ------
+        StorageFull : there is no room for the end itself, not even the job store's reserve.
+        """
+        best = self._best_so_far()
+        for outcome in [] if best is None else [best, Outcome(best.document)]:
+            try:
+                return self._finish(status, outcome=outcome, error=error)
+            except StorageFull:
+                log.warning("job %s: no room for what it leaves", self._claim.job_id)
+        return self._finish(status, error=error, even_if_full=True)
 
     def _best_so_far(self) -> Outcome | None:
         if self._work is None or self._checkpoint is None:
@@ -258,7 +265,12 @@ class Attempt(Patient):
             return None
 
     def _finish(
-        self, status: JobStatus, *, outcome: Outcome | None = None, error: Document | None = None
+        self,
+        status: JobStatus,
+        *,
+        outcome: Outcome | None = None,
+        error: Document | None = None,
+        even_if_full: bool = False,
     ) -> Ending:
         self._persist(
             lambda connection: finish_job(
@@ -268,7 +280,8 @@ class Attempt(Patient):
                 result=None if outcome is None else outcome.document,
                 error=error,
                 artifacts={} if outcome is None else dict(outcome.artifacts),
-            )
+            ),
+            even_if_full=even_if_full,
         )
         return ENDINGS[status]
 

@@ -69,8 +69,12 @@ class Patient:
 
         return self._patiently(load)
 
-    def _persist(self, write: Callable[[Connection], bool]) -> None:
+    def _persist(self, write: Callable[[Connection], bool], *, even_if_full: bool = False) -> None:
         """Write in a transaction of its own; wait out a job store that is away.
+
+        Parameters
+        ----------
+        even_if_full : use the job store's reserve of disk space: for a few rows that must be written.
 
         Raises
         ------
@@ -79,6 +83,8 @@ class Patient:
         """
 
         def once() -> bool:
+            if even_if_full:
+                return self._database.write_even_if_full(write)
             with self._database.write() as connection:
                 return write(connection)
 

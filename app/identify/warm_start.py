@@ -13,6 +13,7 @@ from app.jobs.rows import get_job
 from app.models import repository as models
 from app.models.checks import known_model_faults
 from app.models.left_models import left_model
+from app.models.service import as_given
 from app.schemas.parameters import KnownModel, WholeResult
 from app.schemas.search import WarmStart
 
@@ -50,8 +51,7 @@ def _parameters(session: Session, owner: str, warm_start: WarmStart) -> Document
             _, document = models.get_model(session, owner, warm_start.model_id)
         except ModelNotFound as error:
             raise _refused("model_not_found", error.detail, "/model_id", error.hint) from None
-        parameters: Document = document["model"]
-        return parameters
+        return as_given(document["model"])
     if warm_start.job_id is not None:
         return _of_job(session, owner, warm_start.job_id)
     faults = known_model_faults(KnownModel(parameters=warm_start.parameters), POINTER)
@@ -79,8 +79,7 @@ def _of_job(session: Session, owner: str, job_id: str) -> Document:
             "/job_id",
             "Name an identification or a study with a result." if job.finished else hint,
         )
-    parameters: Document = left["model"]
-    return parameters
+    return as_given(left["model"])
 
 
 def _require_fit(request: IdentifyRequest, parameters: Document, at: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
@@ -11,6 +11,7 @@ from pydantic import AwareDatetime, BaseModel
 
 from app.audit.records import Action
 from app.audit.service import note
+from app.database import Session
 from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
@@ -19,6 +20,7 @@ from app.http.problems import documented
 from app.jobs import repository, service, store
 from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type
 from app.jobs.event_stream import stream_events, wait_for_end
+from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
 from app.jobs.results import JobResult
@@ -48,6 +50,21 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
         },
     },
     204: {"description": "The job has ended and every event was seen: do not connect again."},
+}
+
+# by reference: the forms of the four bodies are in the document already
+REQUEST: dict[str, Any] = {
+    "description": "The request, in the form that `POST /{operation}` takes.",
+    "content": {
+        "application/json": {
+            "schema": {
+                "anyOf": [
+                    {"$ref": f"#/components/schemas/{operation.capitalize()}Request"}
+                    for operation in get_args(Operation)
+                ]
+            }
+        }
+    },
 }
 
 
@@ -166,6 +183,25 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
 
 
 @router.get(
+    "/jobs/{job_id}/request",
+    dependencies=[demands(Scope.JOBS_READ)],
+    operation_id="get_job_request",
+    summary="Get the request of a job",
+    response_class=JSONResponse,
+    responses={200: REQUEST, **documented(InvalidRequest, JobNotFound)},
+)
+def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
+    """Return what was asked for, whole: to look at it, or to post it again to the job's operation.
+
+    Uploaded flights and identified models stand in it with their content, as they were when the job was
+    posted, and so do the defaults. So the same job comes of it even where they were deleted since.
+    """
+    with app.database.read() as session:
+        text = repository.request_json(session, owner, job_id)
+    return Response(text, media_type="application/json")
+
+
+@router.get(
     "/jobs/{job_id}/artifacts",
     dependencies=[demands(Scope.JOBS_READ)],
     operation_id="list_job_artifacts",
@@ -230,9 +266,13 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
     A queued job ends at once; a running one within two seconds, and its best so far is a partial result; a
     finished one stays as it is.
     """
-    with app.database.write() as session:
+
+    def cancel(session: Session) -> StoredJob:
         job = store.request_cancel(session, caller.owner, job_id)
         note(session, caller, Action.JOB_CANCEL, job_id)
+        return job
+
+    job = app.database.write_even_if_full(cancel)
     if job.status is JobStatus.CANCELLING:
         app.publisher.publish(job_id)  # a spread job is in nobody's hands: whoever is woken winds it down
     return Job.of(job)
@@ -248,6 +288,9 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
 )
 def delete_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> None:
     """Delete a finished job with its events, result and files; its identified model stays."""
-    with app.database.write() as session:
+
+    def remove(session: Session) -> None:
         repository.delete_job(session, caller.owner, job_id)
         note(session, caller, Action.JOB_DELETE, job_id)
+
+    app.database.write_even_if_full(remove)

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, delete, select
+from sqlalchemy import ColumnElement, delete, func, select, union_all
 
 from app.database import Session
 from app.documents import unpacked_json
 from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
 from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
-from app.tables import artifacts, idempotency_keys, job_events, job_results, jobs
+from app.tables import (
+    STATUSES,
+    artifacts,
+    idempotency_keys,
+    job_events,
+    job_requests,
+    job_results,
+    jobs,
+)
 
+EVERY_STATUS = (None,)
 ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
 
 
@@ -38,14 +47,28 @@ class JobFilter:
     created_after: datetime | None = None
     created_before: datetime | None = None
 
-    def conditions(self) -> Iterator[ColumnElement[bool]]:
-        """The same in SQL."""
-        if self.statuses:
-            yield jobs.c.status.in_(self.statuses)
+    @property
+    def ranges(self) -> tuple[str | None, ...]:
+        """Statuses to list and merge; None where jobs of all statuses lie in one order."""
+        if self.label is not None or (not self.statuses and self.operation is None):
+            return EVERY_STATUS
+        return tuple(dict.fromkeys(self.statuses)) or STATUSES
+
+    def kinds(self) -> Iterator[ColumnElement[bool]]:
+        """What kind of job, in SQL."""
+        if self.label is None:
+            if self.operation is not None:
+                yield jobs.c.operation == self.operation
+            return
+        yield jobs.c.label == self.label
+        # few jobs have the label: the other conditions are put so that no other index seems to fit as well
         if self.operation is not None:
-            yield jobs.c.operation == self.operation
-        if self.label is not None:
-            yield jobs.c.label == self.label
+            yield func.lower(jobs.c.operation) == self.operation
+        if self.statuses:
+            yield func.lower(jobs.c.status).in_(self.statuses)
+
+    def times(self) -> Iterator[ColumnElement[bool]]:
+        """When they were made, in SQL."""
         if self.created_after is not None:
             yield jobs.c.created_at >= self.created_after.timestamp() - ROUNDED_S
         if self.created_before is not None:
@@ -56,11 +79,36 @@ def list_jobs(
     session: Session, owner: str, wanted: JobFilter, *, before: str | None, limit: int
 ) -> list[Job]:
     """Newest jobs first, older than the id `before` when given."""
-    query = select(*JOB_COLUMNS).where(jobs.c.owner == owner, *wanted.conditions())
-    if before is not None:
-        query = query.where(jobs.c.id < before)
-    rows = session.execute(query.order_by(jobs.c.id.desc()).limit(limit))
+    places = [] if before is None else [jobs.c.id < before]
+    times = list(wanted.times())
+    if times:
+        ends = session.execute(
+            select(func.min(jobs.c.id), func.max(jobs.c.id)).where(jobs.c.owner == owner, *places, *times)
+        ).one()
+        if ends[0] is None:
+            return []
+        # ids rise with time but for what two hosts' clocks differ: between these there is hardly another job
+        places = [jobs.c.id.between(*ends), *times]
+    matches = [jobs.c.owner == owner, *wanted.kinds(), *places]
+    if len(wanted.ranges) > 1:
+        matches = [jobs.c.id.in_(_newest_ids(session, wanted.ranges, matches, limit))]
+    elif wanted.ranges != EVERY_STATUS:
+        matches.append(jobs.c.status == wanted.ranges[0])
+    rows = session.execute(select(*JOB_COLUMNS).where(*matches).order_by(jobs.c.id.desc()).limit(limit))
     return [job_from_row(row) for row in rows]
+
+
+def _newest_ids(
+    session: Session, statuses: Iterable[str | None], matches: list[ColumnElement[bool]], limit: int
+) -> list[str]:
+    """Ids of the newest jobs of each status: one range of an index for each, in order.
+
+    With several statuses in one condition the database would read and sort every match.
+    """
+    newest = select(jobs.c.id).where(*matches).order_by(jobs.c.id.desc()).limit(limit)
+    ranges = (newest.where(jobs.c.status == status).subquery() for status in statuses)
+    found = session.scalars(union_all(*(select(part.c.id) for part in ranges)))
+    return sorted(found, reverse=True)[:limit]
 
 
 def events_after(session: Session, owner: str, job_id: str, seq: int, limit: int) -> list[Event]:
@@ -92,6 +140,24 @@ def result_json(session: Session, owner: str, job_id: str) -> bytes | None:
     if row is None:
         raise JobNotFound(job_id)
     return None if row.document is None else unpacked_json(row.document)
+
+
+def request_json(session: Session, owner: str, job_id: str) -> bytes:
+    """Return the JSON text of a job's request, every sample and model inline.
+
+    Raises
+    ------
+    JobNotFound
+        When `owner` has no such job.
+    """
+    document = session.execute(
+        select(job_requests.c.document)
+        .join(jobs, jobs.c.id == job_requests.c.job_id)
+        .where(jobs.c.id == job_id, jobs.c.owner == owner)
+    ).scalar_one_or_none()
+    if document is None:
+        raise JobNotFound(job_id)
+    return unpacked_json(document)
 
 
 def list_artifacts(session: Session, owner: str, job_id: str) -> list[StoredArtifact]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, delete, insert, select, update
+from sqlalchemy import ColumnElement, Row, Text, cast, delete, func, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import finite
@@ -13,7 +13,7 @@ from app.errors import JobNotFound
 from app.jobs.records import FINISHED, Job, JobStatus, moment, optional_moment
 from app.keys import quota
 from app.observability.job_counts import note_transition
-from app.tables import job_chunks, job_events, jobs
+from app.tables import job_checkpoints, job_chunks, job_events, jobs
 from app.webhooks.outbox import note_end
 
 JOB_COLUMNS = (
@@ -93,7 +93,9 @@ def transition(
     payload: Mapping[str, Any] | None = None,
     **values: Any,
 ) -> Row[*tuple[Any, ...]] | None:
-    """Compare-and-set on one job row, with its event; an end also settles its share of the key's quota.
+    """Compare-and-set on one job row, with its event.
+
+    An end, of whatever kind, also settles the job's share of the key's quota and drops the state of its work.
 
     Parameters
     ----------
@@ -130,9 +132,23 @@ def transition(
             day=quota.usage_day(row.created_at),
         )
         note_end(session, row)
-        # nobody flies for it any more
-        session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
+        _drop_state(session, row.id)
     return row
+
+
+def _drop_state(session: Session, job_id: str) -> None:
+    """Delete what only somebody who goes on with a job needs, and count what stays: nothing grows any more.
+
+    What an end leaves of its best so far is in its result by then, or lost with its worker.
+    """
+    session.execute(delete(job_chunks).where(job_chunks.c.job_id == job_id))
+    session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == job_id))
+    history = (
+        select(func.coalesce(func.sum(func.length(cast(job_events.c.payload, Text))), 0))
+        .where(job_events.c.job_id == job_id)
+        .scalar_subquery()
+    )
+    session.execute(update(jobs).where(jobs.c.id == job_id).values(size_bytes=jobs.c.size_bytes + history))
 
 
 def insert_event(

@@ -243,11 +243,10 @@ def finish_job(
             model_id=row.model_id,
             owner=row.owner,
             job_id=row.id,
+            key_id=row.key_id,
             request=load_request(session, row.id),
             identified=identified,
         )
-    if succeeded:
-        session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == claim.job_id))
     return True
 
 

@@ -1,4 +1,4 @@
-"""The reaper and the retention inside the API process: they go on while every worker is busy for hours.
+"""Reaper, retention and disk space inside the API process: they go on while every worker is busy for hours.
 
 Workers reap too, whenever one is free. Each change is a compare-and-set, so nobody gets in another's way.
 """
@@ -12,6 +12,7 @@ import threading
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
+from app.disk_space import give_back
 from app.jobs.queue import Publisher
 from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
@@ -21,6 +22,8 @@ from app.settings import Settings
 REAP_EVERY_S = 10.0
 FORGET_EVERY_S = 300.0
 STOP_S = 5.0
+GIVE_BACK_SLICES = 20  # of free pages in one round, with a pause for other writers after each
+PAUSE_S = 0.05
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +58,8 @@ class Upkeep:
 
     def start(self) -> None:
         """Begin."""
+        if self._database.reserve is not None:
+            self._database.reserve.fill()
         self._thread.start()
 
     @property
@@ -79,8 +84,17 @@ class Upkeep:
                 if forget_in_s <= 0.0:
                     more = self.forget()
                     forget_in_s = 0.0 if more else FORGET_EVERY_S
+                self.tidy_disk()
             except SQLAlchemyError as error:
                 log.warning("no upkeep this time, the database does not answer: %s", error)
+
+    def tidy_disk(self) -> None:
+        """Keep the reserve whole, and give back what deleted rows have left."""
+        if self._database.reserve is not None:
+            self._database.reserve.fill()
+        for _ in range(GIVE_BACK_SLICES):
+            if not give_back(self._database) or self._stopping.wait(PAUSE_S):
+                return
 
     def reap(self) -> ReapReport:
         """Make one round of the reaper."""

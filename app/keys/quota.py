@@ -8,13 +8,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sqlalchemy import case, func, select, update
+from sqlalchemy import ColumnElement, case, func, select, update
 
 from app.database import Session, database_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
 from app.keys.records import Quota, Usage
-from app.tables import STATUSES, api_keys, jobs, key_usage, trajectories
+from app.tables import (
+    STATUSES,
+    api_keys,
+    job_checkpoints,
+    job_chunks,
+    jobs,
+    key_usage,
+    models,
+    trajectories,
+)
 
 DAY_S = 86_400
 IN_FLIGHT = tuple(status for status in STATUSES if status not in FINISHED)
@@ -141,11 +150,29 @@ def _flights(session: Session, key_id: str, day: int) -> int:
 
 
 def _stored(session: Session, key_id: str) -> int:
+    """Bytes of the key's jobs, uploads and models, and of the state of its jobs that have not ended."""
     total = 0
-    for table in (jobs, trajectories):
-        size = select(func.coalesce(func.sum(table.c.size_bytes), 0)).where(table.c.key_id == key_id)
+    for table in (jobs, trajectories, models):
+        size = select(_sum(table.c.size_bytes)).where(table.c.key_id == key_id)
         total += int(session.scalar(size) or 0)
+    # asked for as it is now: it changes twice a second, and is gone when the job ends
+    sizes = (
+        (job_checkpoints, func.length(job_checkpoints.c.data)),
+        (job_chunks, func.length(job_chunks.c.task) + func.coalesce(func.length(job_chunks.c.outcome), 0)),
+    )
+    for state, size_bytes in sizes:
+        live = (
+            select(_sum(size_bytes))
+            .select_from(state)
+            .join(jobs, jobs.c.id == state.c.job_id)
+            .where(jobs.c.key_id == key_id, jobs.c.status.in_(IN_FLIGHT))
+        )
+        total += int(session.scalar(live) or 0)
     return total
+
+
+def _sum(size_bytes: ColumnElement[int]) -> ColumnElement[int]:
+    return func.coalesce(func.sum(size_bytes), 0)
 
 
 def _add_flights(session: Session, key_id: str, day: int, flights: int) -> None:

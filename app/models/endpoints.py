@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path
 
 from app.audit.records import Action
 from app.audit.service import note
+from app.database import Session
 from app.errors import InvalidRequest, ModelNotFound
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
@@ -64,6 +65,9 @@ def delete_model(
     app: ServiceDep, caller: CallerDep, model_id: Annotated[str, Path(pattern=ID_PATTERN)]
 ) -> None:
     """Delete a model; its job keeps the result, and jobs that were started with it have copies."""
-    with app.database.write() as session:
+
+    def remove(session: Session) -> None:
         repository.delete_model(session, caller.owner, model_id)
         note(session, caller, Action.MODEL_DELETE, model_id)
+
+    app.database.write_even_if_full(remove)

@@ -31,12 +31,21 @@ class ModelSummary:
 
 
 def insert_model(
-    session: Session, *, model_id: str, owner: str, job_id: str, request: Document, identified: Document
+    session: Session,
+    *,
+    model_id: str,
+    owner: str,
+    job_id: str,
+    key_id: str | None,
+    request: Document,
+    identified: Document,
 ) -> None:
     """Store an identified model with all that is needed to fly it again.
 
     Parameters
     ----------
+    key_id
+        Of the job that identified it; the model counts in this key's stored bytes until it is deleted.
     request
         Of the job that identified it; its aircraft, flight and options are kept.
     identified
@@ -46,6 +55,15 @@ def insert_model(
     aircraft = request.get("aircraft") or {}
     links = model.get("links_per_wing")
     name = str(aircraft.get("name") or "aircraft")
+    stored = packed(
+        {
+            "model": model,
+            "fit": identified.get("fit", []),
+            "aircraft": aircraft,
+            "flight": request.get("flight") or {},
+            "options": {**(request.get("model") or {}), "links_per_wing": links},
+        }
+    )
     session.execute(
         insert(models).values(
             id=model_id,
@@ -53,16 +71,10 @@ def insert_model(
             name=f"{name}, {links} links per wing"[:NAME_LENGTH],
             job_id=job_id,
             links_per_wing=links,
-            document=packed(
-                {
-                    "model": model,
-                    "fit": identified.get("fit", []),
-                    "aircraft": aircraft,
-                    "flight": request.get("flight") or {},
-                    "options": {**(request.get("model") or {}), "links_per_wing": links},
-                }
-            ),
+            document=stored,
             created_at=database_time(),
+            key_id=key_id,
+            size_bytes=len(stored),
         )
     )
 

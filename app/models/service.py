@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pydantic import ValidationError
+
 from app.database import Session
 from app.documents import Document
 from app.errors import Fault, InvalidRequest, ModelNotFound
 from app.models import repository
 from app.models.checks import known_model_faults
 from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
-from app.schemas.parameters import KnownModel, WholeResult
+from app.schemas.parameters import KnownModel, Parameters, WholeResult
 
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
 
@@ -55,6 +57,18 @@ def known_model(session: Session, owner: str, model: KnownModel, pointer: str = 
     return {"parameters": parameters, **identified, **chosen}
 
 
+def as_given(model: Document) -> Document:
+    """Give a stored model in the form that the same parameters get when a request holds them outright.
+
+    So a job's request, in which references are resolved, makes the same job when it is posted again. A model
+    that no request could hold any more, of an earlier version say, stays as it is.
+    """
+    try:
+        return Parameters.model_validate(model).model_dump(exclude_none=True)
+    except ValidationError:
+        return model
+
+
 def _parameters(session: Session, owner: str, model: KnownModel, pointer: str) -> Document:
     """Find the parameters: in the request, or in the owner's identified model."""
     given = model.parameters
@@ -65,5 +79,4 @@ def _parameters(session: Session, owner: str, model: KnownModel, pointer: str) -
     except ModelNotFound as error:
         fault = Fault("model_not_found", error.detail, pointer, error.hint)
         raise InvalidRequest.of([fault]) from None
-    parameters: Document = document["model"]
-    return parameters
+    return as_given(document["model"])

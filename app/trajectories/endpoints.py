@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 
 from app.audit.records import Action
 from app.audit.service import note
+from app.database import Session
 from app.errors import (
     InvalidRequest,
     MalformedBody,
@@ -196,6 +197,9 @@ def delete_trajectory(
     app: ServiceDep, caller: CallerDep, trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)]
 ) -> None:
     """Delete an uploaded flight; jobs that were started with it have copies of their own."""
-    with app.database.write() as session:
+
+    def remove(session: Session) -> None:
         repository.delete_trajectory(session, caller.owner, trajectory_id)
         note(session, caller, Action.TRAJECTORY_DELETE, trajectory_id)
+
+    app.database.write_even_if_full(remove)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
@@ -22,6 +22,9 @@ from cli.screen import (
     reports_errors,
     stdout,
 )
+
+if TYPE_CHECKING:
+    from cli.service import Service
 
 SHOW_RESULT: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
     "identify": show_model,
@@ -91,12 +94,18 @@ def watch_job(
     as_json: options.AsJson = False,
 ) -> None:
     """Follow a job to its end; the exit code tells how it ended. With --json, one line per change."""
-    import json
-
     from cli.service import Service
 
+    with Service(url, api_key) as service:
+        _follow(service, job, as_json=as_json)
+
+
+def _follow(service: Service, job: str, *, as_json: bool) -> NoReturn:
+    """Show a job until it has ended, and exit as it did."""
+    import json
+
     last: dict[str, Any] = {}
-    with Service(url, api_key) as service, meter() as bar:
+    with meter() as bar:
         for seen in service.watch(job):
             if as_json and seen != last:
                 stdout().print(json.dumps(seen), markup=False, soft_wrap=True)
@@ -108,6 +117,39 @@ def watch_job(
         if last.get("error"):
             print_job_error(last["error"])
     raise typer.Exit(int(exit_for(last["status"])))
+
+
+@jobs.command("rerun")
+@reports_errors
+def rerun_job(
+    job: JobId,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="POINTER=VALUE",
+            help="Ask for something else there: `--set /search/seed=2`; repeat. VALUE is JSON, or a text.",
+        ),
+    ] = None,
+    watch: Annotated[bool, typer.Option("--watch", help="Follow the new job to its end.")] = False,
+    url: options.Url = options.DEFAULT_URL,
+    api_key: options.ApiKey = None,
+    as_json: options.AsJson = False,
+) -> None:
+    """Post a job's request again, as it was or changed, and print the new job's id."""
+    from cli.request import changed
+    from cli.service import Service
+
+    with Service(url, api_key) as service:
+        operation = service.job(job)["operation"]
+        request = changed(service.request(job), changes or [])
+        made = service.submit(operation, request)
+        if as_json and not watch:
+            print_json(made)
+        elif not as_json:
+            stdout().print(made["id"], markup=False)
+        if watch:
+            _follow(service, made["id"], as_json=as_json)
 
 
 @jobs.command("cancel")

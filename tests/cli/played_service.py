@@ -19,6 +19,7 @@ class PlayedService:
     result : of the job.
     ending : final status.
     files : what the job leaves behind.
+    request : what was asked for when the job was posted.
     """
 
     def __init__(
@@ -28,8 +29,10 @@ class PlayedService:
         ending: str = "succeeded",
         *,
         files: Mapping[str, bytes] = MappingProxyType({"convergence.svg": b"<svg/>"}),
+        request: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.files = files
+        self.request = dict(request)
         self.operation = operation
         self.result = result
         self.ending = ending
@@ -47,6 +50,7 @@ class PlayedService:
             "POST /trajectories": httpx.Response(201, json={"id": f"traj_{self.asked.count(call)}"}),
             f"POST /{self.operation}": httpx.Response(202, json=self.job("queued")),
             "GET /jobs/job_1": httpx.Response(200, json=self.job(status)),
+            "GET /jobs/job_1/request": httpx.Response(200, json=self.request),
             "GET /jobs/job_1/result": httpx.Response(200, json=self.result),
             "GET /jobs/job_1/artifacts": httpx.Response(
                 200, json={"artifacts": [{"name": name} for name in self.files]}
@@ -67,6 +71,7 @@ class PlayedService:
         )
         return {
             "id": "job_1",
+            "operation": self.operation,
             "status": status,
             "progress": {"fraction": 0.5},
             "partial": False,

@@ -1,0 +1,48 @@
+"""Files that hold secrets, readable by nobody else from their first byte: 0600 in folders of 0700."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import IO
+
+PRIVATE_FILE = 0o600
+PRIVATE_FOLDER = 0o700
+PRIVATE_UMASK = 0o077  # of processes that write such files by means of their own
+OTHERS = 0o077
+
+
+def make_private_folder(path: Path) -> None:
+    """Make a folder, and those above it that are missing, for this user only."""
+    if not path.is_dir():
+        make_private_folder(path.parent)
+        path.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
+
+
+def touch_private(path: Path) -> None:
+    """Make an empty file for this user only, or take what others may do from one that exists."""
+    descriptor = _opened(path, os.O_RDWR)
+    os.close(descriptor)
+
+
+def open_private(path: Path, mode: str) -> IO[str]:
+    """Open a text file for writing (``w``) or appending (``a``) as `touch_private` makes it."""
+    return open(path, mode, encoding="utf-8", opener=lambda name, flags: _opened(Path(name), flags))
+
+
+def close_to_others(path: Path) -> bool:
+    """Take from a file or folder of ours what others may do with it; tell whether that was anything."""
+    found = path.stat()
+    if not found.st_mode & OTHERS or found.st_uid != os.geteuid():
+        return False
+    path.chmod(stat.S_IMODE(found.st_mode) & ~OTHERS)
+    return True
+
+
+def _opened(path: Path, flags: int) -> int:
+    descriptor = os.open(path, flags | os.O_CREAT | os.O_CLOEXEC, PRIVATE_FILE)
+    found = os.fstat(descriptor)
+    if found.st_mode & OTHERS and stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid():
+        os.fchmod(descriptor, stat.S_IMODE(found.st_mode) & ~OTHERS)  # an earlier version made it
+    return descriptor

@@ -1,0 +1,74 @@
+"""Room kept for what must be written even on a full disk: the cancel of a job, a deletion, an end."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+RESERVE_BYTES = 4 * 2**20
+SLICE_BYTES = 2**19  # what one such write may need: some dozens of pages in the journal
+STEP_BYTES = 2**15  # in which what was not needed is taken back
+SHARE = 16  # of a small disk's free room only such a part is kept
+SUFFIX = "-reserve"
+
+
+class Reserve:
+    """A file beside an SQLite database whose blocks are given to the database when the disk has no others.
+
+    Writes that may wait never get them, so a disk that is full for them is not full for a cancel. Any number
+    of processes may lend and fill at once: each step leaves a file that is merely shorter or longer.
+
+    Parameters
+    ----------
+    database : Path
+        The database's file.
+    size_bytes : int
+        Kept when there is ample room.
+    """
+
+    def __init__(self, database: Path, size_bytes: int = RESERVE_BYTES) -> None:
+        self.path = database.with_name(database.name + SUFFIX)
+        self._size_bytes = size_bytes
+
+    def fill(self) -> None:
+        """Take back what is missing, as far as there is room; silent where there is none."""
+        with contextlib.suppress(OSError):
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            try:
+                held = os.fstat(descriptor).st_size
+                disk = os.fstatvfs(descriptor)
+                wanted = min(self._size_bytes, (disk.f_bavail * disk.f_frsize + held) // SHARE)
+                while held < wanted:
+                    held += _grow(descriptor, held, min(SLICE_BYTES, wanted - held))
+            finally:
+                os.close(descriptor)
+
+    def take_back(self) -> None:
+        """Take back what is left of a slice, before somebody else's write finds it."""
+        with contextlib.suppress(OSError):
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CLOEXEC)
+            try:
+                held = os.fstat(descriptor).st_size
+                wanted = min(held + SLICE_BYTES, self._size_bytes)
+                while held < wanted:
+                    held += _grow(descriptor, held, min(STEP_BYTES, wanted - held))
+            finally:
+                os.close(descriptor)
+
+    def lend(self) -> bool:
+        """Give a slice to whoever writes next; False when nothing is left."""
+        with contextlib.suppress(OSError):
+            held = self.path.stat().st_size
+            if held > 0:
+                os.truncate(self.path, max(held - SLICE_BYTES, 0))
+                return True
+        return False
+
+
+def _grow(descriptor: int, held: int, by: int) -> int:
+    """Add blocks that are really there: a hole in a file keeps no room."""
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(descriptor, held, by)
+        return by
+    return os.pwrite(descriptor, os.urandom(by), held)
