@@ -26,7 +26,9 @@ from tests.waiting import until
 BOMBS = 14
 BOMB_S = 1.0  # a real one takes up to 20
 OTHERS_WAIT_S = 3.0
-FLIGHT = b"t,sweep_left,sweep_right,phi,theta,psi\n0,0,0,0,0,0\n1,0,0,0,0,0\n"
+FLIGHT = (
+    "t,sweep_left,sweep_right,phi,theta,psi\n" + "".join(f"{0.01 * i},0,0,0,0,0\n" for i in range(20))
+).encode()
 BODY_BYTES = 2**20
 
 
