@@ -300,6 +300,9 @@ class TooManyRequests(ServiceError):
         return {"Retry-After": str(self.retry_after_s)}
 
 
+STREAM_ENDS_S = 5  # when to ask again for what other requests of the owner give back
+
+
 class TooManyRefusals(TooManyRequests):
     """An address that keeps sending keys that do not open."""
 
@@ -311,6 +314,31 @@ class TooManyRefusals(TooManyRequests):
             "This address has sent too many invalid API keys.",
             "Correct the key; then ask again after the time of Retry-After.",
             retry_after_s=retry_after_s,
+        )
+
+
+class TooManyStreams(TooManyRequests):
+    """The owner follows as many jobs at once as one may."""
+
+    code = "too_many_streams"
+    title = "Too many event streams or waiting requests at once"
+
+    @classmethod
+    def of_streams(cls, limit: int) -> TooManyStreams:
+        """Tell that there are as many event streams as one owner may have."""
+        return cls(
+            f"You have {limit} event streams open, and may have no more at once.",
+            "Close one that is not needed, or read the events a page at a time: Accept: application/json.",
+            retry_after_s=STREAM_ENDS_S,
+        )
+
+    @classmethod
+    def of_waits(cls, limit: int) -> TooManyStreams:
+        """Tell that as many requests wait as one owner may have."""
+        return cls(
+            f"{limit} requests of yours wait for jobs (Prefer: wait), and no more may at once.",
+            "Ask without Prefer: wait, or again when one of them has been answered.",
+            retry_after_s=STREAM_ENDS_S,
         )
 
 

@@ -14,11 +14,13 @@ from fastapi import FastAPI
 
 from app.afterwards import Afterwards
 from app.database import Database, upgrade
+from app.errors import TooManyStreams
 from app.health.endpoints import router as health
 from app.health.service import Health
 from app.http.body_limit import BodyLimit, BodyLimits
 from app.http.context import Service
 from app.http.gate import Gate
+from app.http.head import HeadAsGet
 from app.http.observed import Observed
 from app.http.problems import install_problem_handlers
 from app.http.request_id import RequestId
@@ -31,11 +33,14 @@ from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
 from app.keys.endpoints import router as keys
 from app.keys.keyring import KeyRing
+from app.keys.watch import KeyWatch
 from app.models.endpoints import router as models
 from app.observability.logs import configure_logging
 from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
 from app.optimize.endpoints import router as optimize
+from app.owner_limit import OwnerLimit
+from app.owner_turns import OwnerTurns
 from app.parsing.confinement import Limits
 from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
@@ -48,6 +53,9 @@ from app.web.endpoints import router as web
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
+
+BODIES_AT_ONCE = 16  # of the largest size
+READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too
 
 
 def routed_app() -> FastAPI:
@@ -77,9 +85,14 @@ def create_app(settings: Settings | None = None, *, sending: SenderSettings | No
     app = routed_app()
     app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
     install_problem_handlers(app, known_fields=lambda: _request_fields(app))
+    bodies = BODIES_AT_ONCE * chosen.max_body_bytes
     limits = BodyLimits(
-        chosen.max_body_bytes, chosen.body_grace_s, max_total_bytes=16 * chosen.max_body_bytes
+        chosen.max_body_bytes,
+        chosen.body_grace_s,
+        max_total_bytes=bodies,
+        max_owner_bytes=bodies // 2 if chosen.demands_keys else bodies,
     )
+    app.add_middleware(HeadAsGet)
     app.add_middleware(BodyLimit, limits=limits)
     app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
     _wrap(app)
@@ -106,6 +119,11 @@ def _sending(settings: Settings) -> SenderSettings:
     )
 
 
+def _turns(settings: Settings, at_once: int) -> OwnerTurns:
+    """Slots of which one owner leaves one to the others; where everyone is one owner, there are no others."""
+    return OwnerTurns(at_once, max(1, at_once - 1) if settings.demands_keys else at_once)
+
+
 def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -116,22 +134,27 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
         watcher = JobWatcher(database, settings.event_poll_s)
         afterwards = Afterwards(database)
         keys = KeyRing(database, afterwards)
-        parsers = ParserPool(settings.parsers, Limits(settings.parser_memory_bytes))
+        key_watch = KeyWatch(database)
         app.state.service = Service(
-            settings,
-            database,
-            publisher,
-            watcher,
-            QueueView(),
-            keys,
-            afterwards,
-            parsers,
-            sending.policy,
+            settings=settings,
+            database=database,
+            publisher=publisher,
+            watcher=watcher,
+            queue=QueueView(),
+            keys=keys,
+            key_watch=key_watch,
+            afterwards=afterwards,
+            parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
+            reads=_turns(settings, READS_AT_ONCE),
+            streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
+            waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
+            webhook_policy=sending.policy,
         )
         app.state.health = Health(database, settings)
         afterwards.start()
         publisher.start()
         watcher.start()
+        key_watch.start()
         sender = WebhookSender(database, sending)
         sender.start()
         upkeep = Upkeep(database, publisher, settings)
@@ -141,6 +164,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
                 yield
         finally:
             await watcher.stop()
+            await key_watch.stop()
             await asyncio.to_thread(upkeep.stop)
             await asyncio.to_thread(sender.stop)
             await asyncio.to_thread(publisher.stop)

@@ -68,6 +68,12 @@ class Settings(BaseSettings):
     max_connections: int = Field(
         default=4096, ge=8, le=100_000, description="Connections at once; event streams count."
     )
+    max_streams_per_owner: int = Field(
+        default=200,
+        ge=1,
+        le=100_000,
+        description="Event streams of one owner at once in a process, and as many requests that wait.",
+    )
     header_timeout_s: float = Field(
         default=10.0, gt=0.0, le=600.0, description="Time to send the headers of a request."
     )

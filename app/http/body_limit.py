@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import Counter
 from dataclasses import dataclass
 
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import BodyTooLarge, ServiceBusy, ServiceError, SlowBody
+from app.http.context import caller_of
 from app.http.early_answer import answer_early
+from app.keys.watch import KeyInUse
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +30,15 @@ class BodyLimits:
         Bytes per second that a larger one must arrive with on top.
     max_total_bytes : int
         All bodies together that are being received or read; beyond it requests are told to come again.
+    max_owner_bytes : int
+        The same of one owner, which leaves room for the others.
     """
 
     max_bytes: int
     grace_s: float = 20.0
     least_rate: float = 16_384.0
     max_total_bytes: int = 2**30
+    max_owner_bytes: int = 2**30
 
 
 class BodyLimit:
@@ -48,6 +54,7 @@ class BodyLimit:
         self.app = app
         self.limits = limits
         self.total = 0  # bytes of all bodies whose requests are not yet answered
+        self.of_owners: Counter[str] = Counter()  # the same of each owner's
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -66,7 +73,7 @@ class BodyLimit:
             if not body.refused:
                 raise
         finally:
-            self.total -= body.counted
+            body.forget()
 
 
 class _Body:
@@ -77,6 +84,9 @@ class _Body:
         self.scope = scope
         self.from_client = receive
         self.to_client = send
+        caller = caller_of(scope)
+        self.owner = "" if caller is None else caller.owner
+        self.key = KeyInUse() if caller is None else caller.key
         self.counted = 0
         self.waited_s = 0.0  # for the client; the application's own pauses are not the client's fault
         self.complete = False
@@ -109,7 +119,10 @@ class _Body:
         limits = self.limit.limits
         start = time.monotonic()
         try:
-            async with asyncio.timeout(limits.grace_s + self.counted / limits.least_rate - self.waited_s):
+            async with (
+                asyncio.timeout(limits.grace_s + self.counted / limits.least_rate - self.waited_s),
+                self.key.while_it_opens(),
+            ):
                 message = await self.from_client()
         except TimeoutError:
             raise SlowBody from None
@@ -120,11 +133,21 @@ class _Body:
         size = len(message.get("body", b""))
         self.counted += size
         self.limit.total += size
+        self.limit.of_owners[self.owner] += size
         self.complete = not message.get("more_body", False)
         if self.counted > self.limit.limits.max_bytes:
             raise _too_large(self.limit.limits)
         if self.limit.total > self.limit.limits.max_total_bytes:
             raise ServiceBusy("Too many large bodies are being received at the moment.")
+        if self.limit.of_owners[self.owner] > self.limit.limits.max_owner_bytes:
+            raise ServiceBusy("Too many large bodies of yours are being received at the moment.")
+
+    def forget(self) -> None:
+        """Give back what the body took of the limits."""
+        self.limit.total -= self.counted
+        self.limit.of_owners[self.owner] -= self.counted
+        if not self.limit.of_owners[self.owner]:
+            del self.limit.of_owners[self.owner]
 
 
 def _announced(scope: Scope) -> int:

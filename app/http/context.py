@@ -17,6 +17,9 @@ from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
 from app.keys.keyring import KeyRing
 from app.keys.records import Quota, Scope
+from app.keys.watch import KeyInUse, KeyWatch
+from app.owner_limit import OwnerLimit
+from app.owner_turns import OwnerTurns
 from app.parsing.pool import ParserPool
 from app.settings import Settings
 from app.webhooks.addresses import AddressPolicy
@@ -32,7 +35,15 @@ BEARER = HTTPBearer(
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """The parts of one running API process."""
+    """The parts of one running API process.
+
+    Attributes
+    ----------
+    reads : OwnerTurns
+        Reads of the database for clients that follow jobs.
+    streams, waits : OwnerLimit
+        Event streams and waiting requests.
+    """
 
     settings: Settings
     database: Database
@@ -40,9 +51,13 @@ class Service:
     watcher: JobWatcher
     queue: QueueView
     keys: KeyRing
+    key_watch: KeyWatch
     afterwards: Afterwards
     parsers: ParserPool
     webhook_policy: AddressPolicy
+    reads: OwnerTurns
+    streams: OwnerLimit
+    waits: OwnerLimit
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +78,8 @@ class Caller:
         Of the other end.
     quota : Quota
         How much it may use.
+    key : KeyInUse
+        Tells whether its key still opens.
     """
 
     owner: str
@@ -71,6 +88,7 @@ class Caller:
     request_id: str
     address: str
     quota: Quota
+    key: KeyInUse
 
 
 async def current_service(request: Request) -> Service:
@@ -91,11 +109,13 @@ async def current_caller(request: Request) -> Caller:
     Raises
     ------
     Unauthorized
-        Nobody known: the path is a public one, or there is no gate.
+        Nobody known: the path is a public one, or there is no gate. Or the key was revoked or has expired
+        while the body arrived.
     """
     caller = caller_of(request.scope)
     if caller is None:
         raise Unauthorized
+    caller.key.must_open()
     return caller
 
 

@@ -7,15 +7,12 @@ public list needs a valid key. What a key may do is said by each route (`app.htt
 from __future__ import annotations
 
 import logging
-import time
-from contextlib import suppress
 from functools import partial
 
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.datastructures import Headers
-from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.audit import repository as audit
 from app.audit.records import Action
@@ -24,10 +21,11 @@ from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
 from app.http.early_answer import answer_early
 from app.http.origins import Doors, refusal
 from app.http.request_id import current_request_id
-from app.keys.keyring import FRESH_S, Refusal
+from app.keys.keyring import Refusal
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
 from app.keys.refusal_limit import RefusalLimit
 from app.keys.secret import KeyText
+from app.keys.watch import KeyInUse
 from app.settings import Settings
 
 PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
@@ -67,19 +65,23 @@ class Gate:
             return
         address = scope["client"][0][:ADDRESS_LENGTH] if scope.get("client") else ""
         if not self._demands_keys:
-            caller = Caller(LOCAL_OWNER, None, EVERY_SCOPE, current_request_id(), address, NO_QUOTA)
-            scope[CALLER] = caller
+            request_id = current_request_id()
+            scope[CALLER] = Caller(LOCAL_OWNER, None, EVERY_SCOPE, request_id, address, NO_QUOTA, KeyInUse())
             await self.app(scope, receive, send)
             return
         try:
-            key, text = await self._key(scope, address)
+            key = await self._key(scope, address)
         except ServiceError as refused:
             await answer_early(refused, scope, receive, send)
             return
-        scope[CALLER] = Caller(key.owner, key.id, key.scopes, current_request_id(), address, key.quota)
-        await _while_the_key_opens(self.app, text, scope, receive, send)
+        service: Service = scope["app"].state.service
+        with service.key_watch.use(key) as in_use:
+            scope[CALLER] = Caller(
+                key.owner, key.id, key.scopes, current_request_id(), address, key.quota, in_use
+            )
+            await self.app(scope, receive, send)
 
-    async def _key(self, scope: Scope, address: str) -> tuple[ApiKey, KeyText]:
+    async def _key(self, scope: Scope, address: str) -> ApiKey:
         """Find the key that the request carries.
 
         Raises
@@ -106,7 +108,7 @@ class Gate:
         if isinstance(found, Refusal):
             raise self._refused(service, address, prefix, found)
         self._limit.note_opened(address, prefix)
-        return found, text
+        return found
 
     def _refused(self, service: Service, address: str, prefix: str, reason: Refusal) -> Unauthorized:
         if reason in (Refusal.EXPIRED, Refusal.REVOKED):
@@ -139,30 +141,3 @@ async def _checked(service: Service, text: KeyText) -> ApiKey | Refusal:
     except SQLAlchemyError as error:
         logger.warning("API keys cannot be looked up: %s", error)
         raise DatabaseAway from None
-
-
-async def _while_the_key_opens(
-    app: ASGIApp, text: KeyText, scope: Scope, receive: Receive, send: Send
-) -> None:
-    """Serve a request; end a stream, which may last for hours, when its key is revoked or expires."""
-    service: Service = scope["app"].state.service
-    checked_at = time.monotonic()
-    ended = False
-
-    async def send_while_open(message: Message) -> None:
-        nonlocal checked_at, ended
-        now = time.monotonic()
-        if message.get("more_body") and now - checked_at >= FRESH_S:
-            checked_at = now
-            with suppress(DatabaseAway):  # the stream has its own troubles then
-                ended = not isinstance(await _checked(service, text), ApiKey)
-        if ended:
-            await send({"type": "http.response.body", "body": b"", "more_body": False})
-            raise ClientDisconnect
-        await send(message)
-
-    try:
-        await app(scope, receive, send_while_open)
-    except Exception:
-        if not ended:
-            raise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Coroutine
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
@@ -18,10 +18,8 @@ from app.errors import (
     SlowBody,
     UnsupportedMediaType,
 )
+from app.http.context import Service, current_caller
 from app.parsing.json_text import parse_json
-
-if TYPE_CHECKING:
-    from app.http.context import Service
 
 # a process costs 50 ms; parsing this much holds up the other requests for 10
 LARGEST_HERE = 2**19
@@ -76,7 +74,8 @@ async def json_document(request: Request) -> Any:
         async for piece in request.stream():
             await file.write(piece)
         if (file.size or 0) > LARGEST_HERE:
-            return await service.parsers.json_document(file.file)
+            caller = await current_caller(request)
+            return await service.parsers.json_document(caller.owner, file.file)
         await file.seek(0)
         return parse_json(await file.read())
     finally:

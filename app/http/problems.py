@@ -185,6 +185,8 @@ def allowed_methods(document: Mapping[str, Any], path: str) -> str:
     for template, operations in document["paths"].items():
         if compile_path(template)[0].match(path):
             methods.update(name.upper() for name in operations)
+    if "GET" in methods:
+        methods.add("HEAD")
     return ", ".join(sorted(methods))
 
 

@@ -10,6 +10,7 @@ import argparse
 import asyncio
 import json
 import logging
+import re
 import resource
 import socket
 import sys
@@ -26,6 +27,7 @@ from app.http.problems import MEDIA_TYPE, problem_document
 from app.settings import Settings, load_settings
 
 MAX_HEADER_BYTES = 32 * 1024  # request line and headers
+END_OF_HEADERS = re.compile(rb"\n\r?\n")
 LINGER_S = 1.0  # to read an answer that came before the end of the request
 LEAST_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
 DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
@@ -73,11 +75,44 @@ LARGE_HEADERS = HttpError(
     431,
     "headers_too_large",
     "The headers of the request are too large",
-    "Shorten the address and the headers.",
+    f"Send at most {MAX_HEADER_BYTES // 1024} KiB of headers, the line with the address included.",
+)
+LONG_ADDRESS = HttpError(
+    414,
+    "address_too_long",
+    "The address of the request is too long",
+    f"Send at most {MAX_HEADER_BYTES // 1024} KiB; what is long belongs into the body.",
 )
 BAD_REQUEST = HttpError(
     400, "bad_request", "This is not an HTTP request", "Escape the address, and send what HTTP/1.1 says."
 )
+
+
+class BoundedConnection(h11.Connection):
+    """A parser that bounds headers however they arrive.
+
+    h11 itself looks at the size of what is incomplete only: headers of any size pass that come in one piece.
+    """
+
+    def _extract_next_receive_event(self) -> Any:
+        before = len(self._receive_buffer)
+        if self.their_state is h11.IDLE and before > MAX_HEADER_BYTES:
+            beginning = self.trailing_data[0][:MAX_HEADER_BYTES]
+            if b"\n" not in beginning:
+                raise _too_large(LONG_ADDRESS)
+            if END_OF_HEADERS.search(beginning) is None:
+                raise _too_large(LARGE_HEADERS)
+        event = super()._extract_next_receive_event()
+        taken = before - len(self._receive_buffer)
+        if isinstance(event, h11.Data):
+            taken -= len(event.data)
+        if taken > MAX_HEADER_BYTES:  # fields after a chunked body, or of one of its chunks
+            raise _too_large(LARGE_HEADERS)
+        return event
+
+
+def _too_large(error: HttpError) -> h11.RemoteProtocolError:
+    return h11.RemoteProtocolError(error.detail, error_status_hint=error.status)
 
 
 class GuardedConfig(uvicorn.Config):
@@ -88,7 +123,6 @@ class GuardedConfig(uvicorn.Config):
             app,
             http=GuardedProtocol,
             ws="none",
-            h11_max_incomplete_event_size=MAX_HEADER_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
             server_header=False,
             access_log=False,
@@ -110,6 +144,7 @@ class GuardedProtocol(H11Protocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, app_state, _loop)
+        self.conn = BoundedConnection(h11.SERVER, MAX_HEADER_BYTES)
         self.limits = config.limits
         self._header_timer: asyncio.TimerHandle | None = None
         self._write_timer: asyncio.TimerHandle | None = None
@@ -175,8 +210,9 @@ class GuardedProtocol(H11Protocol):
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's sentence; ours says more
         """Answer what is no request with a problem document, where an answer has not begun."""
         # called where the parser's error is handled
-        too_large = getattr(sys.exception(), "error_status_hint", None) == LARGE_HEADERS.status
-        self._refuse(LARGE_HEADERS if too_large else BAD_REQUEST)
+        status = getattr(sys.exception(), "error_status_hint", None)
+        told = (error for error in (LARGE_HEADERS, LONG_ADDRESS) if error.status == status)
+        self._refuse(next(told, BAD_REQUEST))
 
     def _refuse(self, error: ServiceError) -> None:
         """Answer and hang up; a client that is still sending gets to read the answer before."""
@@ -185,6 +221,11 @@ class GuardedProtocol(H11Protocol):
         if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):  # another answer is under way
             self.transport.close()
             return
+        # None before the first request, whatever its annotation says
+        if self.cycle is not None and not self.cycle.response_complete:  # type: ignore[redundant-expr]
+            # the application waits for the rest of the body; whatever it would answer is too late
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
         self.transport.write(_answer(error))
         if self.transport.can_write_eof():
             self.transport.write_eof()

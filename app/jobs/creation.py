@@ -142,7 +142,11 @@ def create_job(
 def _take_idempotency_key(
     session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
 ) -> Job | None:
-    """Write the key, or return the job that holds it. The unique key decides between two racing requests."""
+    """Write the key, or return the job that holds it. The unique key decides between two racing requests.
+
+    A job is deleted together with its key, and on Postgres that may be committed between any two statements
+    here: then the key is free, and is written after all. A job that is returned is there until the commit.
+    """
     keys = idempotency_keys
     values = {
         "owner": owner,
@@ -152,15 +156,17 @@ def _take_idempotency_key(
         "job_id": job_id,
         "at": database_time(),
     }
-    taken = session.execute(
-        insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
-    ).one_or_none()
-    if taken is not None:
-        return None
-    earlier = session.execute(select(keys).where(keys.c.owner == owner, keys.c.key == key)).one()
-    if (earlier.operation, earlier.sha256) != (operation, fingerprint):
-        raise IdempotencyConflict(key)
-    row = session.execute(
-        select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
-    ).one()
-    return job_from_row(row, replayed=True)
+    taking = insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
+    holding = select(keys).where(keys.c.owner == owner, keys.c.key == key)
+    while session.execute(taking).one_or_none() is None:
+        earlier = session.execute(holding).one_or_none()
+        if earlier is None:
+            continue
+        if (earlier.operation, earlier.sha256) != (operation, fingerprint):
+            raise IdempotencyConflict(key)
+        kept = select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
+        # waits for whoever is deleting the job, and for nobody else
+        row = session.execute(kept.with_for_update(read=True, key_share=True)).one_or_none()
+        if row is not None:
+            return job_from_row(row, replayed=True)
+    return None

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated, Any, get_args
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
-from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.responses import JSONResponse
 from pydantic import AwareDatetime, BaseModel
 
 from app.audit.records import Action
 from app.audit.service import note
 from app.database import Session
-from app.errors import ArtifactNotFound, InvalidRequest, JobNotFinished, JobNotFound, ResultNotReady
+from app.errors import (
+    ArtifactNotFound,
+    InvalidRequest,
+    JobNotFinished,
+    JobNotFound,
+    ResultNotReady,
+    TooManyStreams,
+)
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, service, store
 from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type
-from app.jobs.event_stream import stream_events, wait_for_end
+from app.jobs.event_stream import EventStream, read_in_turn, wait_for_end
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
@@ -113,12 +119,12 @@ def list_jobs(
     operation_id="get_job",
     summary="Look at a job",
     response_model=Job,
-    responses=documented(InvalidRequest, JobNotFound),
+    responses=documented(InvalidRequest, JobNotFound, TooManyStreams),
 )
-async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: PreferHeader = None) -> Response:
+async def get_job(app: ServiceDep, caller: CallerDep, job_id: JobId, prefer: PreferHeader = None) -> Response:
     """Status, progress, times and error of a job; with `Prefer: wait=n` it answers when the job has ended."""
     wait_s = wait_seconds(prefer, app.settings.max_wait_s)
-    return as_json(await wait_for_end(app, owner, job_id, wait_s))
+    return as_json(await wait_for_end(app, caller, job_id, wait_s))
 
 
 @router.get(
@@ -128,12 +134,12 @@ async def get_job(app: ServiceDep, owner: OwnerDep, job_id: JobId, prefer: Prefe
     summary="Follow a job",
     response_class=JSONResponse,
     response_model=JobEventPage,
-    responses={**EVENT_STREAM, **documented(InvalidRequest, JobNotFound)},
+    responses={**EVENT_STREAM, **documented(InvalidRequest, JobNotFound, TooManyStreams)},
 )
 async def get_job_events(
     request: Request,
     app: ServiceDep,
-    owner: OwnerDep,
+    caller: CallerDep,
     job_id: JobId,
     after: Annotated[int, Query(ge=0, le=2**31 - 1, description="Only events after this number.")] = 0,
     last_event_id: Annotated[
@@ -143,25 +149,22 @@ async def get_job_events(
 ) -> Response:
     """Every event of the job from the beginning (or after a number), then those that come.
 
-    The stream ends with the job. Comment lines come between as signs of life.
+    The stream ends with the job. Comment lines come between as signs of life. `HEAD` gives the status and the
+    headers, and opens no stream.
     """
     seen = max(after, int(last_event_id or 0))
 
     def read() -> JobEventPage:
         with app.database.read() as session:
-            return service.event_page(session, owner, job_id, seen)
+            return service.event_page(session, caller.owner, job_id, seen)
 
-    page = await asyncio.to_thread(read)
+    page = await read_in_turn(app, caller.owner, read)
     accepted = request.headers.get("accept", "")
     if "application/json" in accepted and "text/event-stream" not in accepted:
         return JSONResponse(page.model_dump(mode="json"))
     if page.finished and not page.events:
         return Response(status_code=204)
-    return StreamingResponse(
-        stream_events(app, owner, job_id, seen),
-        media_type="text/event-stream",
-        headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"},
-    )
+    return EventStream(app, caller, job_id, seen)
 
 
 @router.get(

@@ -3,21 +3,61 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from typing import TypeVar
 
+from fastapi.responses import StreamingResponse
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.types import Receive, Scope, Send
 
 from app.database_errors import trouble_of
 from app.documents import json_bytes
-from app.errors import JobNotFound
-from app.http.context import Service
+from app.errors import JobNotFound, Unauthorized
+from app.http.context import Caller, Service
 from app.jobs import service as jobs
 from app.jobs.records import Job as StoredJob
 from app.jobs.rows import get_job
 from app.jobs.schemas import Job, JobEvent, JobEventPage
+from app.jobs.watch import Subscription
 
 KEEP_ALIVE = b": keep-alive\n\n"
 RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection asks again
+
+Found = TypeVar("Found")
+
+
+class EventStream(StreamingResponse):
+    """The answer that follows a job; it counts as one of its owner's streams while it lasts.
+
+    Parameters
+    ----------
+    service : Service
+    caller : Caller
+        Who follows.
+    job_id : str
+        One of the caller's jobs.
+    after : int
+        Number of the last event that was seen.
+    """
+
+    def __init__(self, service: Service, caller: Caller, job_id: str, after: int) -> None:
+        super().__init__(
+            stream_events(service, caller, job_id, after),
+            media_type="text/event-stream",
+            headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"},
+        )
+        self._place = service.streams.place(caller.owner)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer.
+
+        Raises
+        ------
+        TooManyStreams
+            The owner has as many as one may have.
+        """
+        with self._place:
+            await super().__call__(scope, receive, send)
 
 
 def formatted(event: JobEvent) -> bytes:
@@ -26,13 +66,23 @@ def formatted(event: JobEvent) -> bytes:
     return f"id: {event.seq}\nevent: {event.type}\ndata: {json_bytes(data).decode()}\n\n".encode()
 
 
-async def stream_events(service: Service, owner: str, job_id: str, after: int) -> AsyncIterator[bytes]:
-    """Stream the events after number `after` until the job has ended, is deleted, or the service stops."""
+async def read_in_turn(service: Service, owner: str, read: Callable[[], Found]) -> Found:
+    """Read from the database in a thread; the clients of all owners who follow jobs take turns."""
+    async with service.reads.turn(owner):
+        return await asyncio.to_thread(read)
+
+
+async def stream_events(service: Service, caller: Caller, job_id: str, after: int) -> AsyncIterator[bytes]:
+    """Stream the events after number `after`.
+
+    The stream ends when the job has ended or is deleted, when the caller's key opens no more, and when the
+    service stops.
+    """
 
     def read() -> JobEventPage | None:
         try:
             with service.database.read() as session:
-                return jobs.event_page(session, owner, job_id, after)
+                return jobs.event_page(session, caller.owner, job_id, after)
         except JobNotFound:
             return None
         except SQLAlchemyError as error:
@@ -43,37 +93,71 @@ async def stream_events(service: Service, owner: str, job_id: str, after: int) -
 
     yield RETRY
     with service.watcher.watch(job_id) as subscription:
-        while (page := await asyncio.to_thread(read)) is not None:
+        while (page := await read_in_turn(service, caller.owner, read)) is not None:
             for event in page.events:
                 yield formatted(event)
             after = page.last_seq
-            if page.finished or service.watcher.closed:
+            if page.finished or service.watcher.closed or caller.key.lost:
                 return
             if not page.events:
                 # the watcher has looked at the row for everyone: a silent job costs no query of its own
-                while not await subscription.wait(after, service.settings.keep_alive_s):
+                while not await _news(subscription, caller, after, service.settings.keep_alive_s):
                     yield KEEP_ALIVE
 
 
-async def wait_for_end(service: Service, owner: str, job_id: str, timeout_s: float) -> Job:
-    """Wait until a job has ended, at most `timeout_s`, and show it as it is then."""
+async def _news(subscription: Subscription, caller: Caller, seen: int, timeout_s: float) -> bool:
+    """Wait for news, or the end of the caller's right to hear them; False after `timeout_s`."""
+    try:
+        async with caller.key.while_it_opens():
+            return await subscription.wait(seen, timeout_s)
+    except Unauthorized:
+        return True
+
+
+async def wait_for_end(
+    service: Service, caller: Caller, job_id: str, timeout_s: float, accepted: StoredJob | None = None
+) -> Job:
+    """Wait until a job has ended, at most `timeout_s`, and show it as it is then.
+
+    Parameters
+    ----------
+    accepted : Job, optional
+        The job that the caller has just posted. It is shown as it was last seen when it is deleted meanwhile:
+        the post was accepted all the same.
+
+    Raises
+    ------
+    JobNotFound
+        There is no such job.
+    TooManyStreams
+        As many requests of the owner wait as may.
+    Unauthorized
+        The caller's key opens no more.
+    """
 
     def read() -> StoredJob:
         with service.database.read() as session:
-            return get_job(session, owner, job_id)
+            return get_job(session, caller.owner, job_id)
 
     def show() -> Job:
         with service.database.read() as session:
-            return jobs.shown(session, service.queue, get_job(session, owner, job_id))
+            return jobs.shown(session, service.queue, get_job(session, caller.owner, job_id))
 
-    if timeout_s <= 0.0:
-        return await asyncio.to_thread(show)
-    loop = asyncio.get_running_loop()
-    deadline = loop.time() + timeout_s
-    with service.watcher.watch(job_id) as subscription:
-        while True:
-            job = await asyncio.to_thread(read)
-            left = deadline - loop.time()
-            if job.finished or left <= 0.0 or service.watcher.closed:
-                return await asyncio.to_thread(show)
-            await subscription.wait(job.event_seq, left)
+    try:
+        if timeout_s > 0.0:
+            loop = asyncio.get_running_loop()
+            deadline = loop.time() + timeout_s
+            with service.waits.place(caller.owner), service.watcher.watch(job_id) as subscription:
+                while True:
+                    job = await read_in_turn(service, caller.owner, read)
+                    accepted = job if accepted is not None else None
+                    left = deadline - loop.time()
+                    if job.finished or left <= 0.0 or service.watcher.closed:
+                        break
+                    async with caller.key.while_it_opens():
+                        await subscription.wait(job.event_seq, left)
+        return await read_in_turn(service, caller.owner, show)
+    except JobNotFound:
+        if accepted is None:
+            raise
+        return Job.of(accepted)

@@ -144,9 +144,11 @@ class Submission:
         else:
             self.app.publisher.publish(job.id)
         headers["Location"] = f"/jobs/{job.id}"
-        if self.wait_s > 0.0:
-            headers["Preference-Applied"] = f"wait={self.wait_s:g}"
-        return await wait_for_end(self.app, self.caller.owner, job.id, self.wait_s)
+        # the job is made: an owner with too many waiting requests is answered at once and not refused
+        wait_s = self.wait_s if self.app.waits.has_room(self.caller.owner) else 0.0
+        if wait_s > 0.0:
+            headers["Preference-Applied"] = f"wait={wait_s:g}"
+        return await wait_for_end(self.app, self.caller, job.id, wait_s, accepted=job)
 
     def _write(self, prepare: Prepare[Request, Any], request: Request) -> StoredJob:
         with self.app.database.read() as session:

@@ -14,6 +14,7 @@ from app.database import Database
 from app.tables import jobs
 
 CHUNK = 500  # ids per query
+GONE = 2**62  # number of the last event of a job that is not there: after all that anybody has seen
 
 logger = logging.getLogger(__name__)
 
@@ -33,6 +34,7 @@ class Subscription:
         self._news.clear()
         if self._watcher.closed:
             return True
+        self._watcher.expect(self)
         try:
             async with asyncio.timeout(timeout_s):
                 await self._news.wait()
@@ -48,6 +50,9 @@ class Subscription:
 class JobWatcher:
     """Looks at the watched jobs every `poll_s` seconds and wakes those who wait for them.
 
+    What a look costs grows with the jobs that are watched and the clients that are woken, not with those that
+    wait.
+
     Parameters
     ----------
     database : Database
@@ -58,7 +63,9 @@ class JobWatcher:
     def __init__(self, database: Database, poll_s: float) -> None:
         self._database = database
         self._poll_s = poll_s
-        self._subscriptions: set[Subscription] = set()
+        self._subscriptions: dict[str, set[Subscription]] = {}
+        self._numbers: dict[str, int] = {}  # of the last event of each watched job, at the last look
+        self._late: set[Subscription] = set()  # these had news to read when they began to wait
         self._someone = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self.closed = False
@@ -70,8 +77,9 @@ class JobWatcher:
     def close(self) -> None:
         """Wake everyone for good: the process ends."""
         self.closed = True
-        for subscription in self._subscriptions:
-            subscription.tell()
+        for subscriptions in self._subscriptions.values():
+            for subscription in subscriptions:
+                subscription.tell()
 
     async def stop(self) -> None:
         """Stop looking."""
@@ -85,12 +93,22 @@ class JobWatcher:
     def watch(self, job_id: str) -> Iterator[Subscription]:
         """Watch one job while the block lasts."""
         subscription = Subscription(self, job_id)
-        self._subscriptions.add(subscription)
+        self._subscriptions.setdefault(job_id, set()).add(subscription)
         self._someone.set()
         try:
             yield subscription
         finally:
-            self._subscriptions.discard(subscription)
+            self._late.discard(subscription)
+            watching = self._subscriptions[job_id]
+            watching.discard(subscription)
+            if not watching:
+                del self._subscriptions[job_id]
+                self._numbers.pop(job_id, None)
+
+    def expect(self, subscription: Subscription) -> None:
+        """Note that a client begins to wait; the next look tells it what an earlier one has seen already."""
+        if self._numbers.get(subscription.job_id, -1) > subscription.seen:
+            self._late.add(subscription)
 
     async def _run(self) -> None:
         while not self.closed:
@@ -98,21 +116,31 @@ class JobWatcher:
                 self._someone.clear()
                 await self._someone.wait()
             await asyncio.sleep(self._poll_s)
-            ids = sorted({subscription.job_id for subscription in self._subscriptions})
+            ids = list(self._subscriptions)
             try:
                 numbers = await asyncio.to_thread(self._event_numbers, ids)
             except SQLAlchemyError as error:
                 logger.warning("cannot look at the watched jobs: %s", error)
                 continue
-            for subscription in tuple(self._subscriptions):
-                if subscription.job_id in ids and numbers.get(subscription.job_id, 2**62) > subscription.seen:
-                    subscription.tell()
+            self._tell(ids, numbers)
+
+    def _tell(self, ids: list[str], numbers: dict[str, int]) -> None:
+        """Wake whoever has not seen the last event of a job, or follows one that is gone."""
+        woken, self._late = self._late, set()
+        for job_id in ids:
+            number = numbers.get(job_id, GONE)
+            if job_id in self._subscriptions and self._numbers.get(job_id) != number:
+                self._numbers[job_id] = number
+                woken |= self._subscriptions[job_id]
+        for subscription in woken:
+            if self._numbers.get(subscription.job_id, -1) > subscription.seen:
+                subscription.tell()
 
     def _event_numbers(self, ids: list[str]) -> dict[str, int]:
         numbers: dict[str, int] = {}
         with self._database.read() as session:
             for start in range(0, len(ids), CHUNK):
                 chosen = jobs.c.id.in_(ids[start : start + CHUNK])
-                for row in session.execute(select(jobs.c.id, jobs.c.event_seq).where(chosen)):
-                    numbers[row.id] = row.event_seq
+                rows = session.execute(select(jobs.c.id, jobs.c.event_seq).where(chosen))
+                numbers |= dict(iter(rows))
         return numbers

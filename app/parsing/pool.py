@@ -10,14 +10,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from fastapi.concurrency import run_in_threadpool
 
 from app.errors import Fault, InvalidRequest, MalformedBody, ServiceBusy, UnsupportedMediaType
+from app.owner_turns import OwnerTurns
 from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
@@ -38,25 +38,25 @@ class _Unanswered(Exception):
 
 
 class ParserPool:
-    """Starts parser processes.
+    """Starts parser processes; owners take turns.
 
     Parameters
     ----------
-    at_once : int
-        Processes at the same time.
+    turns : OwnerTurns
+        Processes at the same time, of all owners and of one.
     limits : Limits
         Of each process.
     queue_s : float
         Longest wait for one; a request that waits longer is told that the service is busy.
     """
 
-    def __init__(self, at_once: int, limits: Limits, queue_s: float = QUEUE_S) -> None:
-        self._free = asyncio.Semaphore(at_once)
+    def __init__(self, turns: OwnerTurns, limits: Limits, queue_s: float = QUEUE_S) -> None:
+        self._turns = turns
         self._queue_s = queue_s
         self._limits = limits
 
-    async def json_document(self, file: BinaryIO) -> Any:
-        """Parse the JSON text in a file, as `parse_json` would.
+    async def json_document(self, owner: str, file: BinaryIO) -> Any:
+        """Parse the JSON text in a file of this owner, as `parse_json` would.
 
         Raises
         ------
@@ -66,18 +66,20 @@ class ParserPool:
             Too many others are being read.
         """
         try:
-            answer = await self._read(BODY, file)
+            answer = await self._read(owner, BODY, file)
         except _Unanswered as why:
             raise MalformedBody(f"The body cannot be read: {why}.", hint="Send less text.") from None
         if "malformed" in answer:
             raise MalformedBody(*answer["malformed"])
         return answer["document"]
 
-    async def flight(self, kind: str, file: BinaryIO, pointer: str) -> dict[str, list[float]]:
+    async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> dict[str, list[float]]:
         """Read the columns of a flight, SI units, by their standard names.
 
         Parameters
         ----------
+        owner : str
+            Whose upload it is.
         kind : str
             As `samplefiles.reading.kind_of` says.
         file : binary file
@@ -95,7 +97,7 @@ class ParserPool:
             Too many others are being read.
         """
         try:
-            answer = await self._read(kind, file)
+            answer = await self._read(owner, kind, file)
         except _Unanswered as why:
             hint = "Send a plain file of six columns of numbers; leave out everything else."
             raise InvalidRequest.of(
@@ -106,22 +108,17 @@ class ParserPool:
         columns: dict[str, list[float]] = answer["columns"]
         return columns
 
-    async def _read(self, kind: str, file: BinaryIO) -> dict[str, Any]:
-        async with self._turn():
-            answer: dict[str, Any] = await run_in_threadpool(_answer_of, kind, file, self._limits)
-        return answer
-
-    @asynccontextmanager
-    async def _turn(self) -> AsyncIterator[None]:
+    async def _read(self, owner: str, kind: str, file: BinaryIO) -> dict[str, Any]:
         try:
             async with asyncio.timeout(self._queue_s):
-                await self._free.acquire()
+                await self._turns.take(owner)
         except TimeoutError:
             raise ServiceBusy("Too many files are being read at the moment.") from None
         try:
-            yield
+            answer: dict[str, Any] = await run_in_threadpool(_answer_of, kind, file, self._limits)
         finally:
-            self._free.release()
+            self._turns.give_back(owner)
+        return answer
 
 
 def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMediaType:

@@ -81,7 +81,7 @@ async def upload_trajectory(
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
     kind = media_type(request)
     if kind == "multipart/form-data":
-        upload, pointer = await _from_form(request, app), "/file"
+        upload, pointer = await _from_form(request, app, caller.owner), "/file"
     elif is_json(kind):
         upload, pointer = _checked(await json_document(request)), ""
     else:
@@ -90,6 +90,8 @@ async def upload_trajectory(
             "#header/Content-Type",
             "Send multipart/form-data with a `file` (curl -F file=@flight.csv), or application/json.",
         )
+
+    caller.key.must_open()  # the body and its reader may have taken a minute
 
     def store() -> repository.StoredTrajectory:
         with app.database.write() as session:
@@ -100,7 +102,7 @@ async def upload_trajectory(
     return _summary(stored)
 
 
-async def _from_form(request: Request, app: Service) -> TrajectoryUpload:
+async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUpload:
     try:
         form = await request.form(max_files=1, max_fields=4, max_part_size=MAX_NAME_BYTES)
     except HTTPException as error:
@@ -120,7 +122,7 @@ async def _from_form(request: Request, app: Service) -> TrajectoryUpload:
                 "Only `file` and `name` are read.",
             )
         filename = file.filename or ""
-        columns = await app.parsers.flight(service.file_kind(filename), file.file, "/file")
+        columns = await app.parsers.flight(owner, service.file_kind(filename), file.file, "/file")
         return service.upload_of(columns, filename, name if isinstance(name, str) else None)
     finally:
         await form.close()

@@ -238,7 +238,7 @@ GARBAGE: dict[str, tuple[bytes, int]] = {
     "a header without a name": (GET + b": x\r\n\r\n", 400),
     "no host": (b"GET /livez HTTP/1.1\r\n\r\n", 400),
     "a header of a megabyte": (GET + b"X: " + b"y" * 2**20 + b"\r\n\r\n", 431),
-    "a path of a megabyte": (b"GET /" + b"y" * 2**20 + b" HTTP/1.1\r\n\r\n", 431),
+    "a path of a megabyte": (b"GET /" + b"y" * 2**20 + b" HTTP/1.1\r\n\r\n", 414),
     "a hundred thousand headers": (GET + b"X: y\r\n" * 100_000 + b"\r\n", 431),
     "two lengths": (POST + b"Content-Length: 5\r\nContent-Length: 6\r\n\r\nabcde", 400),
     "a negative length": (POST + b"Content-Length: -5\r\n\r\nabcde", 400),

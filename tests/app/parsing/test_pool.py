@@ -19,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import InvalidRequest, MalformedBody, ServiceBusy
+from app.owner_turns import OwnerTurns
 from app.parsing import pool
 from app.parsing.confinement import Limits
 from app.parsing.frame import MARK, BadFrame, pack, unpack
@@ -55,7 +56,7 @@ def file_of() -> Iterator[FileOf]:
 
 def reader(**limits: int) -> ParserPool:
     """A pool of one."""
-    return ParserPool(1, Limits(**limits))
+    return ParserPool(OwnerTurns(1, 1), Limits(**limits))
 
 
 def same(left: Any, right: Any) -> bool:
@@ -104,14 +105,14 @@ def test_frames_that_lie_are_refused() -> None:
 
 def test_a_flight_is_read(file_of: FileOf) -> None:
     """Columns by their standard names."""
-    columns = asyncio.run(reader().flight("csv", file_of(FLIGHT), "/file"))
+    columns = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
     assert columns["t"] == [0.0, 1.0]
 
 
 def test_faults_come_with_their_place(file_of: FileOf) -> None:
     """Pointers into the file."""
     with pytest.raises(InvalidRequest) as caught:
-        asyncio.run(reader().flight("csv", file_of(FLIGHT.replace(b"1,0,", b"1,x,")), "/file"))
+        asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT.replace(b"1,0,", b"1,x,")), "/file"))
     assert caught.value.pointer == "/file/1/sweep_left"
 
 
@@ -121,7 +122,7 @@ def test_a_million_keys_and_a_deep_nest_are_told(file_of: FileOf) -> None:
     many = b"{" + b",".join(b'"%d":1' % number for number in range(1_000_000)) + b"}"
     for body, words in ((many, "more than 100 fields"), (b"[" * 99_999, "nested")):
         with pytest.raises(MalformedBody, match=words):
-            asyncio.run(reader().json_document(file_of(body)))
+            asyncio.run(reader().json_document("alpha", file_of(body)))
 
 
 def played(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
@@ -160,7 +161,7 @@ def test_whatever_a_parser_does_it_is_ended_and_reaped(
     played(monkeypatch, code)
     start = time.monotonic()
     with pytest.raises(InvalidRequest, match=words):
-        asyncio.run(reader(wall_s=1).flight("csv", file_of(FLIGHT), "/file"))
+        asyncio.run(reader(wall_s=1).flight("alpha", "csv", file_of(FLIGHT), "/file"))
     assert time.monotonic() - start < 20.0
     assert no_child_left()
 
@@ -175,7 +176,7 @@ def test_no_secret_reaches_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: Fi
         "seen = [*os.environ, *os.environ.values(), *os.listdir('/proc/self/fd')]\n"
         "sys.stdout.buffer.write(pack({'columns': {'seen': seen}}))",
     )
-    seen: list[Any] = asyncio.run(reader().flight("csv", file_of(FLIGHT), "/file"))["seen"]
+    seen: list[Any] = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))["seen"]
     assert not any("secret" in word or word.startswith("MORPHID") for word in seen)
     assert {word for word in seen if word.isdigit() and len(word) < 4} <= {"0", "1", "2", "3"}
 
@@ -193,7 +194,7 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
         "except MemoryError: found['got'] = False\n"
         "sys.stdout.buffer.write(pack({'columns': found}))",
     )
-    found: Any = asyncio.run(reader().flight("csv", file_of(FLIGHT), "/file"))
+    found: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
     assert found["DATA"] == [Limits().memory_bytes] * 2
     assert found["CPU"] == [Limits().cpu_s] * 2
     assert found["FSIZE"] == found["NPROC"] == found["CORE"] == [0, 0]
@@ -204,13 +205,13 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
 def test_too_many_wait_in_vain(monkeypatch: pytest.MonkeyPatch, file_of: FileOf) -> None:
     """One at a time; who waits too long is told to come again, and the turn is given back."""
     played(monkeypatch, "import time; time.sleep(60)")
-    parsers = ParserPool(1, Limits(wall_s=1), queue_s=0.2)
+    parsers = ParserPool(OwnerTurns(1, 1), Limits(wall_s=1), queue_s=0.2)
 
     async def crowd() -> list[Any]:
-        calls = [parsers.flight("csv", file_of(FLIGHT), "/file") for _ in range(4)]
+        calls = [parsers.flight("alpha", "csv", file_of(FLIGHT), "/file") for _ in range(4)]
         found = await asyncio.gather(*calls, return_exceptions=True)
         try:
-            await parsers.flight("csv", file_of(FLIGHT), "/file")
+            await parsers.flight("alpha", "csv", file_of(FLIGHT), "/file")
         except InvalidRequest as error:
             found.append(error)
         return found

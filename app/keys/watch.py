@@ -1,0 +1,150 @@
+"""Keys of requests that are under way: whoever waits is broken off when the key opens no more.
+
+A request is let in by its key once, and may then wait for a minute or stream for hours. One query a second
+looks at the keys of all requests under way, however many there are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database import Database
+from app.errors import Unauthorized
+from app.keys.records import ApiKey
+from app.keys.repository import keys_by_id
+
+LOOK_S = 1.0  # between two looks: a waiting request outlives its key by little more
+
+logger = logging.getLogger(__name__)
+
+
+class KeyInUse:
+    """The key of one request, as long as the request lasts; used from the event loop's thread.
+
+    Parameters
+    ----------
+    key : ApiKey or None
+        As it was when the request was let in; None where no keys are demanded.
+    """
+
+    def __init__(self, key: ApiKey | None = None) -> None:
+        self.key = key
+        self.lost = False
+        self._waits: set[asyncio.Timeout] = set()
+
+    def must_open(self) -> None:
+        """Go on only while the key opens.
+
+        Raises
+        ------
+        Unauthorized
+            It was revoked, has expired, or may do less than before.
+        """
+        if self.lost:
+            raise Unauthorized
+
+    @asynccontextmanager
+    async def while_it_opens(self) -> AsyncIterator[None]:
+        """Wait for something in the block; it is broken off as soon as the key opens no more.
+
+        Raises
+        ------
+        Unauthorized
+            As `must_open` does.
+        """
+        self.must_open()
+        try:
+            async with asyncio.timeout(None) as wait:
+                self._waits.add(wait)
+                try:
+                    yield
+                finally:
+                    self._waits.discard(wait)
+        except TimeoutError:
+            self.must_open()
+            raise
+
+    def opens_as(self, now: ApiKey | None) -> bool:
+        """Whether the key still lets its request do all that it did."""
+        began = self.key
+        if began is None:
+            return True
+        if now is None or now.state != "active" or now.owner != began.owner:
+            return False
+        return began.scopes <= now.scopes
+
+    def lose(self) -> None:
+        """Break off whatever the request waits for."""
+        self.lost = True
+        now = asyncio.get_running_loop().time()
+        for wait in self._waits:
+            wait.reschedule(now)
+
+
+class KeyWatch:
+    """Looks at the keys of all requests that are under way.
+
+    Parameters
+    ----------
+    database : Database
+    look_s : float
+        Time between two looks, s.
+    """
+
+    def __init__(self, database: Database, look_s: float = LOOK_S) -> None:
+        self._database = database
+        self._look_s = look_s
+        self._in_use: dict[str, set[KeyInUse]] = {}
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._task = asyncio.create_task(self._run(), name="key-watch")
+
+    async def stop(self) -> None:
+        """Stop looking."""
+        if self._task is not None:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
+
+    @contextmanager
+    def use(self, key: ApiKey) -> Iterator[KeyInUse]:
+        """Watch the key of a request while the block lasts."""
+        in_use = KeyInUse(key)
+        requests = self._in_use.setdefault(key.id, set())
+        requests.add(in_use)
+        try:
+            yield in_use
+        finally:
+            requests.discard(in_use)
+            if not requests and self._in_use.get(key.id) is requests:
+                del self._in_use[key.id]
+
+    async def look(self) -> None:
+        """Break off the requests whose keys open no more."""
+        ids = list(self._in_use)
+        try:
+            found = await asyncio.to_thread(self._read, ids)
+        except SQLAlchemyError as error:
+            logger.warning("cannot look at the keys of waiting requests: %s", error)
+            return
+        for key_id in ids:
+            for in_use in tuple(self._in_use.get(key_id, ())):
+                if not in_use.lost and not in_use.opens_as(found.get(key_id)):
+                    in_use.lose()
+
+    async def _run(self) -> None:
+        while True:
+            await asyncio.sleep(self._look_s)
+            if self._in_use:
+                await self.look()
+
+    def _read(self, ids: Sequence[str]) -> dict[str, ApiKey]:
+        with self._database.read() as session:
+            return {key.id: key for key in keys_by_id(session, ids)}

@@ -1,0 +1,83 @@
+"""Slots that owners take by turns: however many requests of one owner wait, another's is next."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+
+class OwnerTurns:
+    """A semaphore that is fair to owners; used from one thread (the event loop's).
+
+    When a slot becomes free, the owner with the fewest slots is next, then the one that was served least
+    recently; inside an owner it is first come, first served.
+
+    Parameters
+    ----------
+    at_once : int
+        Slots.
+    per_owner : int
+        Slots that one owner may have at once. Below `at_once` some are always free for the others.
+    """
+
+    def __init__(self, at_once: int, per_owner: int) -> None:
+        self._free = at_once
+        self._per_owner = per_owner
+        self._held: Counter[str] = Counter()
+        # in the order of turns: who was served goes to the end
+        self._waiting: dict[str, deque[asyncio.Future[None]]] = {}
+
+    @asynccontextmanager
+    async def turn(self, owner: str) -> AsyncIterator[None]:
+        """Wait for a slot and have it while the block lasts."""
+        await self.take(owner)
+        try:
+            yield
+        finally:
+            self.give_back(owner)
+
+    async def take(self, owner: str) -> None:
+        """Wait for a slot; whoever got it gives it back."""
+        waiter = asyncio.get_running_loop().create_future()
+        self._waiting.setdefault(owner, deque()).append(waiter)
+        self._serve()
+        try:
+            await waiter
+        except asyncio.CancelledError:
+            if waiter.cancelled():
+                self._forget(owner, waiter)
+            else:  # served at the very moment
+                self.give_back(owner)
+            raise
+
+    def give_back(self, owner: str) -> None:
+        """Let the next one have the slot."""
+        self._free += 1
+        self._held[owner] -= 1
+        if not self._held[owner]:
+            del self._held[owner]
+        self._serve()
+
+    def _serve(self) -> None:
+        while self._free:
+            owner = min(self._waiting, key=self._held.__getitem__, default=None)
+            if owner is None or self._held[owner] >= self._per_owner:
+                return
+            queue = self._waiting.pop(owner)
+            waiter = queue.popleft()
+            if queue:
+                self._waiting[owner] = queue
+            if waiter.done():  # its request has gone
+                continue
+            self._free -= 1
+            self._held[owner] += 1
+            waiter.set_result(None)
+
+    def _forget(self, owner: str, waiter: asyncio.Future[None]) -> None:
+        queue = self._waiting.get(owner)
+        if queue is not None and waiter in queue:
+            queue.remove(waiter)
+            if not queue:
+                del self._waiting[owner]
