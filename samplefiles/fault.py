@@ -13,6 +13,11 @@ def shown(text: object) -> str:
     return str(text)[:SHOWN_CHARACTERS].encode("unicode_escape").decode("ascii")
 
 
+def as_sentence(text: str) -> str:
+    """A fault's detail or hint with a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 @dataclass(eq=False)
 class FileFault(Exception):
     """The file cannot be read as a flight.
@@ -49,3 +54,12 @@ class FileFault(Exception):
         if self.line is not None:
             return f"line {self.line}"
         return "" if self.row is None else f"row {self.row} (from 0)"
+
+
+def octave_text() -> FileFault:
+    """The fault of Octave's own text format, which it writes under any name."""
+    return FileFault(
+        "octave_text",
+        "this is an Octave text file",
+        "save it from Octave for MATLAB: save -v7 flight.mat t sweep_left sweep_right phi theta psi",
+    )

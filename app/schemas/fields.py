@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field
+
+from samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
-MAX_ROWS = 100_000  # of one sample: 1000 s at 10 ms
-MIN_ROWS = 4  # a shape-preserving spline through fewer is guesswork
+MAX_ROWS = MOST_ROWS  # of one sample
+MIN_ROWS = FEWEST_ROWS
+LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 
 
 class Strict(BaseModel):
@@ -28,9 +31,10 @@ Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-
 
 # FailFast: one bad row is named, not a hundred thousand
 TimeSeries = Annotated[
-    list[Annotated[float, Field(ge=-1e6, le=1e6)]],
+    list[Annotated[float, Field(ge=-LATEST_DATE_S, le=LATEST_DATE_S)]],
     FailFast(),
     Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+    AfterValidator(from_first_row),
 ]
 AngleSeries = Annotated[
     list[Annotated[float, Field(ge=-1e3, le=1e3)]],

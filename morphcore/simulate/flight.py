@@ -28,13 +28,13 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
 from samplefiles.csv_table import write_table
+from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Schedules = Sequence[Schedule] | Mapping[str, Schedule] | Trajectory
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 
 OUTPUT_STEP_S = 0.01  # as the example flights
-LARGEST_ROWS = 200_000  # of a trajectory
 
 
 @dataclass(frozen=True)
@@ -248,12 +248,18 @@ def _output_times(
     for name, value in (("duration_s", duration_s), ("output_step_s", output_step_s), ("step_s", step_s)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidInput(f"{name} is {value}", pointer=f"/{name}", hint="give a positive time in s")
+    if duration_s > LONGEST_FLIGHT_S:
+        raise InvalidInput(
+            f"duration_s is {duration_s:g}",
+            pointer="/duration_s",
+            hint=f"it must be at most {LONGEST_FLIGHT_S:g}",
+        )
     rows = int(np.floor(min(duration_s / output_step_s, 1e9) + 1e-9)) + 1
-    if not 3 <= rows <= LARGEST_ROWS:
+    if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise InvalidInput(
             f"{duration_s:g} s in steps of {output_step_s:g} s make {rows} rows",
             pointer="/output_step_s",
-            hint=f"choose duration_s and output_step_s for 3 to {LARGEST_ROWS} rows",
+            hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
         )
     return begin + output_step_s * np.arange(rows, dtype=np.float64)
 

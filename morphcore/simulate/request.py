@@ -29,7 +29,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
-from samplefiles.columns import MOST_ROWS
+from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -38,7 +38,6 @@ Clock = Callable[[], float]
 
 KINDS: tuple[Kind, ...] = ("rigid", "equivalent", "flexible")
 ANGLES = ("phi", "theta", "psi")
-LONGEST_FLIGHT_S = 3600.0
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 0.02
 MOST_ELEMENTS = 100
 LARGEST_SEED = 2**53 - 1
@@ -204,11 +203,11 @@ def simulation_from_document(document: Document, threads: int | None = None) -> 
     fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     rows = duration_s / output_step_s + 1
-    if not 3 <= rows <= MOST_ROWS:
+    if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise InvalidInput(
             f"{duration_s:g} s in steps of {output_step_s:g} s make {rows:.0f} rows",
             pointer="/output_step_s",
-            hint=f"choose duration_s and output_step_s for 3 to {MOST_ROWS} rows",
+            hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
         )
     if model.start == "given" and flight.start is None:
         raise InvalidInput(
