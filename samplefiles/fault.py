@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 SHOWN_CHARACTERS = 60  # of a title or cell that a stranger wrote
 TITLES = "titles"
@@ -13,13 +14,33 @@ def shown(text: object) -> str:
     return str(text)[:SHOWN_CHARACTERS].encode("unicode_escape").decode("ascii")
 
 
+class Pickled:
+    """Makes an exception survive pickling whole, however it is constructed: base of every error of the house.
+
+    Python calls an exception's class with its ``args`` again, which fails for keyword arguments and for
+    constructors that write their own sentence; a process pool then hangs.
+    """
+
+    args: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (type(self), self.args, dict(vars(self)))
+
+
+def _remade(kind: type[BaseException], args: tuple[Any, ...], data: dict[str, Any]) -> BaseException:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(data)
+    return error
+
+
 def as_sentence(text: str) -> str:
     """A fault's detail or hint with a capital and a full stop."""
     return f"{text[:1].upper()}{text[1:]}."
 
 
 @dataclass(eq=False)
-class FileFault(Exception):
+class FileFault(Pickled, Exception):
     """The file cannot be read as a flight.
 
     Attributes

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from morphcore.errors import InvalidInput
 from morphcore.evolution import Evolution, EvolutionState, first_evolution
@@ -368,6 +367,8 @@ class Identification:
 
 def _even_normals(count: int, d: int, seed: int) -> Array:
     """(count, d) normal numbers spread more evenly than independent draws: a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # as large as half of the library, and many searches need no screen
+
     draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
     return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_MEAN_LAG
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
-from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.mirror import Mirror, mirror_of
 from morphcore.geometry.surface import Surface
@@ -154,13 +154,10 @@ def chain_model(
     ------
     InvalidInput : the number of links is out of range.
     """
-    if not 1 <= links_per_wing <= MOST_LINKS:
-        raise InvalidInput(
-            f"links_per_wing is {links_per_wing}",
-            pointer="/model/links_per_wing",
-            hint=f"give a whole number in 1..{MOST_LINKS}",
-        )
-    return _chain_model(aircraft, flight, links_per_wing, lattice)
+    links = whole_number(
+        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", least=1, most=MOST_LINKS
+    )
+    return _chain_model(aircraft, flight, links, lattice)
 
 
 def _chain_model(

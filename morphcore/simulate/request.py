@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.flexible import DEFAULT_ELEMENTS
@@ -52,7 +52,7 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class FlownModel:
+class FlownModel(WholeNumbers):
     """What flies.
 
     parameters : of the equivalent model, a batch of one. elements : of each surface, in the flexible model.
@@ -131,7 +131,7 @@ class SimulationResult:
 
 
 @dataclass
-class SimulationRun:
+class SimulationRun(WholeNumbers):
     """One flight, ready to be flown.
 
     schedules : of each side. seed : of the turbulence.
