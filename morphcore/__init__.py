@@ -12,6 +12,7 @@ from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphcore.version import VERSION as __version__
 from morphcore.warming import warm_up, warm_up_further
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "IdentifyResult",
     "Simulation",
     "Trajectory",
+    "__version__",
     "identification_from_document",
     "identify",
     "load_aircraft",

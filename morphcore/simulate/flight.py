@@ -17,6 +17,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
+from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
@@ -37,8 +38,8 @@ ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 OUTPUT_STEP_S = 0.01  # as the example flights
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """A flown flight.
 
     trajectory : attitude and sweep (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
@@ -52,6 +53,23 @@ class Simulation:
     trajectory: Trajectory
     trim: Trim
     step_s: float
+
+    def summary(self) -> Summary:
+        """How the flight began, and how far the attitude went."""
+        flown = self.trajectory
+        return Summary(
+            f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
+            {"angle of attack at the start, rad": self.trim.alpha},
+            ("", "from", "to"),
+            [
+                [f"{name}, rad", values.min(), values.max()]
+                for name, values in (
+                    ("sweep left", flown.sweep_left),
+                    ("sweep right", flown.sweep_right),
+                    *zip(("phi", "theta", "psi"), flown.euler.T, strict=True),
+                )
+            ],
+        )
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
+from morphcore.shown import Shown
 from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
@@ -93,8 +94,8 @@ class SimulationStep:
     message: str
 
 
-@dataclass(frozen=True)
-class SimulationResult:
+@dataclass(frozen=True, repr=False)
+class SimulationResult(Shown):
     """A flown flight and what it cost: wall time of trim, preparation and flight together, s."""
 
     model: FlownModel

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
+from morphcore.shown import Shown
 from morphcore.simulate.file_columns import read_file_columns
 from samplefiles.flight import INLINE, flight_faults, from_first_row
 from samplefiles.titles import FLIGHT
@@ -19,8 +20,8 @@ Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Shown):
     """One flight: ``time_s`` (k,) rising; hinge and Euler angles (k,) in rad; other columns in ``extra``."""
 
     name: str
