@@ -12,8 +12,10 @@ from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.version import VERSION as __version__
+from morphcore.version import VERSION
 from morphcore.warming import warm_up, warm_up_further
+
+__version__ = VERSION
 
 __all__ = [
     "Aircraft",
