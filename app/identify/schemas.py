@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution, SpreadExecution
-from app.schemas.fields import Strict, Whole
+from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import Lattice, Start, StepS
 from app.schemas.parameters import MAX_LINKS
@@ -66,15 +66,15 @@ class SoughtModel(Strict):
 class EquivalentModel(SoughtModel):
     """The model whose parameters are sought: wings of rigid links with gimbal joints."""
 
-    links_per_wing: Whole = Field(default=3, ge=1, le=MAX_LINKS)
+    links_per_wing: int = Field(default=3, ge=1, le=MAX_LINKS)
 
 
 class Search(SwarmSearch):
     """How the parameters are sought; what is left out depends on the method."""
 
     method: Method = "hybrid"
-    particles: Annotated[Whole, Field(ge=1, le=100_000)] | None = None
-    generations: Annotated[Whole, Field(ge=1, le=100_000)] | None = None
+    particles: Annotated[int, Field(ge=1, le=100_000)] | None = None
+    generations: Annotated[int, Field(ge=1, le=100_000)] | None = None
     max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
         default=None, description="Time budget of the search; the best so far is the result."
     )

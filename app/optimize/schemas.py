@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
-from app.schemas.fields import Angle, Strict, Whole
+from app.schemas.fields import Angle, Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from app.schemas.parameters import EXAMPLE_PARAMETERS, KnownModel
@@ -35,7 +35,7 @@ class Morph(Strict):
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S)] = Field(
         description="Of the goals `minimum_time` and `pareto` the longest that is looked at."
     )
-    knots: Whole = Field(
+    knots: int = Field(
         default=6, ge=3, le=20, description="Of the spline, both ends included; the times between are sought."
     )
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S)] = Field(
@@ -51,7 +51,7 @@ class Morph(Strict):
     max_variation_rad2: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
         default=None, description="Needed for the goal `minimum_time`."
     )
-    front_points: Whole = Field(default=7, ge=2, le=50, description="Durations on the front of `pareto`.")
+    front_points: int = Field(default=7, ge=2, le=50, description="Durations on the front of `pareto`.")
 
 
 class Limits(Strict):
@@ -77,8 +77,8 @@ class ScheduleSearch(SwarmSearch):
     """How the schedule is sought; what is left out depends on the method."""
 
     method: Literal["hybrid", "pso"] = "hybrid"
-    particles: Annotated[Whole, Field(ge=1, le=10_000)] | None = None
-    generations: Annotated[Whole, Field(ge=1, le=10_000)] | None = None
+    particles: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    generations: Annotated[int, Field(ge=1, le=10_000)] | None = None
     max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
         default=None, description="Time budget of the searches; the best so far is the result."
     )
@@ -90,7 +90,7 @@ class ScheduleSearch(SwarmSearch):
 class VerifyingModel(Strict):
     """The flexible model in which the schedules are flown again."""
 
-    elements: Whole = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
+    elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
     lattice: Lattice | None = Field(default=None, description="As the equivalent model's when left out.")
 
 

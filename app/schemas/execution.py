@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
-from app.schemas.fields import Strict, Whole
+from app.schemas.fields import Strict
 
 MAX_PRIORITY = 100
 MAX_LABEL = 100
@@ -20,7 +20,7 @@ Label = Annotated[str, Field(min_length=1, max_length=MAX_LABEL, pattern=r"^[^\x
 class Execution(Strict):
     """How the job is run; the result is the same whatever stands here."""
 
-    priority: Whole = Field(
+    priority: int = Field(
         default=0,
         ge=-MAX_PRIORITY,
         le=MAX_PRIORITY,
@@ -29,7 +29,7 @@ class Execution(Strict):
     label: Label | None = Field(
         default=None, description="A word of your own, to find the job again: `GET /jobs?label=`."
     )
-    max_attempts: Annotated[Whole, Field(ge=1, le=MAX_ATTEMPTS)] | None = Field(
+    max_attempts: Annotated[int, Field(ge=1, le=MAX_ATTEMPTS)] | None = Field(
         default=None,
         description="How often the job may be begun, again after its worker was lost; the service's own "
         "number when left out.",
@@ -46,7 +46,7 @@ class SpreadExecution(Execution):
         default="single",
         description="`distributed`: whatever workers there are fly each generation together.",
     )
-    chunks: Whole = Field(
+    chunks: int = Field(
         default=16, ge=1, le=MAX_CHUNKS, description="Parts of a generation in the mode `distributed`."
     )
 

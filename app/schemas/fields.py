@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Any, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FailFast, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    FailFast,
+    Field,
+    model_validator,
+)
 
 from samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 
@@ -19,13 +28,34 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_numbers(cls, given: Any) -> Any:
+        """Take 3.0 where a whole number is wanted: JSON Schema makes no difference."""
+        if not isinstance(given, dict):
+            return given
+        return {**given, **{name: _whole(given[name]) for name in _whole_fields(cls) if name in given}}
+
+
+@cache
+def _whole_fields(model: type[BaseModel]) -> tuple[str, ...]:
+    """Names of the fields whose only numbers are whole ones."""
+    kinds = {name: set(_kinds(field.annotation)) for name, field in model.model_fields.items()}
+    return tuple(name for name, found in kinds.items() if int in found and float not in found)
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    yield annotation
+    for part in get_args(annotation):
+        yield from _kinds(part)
+
 
 def _whole(value: Any) -> Any:
-    """A number without a fraction as the whole number that it is: JSON Schema makes no difference."""
+    if isinstance(value, list):
+        return [_whole(item) for item in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-Whole = Annotated[int, BeforeValidator(_whole)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 Angle = Annotated[float, Field(ge=-3.2, le=3.2)]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.fields import Strict, Whole
+from app.schemas.fields import Strict
 
 
 class VortexCore(Strict):
@@ -23,8 +23,8 @@ class VortexCore(Strict):
 class Lattice(Strict):
     """Panels of each wing's vortex lattice, and the core of its vortices."""
 
-    chordwise: Whole = Field(default=4, ge=1, le=8)
-    spanwise: Whole = Field(default=10, ge=4, le=20)
+    chordwise: int = Field(default=4, ge=1, le=8)
+    spanwise: int = Field(default=10, ge=4, le=20)
     core: VortexCore = VortexCore()
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from app.schemas.fields import Identifier, Strict, Whole
+from app.schemas.fields import Identifier, Strict
 from app.schemas.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 
 MAX_LINKS = 8
@@ -45,7 +45,7 @@ class Parameters(Strict):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_PARAMETERS]})
 
-    links_per_wing: Whole = Field(ge=1, le=MAX_LINKS)
+    links_per_wing: int = Field(ge=1, le=MAX_LINKS)
     separate_wings: bool = False
     division: Shares | Annotated[list[Shares], Field(min_length=1, max_length=MAX_WINGS)] = Field(
         description="Share of the span of each link; one list per wing where wings are separate."

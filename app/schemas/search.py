@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from app.schemas.fields import Identifier, Strict, Whole
+from app.schemas.fields import Identifier, Strict
 from app.schemas.parameters import GivenParameters
 
 MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
@@ -39,4 +39,4 @@ class SwarmSearch(Strict):
         default=None, description="Pull to the swarm's best."
     )
     inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
-    seed: Whole = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")
+    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")

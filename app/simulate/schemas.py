@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.jobs.schemas import Validation
 from app.schemas.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from app.schemas.execution import Execution
-from app.schemas.fields import Strict, Whole
+from app.schemas.fields import Strict
 from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import CHOSEN, FlightStepS, Lattice, Start
 from app.schemas.parameters import KnownModel
@@ -43,7 +43,7 @@ class FlexibleModel(Strict):
     """Wings of geometrically exact beams: the reference, and hundreds of times slower."""
 
     kind: Literal["flexible"]
-    elements: Whole = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
+    elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
     start: Start | None = None
@@ -77,7 +77,7 @@ class Environment(Strict):
 
     gust: Gust | None = None
     turbulence: Turbulence | None = None
-    seed: Whole = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
+    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
 
 
 EXAMPLE_SIMULATION: dict[str, Any] = {

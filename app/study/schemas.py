@@ -16,10 +16,9 @@ from app.identify.schemas import (
     SoughtModel,
 )
 from app.jobs.schemas import Validation
-from app.schemas.fields import Whole
 from app.schemas.parameters import MAX_LINKS
 
-Links = Annotated[Whole, Field(ge=1, le=MAX_LINKS)]
+Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 
 EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": [1, 2, 3, 4]}}
 
