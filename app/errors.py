@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from samplefiles.fault import Pickled
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -30,7 +32,7 @@ class Fault:
 
 
 @dataclass(eq=False)
-class ServiceError(Exception):
+class ServiceError(Pickled, Exception):
     """Root of the tree; carries what a problem document says."""
 
     detail: str = ""
@@ -42,6 +44,9 @@ class ServiceError(Exception):
     code = "internal_error"
     title = "Something went wrong inside the service"
     ask_again_s: ClassVar[int | None] = None  # when a repetition may succeed
+
+    def __post_init__(self) -> None:
+        self.args = (self.detail,)  # not what a subclass was constructed of
 
     def __str__(self) -> str:
         return self.detail or self.title

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from samplefiles.fault import Pickled
+
 
 class Exit(IntEnum):
     """What a shell script can rely on."""
@@ -18,7 +20,7 @@ class Exit(IntEnum):
     INTERRUPTED = 130  # Ctrl-C
 
 
-class CommandError(Exception):
+class CommandError(Pickled, Exception):
     """A sentence for the user and the exit code that goes with it.
 
     Parameters

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,34 @@ def require_file(path: Path) -> None:
         raise CommandError(
             f"there is no file {path}", code=Exit.INVALID_INPUT, hint=f"looked in {Path.cwd()}"
         )
+
+
+def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
+    """The files that are named, patterns (``flights/*.csv``) replaced by what matches them, by name.
+
+    A shell replaces them before, unless they are quoted; a file of that very name is no pattern.
+
+    Raises
+    ------
+    CommandError : nothing matches a pattern.
+    """
+    found: list[Path] = []
+    for path in paths:
+        pattern = str(path)
+        if not glob.has_magic(pattern) or path.exists():
+            found.append(path)
+            continue
+        # a pattern may begin anywhere, which Path.glob does not know
+        names = glob.glob(pattern, recursive=True)  # noqa: PTH207
+        matches = sorted(Path(name) for name in names if Path(name).is_file())
+        if not matches:
+            raise CommandError(
+                f"{option} {pattern}: no file matches",
+                code=Exit.INVALID_INPUT,
+                hint=f"looked in {Path.cwd()}",
+            )
+        found += matches
+    return found
 
 
 def require_place(path: Path | None, option: str) -> None:

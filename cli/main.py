@@ -7,6 +7,8 @@ a port, a program or a writable directory; 130 Ctrl-C.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from cli.commands.audit import audit
@@ -22,20 +24,41 @@ from cli.commands.paper import paper
 from cli.commands.serve import serve
 from cli.commands.simulate import simulate
 from cli.commands.study import study
+from cli.several_values import SeveralValues
+
+
+def print_version(wanted: bool) -> None:
+    """Print the version and end, where it is asked for."""
+    if wanted:
+        from app.version import VERSION
+
+        typer.echo(f"morphid {VERSION}")
+        raise typer.Exit
+
 
 app = typer.Typer(
     name="morphid",
-    help="Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
 for command in (serve, doctor, ready, identify, study, simulate, optimize, paper, bench):
-    app.command(epilog=EXIT_CODES)(command)
+    app.command(epilog=EXIT_CODES, cls=SeveralValues)(command)
 app.add_typer(jobs, name="jobs")
 app.add_typer(keys, name="keys")
 app.add_typer(audit, name="audit")
 app.add_typer(database, name="db")
+
+
+@app.callback()
+def morphid(
+    *,
+    _version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights."""
 
 
 if __name__ == "__main__":

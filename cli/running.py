@@ -66,8 +66,10 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
+    bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
+    from morphcore.stopping import listening
     from worker.operations import WorkInterrupted, WorkRefused, find_operation
     from worker.progress import Pace
 
@@ -75,7 +77,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
     pace = Pace(time.monotonic)
     try:
         work = find_operation(request.operation)(request.body(sample_document), threads)
-        with first_interrupt() as interrupted:
+        with first_interrupt() as interrupted, listening(bar.note):
             try:
                 for step in work.steps(None, interrupted):
                     checkpoint = step.checkpoint

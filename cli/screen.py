@@ -100,6 +100,11 @@ class Meter:
         self._next_line_at = 0.0
         self._last_line = ""
 
+    def note(self, message: str) -> None:
+        """Show what is done before there is progress to show, or between."""
+        self._progress.update(self._task, description="preparing", detail=message)
+        self._print("preparing", message)
+
     def show(self, progress: Document | None, status: str = "running") -> None:
         """Show one progress document."""
         if progress is None:
@@ -109,8 +114,11 @@ class Meter:
         self._progress.update(
             self._task, completed=fraction, description=phase, detail=progress_detail(progress)
         )
-        line = f"{phase:<10} {100.0 * fraction:3.0f} %  {progress_detail(progress)}"
-        console = self._progress.console
+        self._print(phase, f"{100.0 * fraction:3.0f} %  {progress_detail(progress)}")
+
+    def _print(self, phase: str, said: str) -> None:
+        """Print a line, now and then, where there is no terminal."""
+        line, console = f"{phase:<10} {said}", self._progress.console
         if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
             console.print(line, markup=False, soft_wrap=True)
             self._last_line = line

@@ -12,7 +12,10 @@ from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphcore.version import VERSION
 from morphcore.warming import warm_up, warm_up_further
+
+__version__ = VERSION
 
 __all__ = [
     "Aircraft",
@@ -21,6 +24,7 @@ __all__ = [
     "IdentifyResult",
     "Simulation",
     "Trajectory",
+    "__version__",
     "identification_from_document",
     "identify",
     "load_aircraft",

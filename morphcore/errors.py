@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from samplefiles.fault import Pickled
 
-class MorphError(Exception):
+
+class MorphError(Pickled, Exception):
     """Base of all errors raised by morphcore.
 
     Parameters

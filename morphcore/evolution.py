@@ -12,23 +12,31 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from morphcore.geometry.fields import WholeNumbers
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # it warns of packages for plots that it misses
-    import cma
+Array = NDArray[np.float64]
 
 FEWEST = 4  # models of a generation: with fewer there is nothing to weigh
 FIRST_SPREAD = 0.1  # standard deviation of the first generation, in the unit cube
 
 
+@cache
+def strategies() -> Any:
+    """The package; loaded for the first strategy, for it brings matplotlib along."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it warns of packages for plots that it misses
+        import cma
+    return cma
+
+
 @dataclass(frozen=True)
-class EvolutionSettings:
+class EvolutionSettings(WholeNumbers):
     """``particles`` models a generation; the search ends before ``generations`` where it has converged."""
 
     particles: int = 32
@@ -101,7 +109,7 @@ class Evolution:
             "signals_filename": None,  # and none read
         }
         with _own_numbers():
-            return cma.CMAEvolutionStrategy(self._mean, FIRST_SPREAD, options)
+            return strategies().CMAEvolutionStrategy(self._mean, FIRST_SPREAD, options)
 
     def _go_to(self, state: EvolutionState) -> None:
         """Tell what is not told yet; begin anew where something else was told."""

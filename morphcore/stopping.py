@@ -1,8 +1,10 @@
-"""Long work that is asked to stop: by an argument, or by whoever runs the calls that take none."""
+"""Long work that is asked to stop, by an argument or by whoever runs it, and that says what it is about."""
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -12,6 +14,53 @@ Stop = Callable[[], bool]
 
 class Interrupted(Exception):
     """The caller's ``stop`` said so between two chunks."""
+
+
+class Deadline:
+    """A question to stop that answers yes when somebody else does, or when the time is up.
+
+    Parameters
+    ----------
+    seconds : from now; None: for ever. stop : of somebody else. clock : seconds that only rise.
+
+    Attributes
+    ----------
+    passed : whether it was the time that stopped the work.
+    """
+
+    def __init__(
+        self, seconds: float | None, stop: Stop | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._stop, self._clock = stop, clock
+        self._end_s = math.inf if seconds is None else clock() + seconds
+        self.passed = False
+
+    def __call__(self) -> bool:
+        """Ask."""
+        if self._stop is not None and self._stop():
+            return True
+        self.passed = self.passed or self._clock() >= self._end_s
+        return self.passed
+
+
+_listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def listening(listener: Callable[[str], None]) -> Iterator[None]:
+    """Let `listener` hear what long work of the block is about between its steps, in this thread."""
+    token = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(token)
+
+
+def say(message: str) -> None:
+    """Tell whoever listens what begins now: a few words for a line of progress."""
+    listener = _listener.get()
+    if listener is not None:
+        listener(message)
 
 
 _surrounding: ContextVar[Stop | None] = ContextVar("stop", default=None)

@@ -9,27 +9,21 @@ from __future__ import annotations
 
 import logging.config
 from dataclasses import dataclass, field
+from functools import cache, partial
+from types import SimpleNamespace
 from typing import Any, cast
 from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.fields import WholeNumbers
+
 Array = NDArray[np.float64]
-
-# pyswarms configures the root logger and opens report.log in the working directory, on import and with every
-# handler that it makes; neither is its to do
-with mock.patch.object(logging.config, "dictConfig"):
-    from pyswarms.backend import compute_pbest, compute_position, compute_velocity
-    from pyswarms.backend.handlers import BoundaryHandler, VelocityHandler
-    from pyswarms.backend.swarms import Swarm
-
-    VELOCITIES = VelocityHandler("unmodified")
-    POSITIONS = BoundaryHandler("nearest")
 
 
 @dataclass(frozen=True)
-class SwarmSettings:
+class SwarmSettings(WholeNumbers):
     """Coefficients of the swarm; ``inertia`` 0.7 keeps c1 = c2 = 1 inside the stable region (Trelea 2003)."""
 
     particles: int = 200
@@ -56,6 +50,26 @@ class SwarmState:
         return np.asarray(self.best_position[int(np.argmin(self.best_cost))])
 
 
+@cache
+def operators() -> SimpleNamespace:
+    """What is used of pyswarms; loaded for the first swarm, for it brings matplotlib along.
+
+    It configures the root logger and opens report.log in the working directory, on import and with every
+    handler that it makes; neither is its to do.
+    """
+    with mock.patch.object(logging.config, "dictConfig"):
+        from pyswarms.backend import compute_pbest, compute_position, compute_velocity
+        from pyswarms.backend.handlers import BoundaryHandler, VelocityHandler
+        from pyswarms.backend.swarms import Swarm
+
+        return SimpleNamespace(
+            Swarm=Swarm,
+            best=compute_pbest,
+            velocity=partial(compute_velocity, clamp=None, vh=VelocityHandler("unmodified")),
+            position=partial(compute_position, bh=BoundaryHandler("nearest")),
+        )
+
+
 def first_swarm(settings: SwarmSettings, guess: Array, seed: int) -> SwarmState:
     """A swarm spread evenly over the unit cube, its first particles the guess (d,) or guesses (k, d)."""
     generator = np.random.RandomState(seed % 2**32)  # the kind of generator that pyswarms draws from
@@ -76,20 +90,21 @@ def first_swarm(settings: SwarmSettings, guess: Array, seed: int) -> SwarmState:
 
 def next_swarm(state: SwarmState, settings: SwarmSettings, cost: Array) -> SwarmState:
     """The next generation, given the costs (p,) of the present positions."""
-    swarm = Swarm(
+    pyswarms = operators()
+    swarm = pyswarms.Swarm(
         position=state.position,
         velocity=state.velocity,
         options={"c1": settings.c1, "c2": settings.c2, "w": settings.inertia},
     )
     swarm.pbest_pos, swarm.pbest_cost, swarm.current_cost = state.best_position, state.best_cost, cost
-    swarm.pbest_pos, swarm.pbest_cost = compute_pbest(swarm)
+    swarm.pbest_pos, swarm.pbest_cost = pyswarms.best(swarm)
     swarm.best_pos = swarm.pbest_pos[int(np.argmin(swarm.pbest_cost))]
     unit = (np.zeros(state.position.shape[1]), np.ones(state.position.shape[1]))
     others = np.random.get_state(legacy=True)  # noqa: NPY002 - pyswarms knows no other
     np.random.set_state(state.random)  # noqa: NPY002
     try:
-        swarm.velocity = compute_velocity(swarm, None, VELOCITIES, unit)
-        position = compute_position(swarm, unit, POSITIONS)
+        swarm.velocity = pyswarms.velocity(swarm, bounds=unit)
+        position = pyswarms.position(swarm, unit)
         random = np.random.get_state(legacy=True)  # noqa: NPY002
     finally:
         np.random.set_state(others)  # noqa: NPY002

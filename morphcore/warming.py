@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 
+from morphcore import evolution, swarm
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
@@ -44,7 +47,7 @@ def warm_up(threads: int | None = None) -> None:
 
 
 def warm_up_further() -> None:
-    """Fly with hinge torques and with beams, so that the kernels of all other jobs are compiled too."""
+    """Fly with hinge torques and with beams: the kernels and packages of all other jobs are loaded too."""
     aircraft, flight, sample = _tiny()
     model = chain_model(aircraft, flight, 2, _SMALL)
     held = flight_plan(model, [Hold()] * len(_SIDES), time_grid(sample.time_s))
@@ -52,6 +55,10 @@ def warm_up_further() -> None:
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
     simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=_SMALL, step_s=0.01)
+    # packages that the searches load when they are first needed
+    importlib.import_module("scipy.stats")
+    evolution.strategies()
+    swarm.operators()
 
 
 def _tiny() -> tuple[Aircraft, Flight, Trajectory]:

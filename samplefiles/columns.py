@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from samplefiles.fault import FileFault, shown
+from samplefiles.flight import MOST_ROWS, from_first_row
 from samplefiles.titles import FLIGHT
 
 Numbers = Iterable[float]
-MOST_ROWS = 200_000  # 2000 s at 10 ms
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,20 @@ class FlightColumns:
     lines: Sequence[int] = ()
 
 
-def in_si(values: Numbers, factor: float, title: str) -> array[float]:
+def column_in_si(name: str, values: Sequence[float], factor: float | None, title: str) -> array[float]:
+    """A flight's column in SI units; time from the first row where its clock counts from an epoch.
+
+    Raises
+    ------
+    FileFault : naming the first row that is no finite number.
+    """
+    return in_si(from_first_row(values, factor) if name == "t" else values, factor, title)
+
+
+def in_si(values: Numbers, factor: float | None, title: str) -> array[float]:
     """Values times `factor`; FileFault names the first row that is no finite number."""
-    scaled = array("d", values if factor == 1.0 else (value * factor for value in values))
+    scale = 1.0 if factor is None else factor
+    scaled = array("d", values if scale == 1.0 else (value * scale for value in values))
     if not all(map(math.isfinite, scaled)):
         row = next(number for number, value in enumerate(scaled) if not math.isfinite(value))
         raise not_finite(title, scaled[row], row)

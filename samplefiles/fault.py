@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 SHOWN_CHARACTERS = 60  # of a title or cell that a stranger wrote
 TITLES = "titles"
@@ -13,8 +14,33 @@ def shown(text: object) -> str:
     return str(text)[:SHOWN_CHARACTERS].encode("unicode_escape").decode("ascii")
 
 
+class Pickled:
+    """Makes an exception survive pickling whole, however it is constructed: base of every error of the house.
+
+    Python calls an exception's class with its ``args`` again, which fails for keyword arguments and for
+    constructors that write their own sentence; a process pool then hangs.
+    """
+
+    args: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (type(self), self.args, dict(vars(self)))
+
+
+def _remade(kind: type[BaseException], args: tuple[Any, ...], data: dict[str, Any]) -> BaseException:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(data)
+    return error
+
+
+def as_sentence(text: str) -> str:
+    """A fault's detail or hint with a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 @dataclass(eq=False)
-class FileFault(Exception):
+class FileFault(Pickled, Exception):
     """The file cannot be read as a flight.
 
     Attributes
@@ -49,3 +75,12 @@ class FileFault(Exception):
         if self.line is not None:
             return f"line {self.line}"
         return "" if self.row is None else f"row {self.row} (from 0)"
+
+
+def octave_text() -> FileFault:
+    """The fault of Octave's own text format, which it writes under any name."""
+    return FileFault(
+        "octave_text",
+        "this is an Octave text file",
+        "save it from Octave for MATLAB: save -v7 flight.mat t sweep_left sweep_right phi theta psi",
+    )

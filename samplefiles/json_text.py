@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from typing import Any, BinaryIO
 
-from samplefiles.columns import FlightColumns, Wanted, equally_long, in_si, not_finite
-from samplefiles.fault import FileFault, shown
+from samplefiles.cells import Clock, Numbers
+from samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si, not_finite
+from samplefiles.comments import is_comment, is_octave
+from samplefiles.fault import FileFault, octave_text, shown
 from samplefiles.titles import chosen
 
 HINT = 'give one object of lists: {"t": [0.0, 0.01], "sweep_left": [...], ...}'
@@ -33,10 +36,12 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
             raise FileFault("list_type", f"{shown(title)} is not a list", HINT, title=title)
         if len(items) > wanted.most_rows:
             raise wanted.too_many_rows()
+        if name == "t" and items and isinstance(items[0], str):
+            items = _dates(items, title)
         for row, item in enumerate(items):
             if not _is_number(item):
                 raise not_finite(title, item, row)
-        values[name] = in_si(items, found[name][1], title)
+        values[name] = column_in_si(name, items, found[name][1], title)
     columns = equally_long(FlightColumns(values), names)
     rows = len(values[wanted.names[0]])
     if wanted.others:
@@ -44,6 +49,18 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
             if title not in names.values() and isinstance(items, list) and len(items) == rows:
                 _keep_numbers(columns, title, items)
     return columns
+
+
+def _dates(items: list[Any], title: str) -> list[float]:
+    """Times, s, of dates (ISO 8601), from the first one."""
+    clock = Clock(1.0, Numbers())
+    times = []
+    for row, item in enumerate(items):
+        time_s = clock.read(item) if isinstance(item, str) and ":" in item else math.nan
+        if not math.isfinite(time_s):
+            raise not_finite(title, item, row)
+        times.append(time_s)
+    return times
 
 
 def _keep_numbers(columns: FlightColumns, title: str, items: list[Any]) -> None:
@@ -63,9 +80,20 @@ def _is_number(item: object) -> bool:
 
 def _parsed(data: bytes) -> Any:
     try:
-        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=_object)
+        text = data.decode(json.detect_encoding(data)).removeprefix("\ufeff")
     except UnicodeDecodeError:
         raise FileFault("not_json", "the text is not UTF-8", "save it in UTF-8") from None
+    if data and not text:
+        raise FileFault("not_json", "there is no text in UTF-8", "save it in UTF-8")
+    if is_octave(text):
+        raise octave_text()
+    try:
+        # no line inside a JSON text begins like a comment: a string cannot go on in the next line
+        lines = (
+            "" if is_comment(line) and not line.lstrip().startswith('"') else line
+            for line in text.split("\n")
+        )
+        return json.loads("\n".join(lines), object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise FileFault("not_json", f"this is not JSON: {error.msg} in line {error.lineno}", HINT) from None
     except RecursionError:

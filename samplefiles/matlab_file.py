@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, BinaryIO
 
-from samplefiles.columns import FlightColumns, Wanted, equally_long, in_si
-from samplefiles.fault import FileFault, shown
+from samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si
+from samplefiles.comments import is_octave
+from samplefiles.fault import FileFault, octave_text, shown
 from samplefiles.titles import MOST_COLUMNS, chosen, meaning
 
 NUMBERS = frozenset(
@@ -14,6 +16,8 @@ NUMBERS = frozenset(
 )
 CLASSES = {"float64": "double", "float32": "single"}  # numpy -> MATLAB
 OBJECTS = frozenset({"opaque", "object", "function"})
+OCTAVE_BINARY = b"Octave-1-"
+SAVED = "again: save('flight.mat', ..., '-v7')"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 PLAIN = "t = ts.Time(:); theta = ts.Data(:); save('flight.mat', 't', 'theta', ..., '-v7')"
 AS_STRUCT = "s = table2struct(T, 'ToScalar', true); save('flight.mat', 's', '-v7')"
@@ -28,7 +32,7 @@ def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     ------
     FileFault : naming the variable and the row.
     """
-    _refuse_hdf5(stream)
+    _refuse_others(stream)
     try:
         return _read(stream, _contents(stream), wanted)
     except (FileFault, MemoryError):
@@ -41,14 +45,25 @@ def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         raise FileFault(
             "not_matlab",
             f"this is not a readable MATLAB file: {words}",
-            "save it again: save('flight.mat', ..., '-v7')",
+            f"save it {SAVED}",
         ) from None
 
 
-def _refuse_hdf5(stream: BinaryIO) -> None:
+def _refuse_others(stream: BinaryIO) -> None:
+    """Refuse files that are something else by how they begin; scipy would stumble over them somewhere."""
     head = stream.read(1024)
     if head.startswith((HDF5, b"MATLAB 7.3")) or head[512:520] == HDF5:
         raise _hdf5()
+    if is_octave(head.decode("latin-1")):
+        raise octave_text()
+    if head.startswith(OCTAVE_BINARY):
+        raise replace(octave_text(), detail="this is an Octave binary file")
+    if head and not head.startswith(b"MATLAB") and all(byte >= ord("\t") for byte in head):
+        raise FileFault(
+            "not_matlab",
+            "this is a text, not a MATLAB file",
+            f"give a table of text the ending .csv, or save {SAVED}",
+        )
 
 
 def _hdf5() -> FileFault:
@@ -164,7 +179,8 @@ def _vectors(arrays: Mapping[str, Any], wanted: Wanted) -> FlightColumns:
         item = arrays[title]
         kind = CLASSES.get(item.dtype.name, item.dtype.name) if hasattr(item, "ravel") else "sparse"
         _require_vector(title, item.shape, kind, wanted)
-        values[name] = in_si(item.ravel().astype(float), found[name][1], title)
+        # Python's own numbers: whole ones of 64 bits are subtracted from each other exactly
+        values[name] = column_in_si(name, item.ravel().tolist(), found[name][1], title)
     columns = equally_long(FlightColumns(values), names)
     if not len(values[wanted.names[0]]):
         raise FileFault("no_rows", "the vectors are empty", "give rows of numbers")

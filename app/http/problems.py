@@ -115,12 +115,16 @@ def _shown(value: Any) -> str:
     return f" (got {text[:SHOWN_CHARACTERS]}{'…' if len(text) > SHOWN_CHARACTERS else ''})"
 
 
-def _sentence(item: Mapping[str, Any]) -> str:
+def _sentence(item: Mapping[str, Any], pointer: str) -> str:
     context = item.get("ctx") or {}
     if item["type"] == "too_long" and context.get("actual_length") is not None:
         return f"{context['actual_length']} items are too many: at most {context['max_length']}"
     if item["type"] == "too_short":
         return f"{context['actual_length']} items are too few: at least {context['min_length']}"
+    if str(item["type"]).startswith(("greater", "less")):
+        names = [part for part in pointer.split("/") if not part.isdecimal()]
+        row = f" at row {item['loc'][-1]}" if isinstance(item["loc"][-1], int) else ""
+        return f"{names[-1]} is {item['input']:g}{row}"
     return str(item["msg"]).removeprefix("Value error, ")
 
 
@@ -157,8 +161,9 @@ def faults_of(error: RequestValidationError, known_fields: Callable[[], Sequence
                 "unknown_field", "There is no such field.", pointer, _extra_field_hint(name, known_fields())
             )
         else:
-            message = _sentence(item)
-            shown = "" if kind == "missing" else _shown(item.get("input"))
+            message = _sentence(item, pointer)
+            bound = kind.startswith(("greater", "less"))
+            shown = "" if kind == "missing" or bound else _shown(item.get("input"))
             faults[pointer] = Fault(
                 kind, f"{message}{shown}.", pointer, _bound_hint(kind, item.get("ctx") or {})
             )

@@ -22,7 +22,7 @@ from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
 from app.schemas.fields import MAX_ROWS
-from samplefiles.fault import TITLES, FileFault
+from samplefiles.fault import TITLES, FileFault, as_sentence
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
@@ -123,8 +123,7 @@ class ParserPool:
 
 def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMediaType:
     """Tell a file's fault as a problem of the request."""
-    detail = fault.detail[:1].upper() + fault.detail[1:] + "."
-    hint = fault.hint[:1].upper() + fault.hint[1:] + "."
+    detail, hint = as_sentence(fault.detail), as_sentence(fault.hint)
     if fault.code in FORMAT_FAULTS:
         return UnsupportedMediaType(detail, pointer, hint)
     place = "".join(f"/{part}" for part in (fault.row, _token(fault.title)) if part not in (None, ""))

@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, FailFast, Field
 
 from app.schemas.fields import MAX_ROWS, Angle, Strict
+from samplefiles.flight import LONGEST_FLIGHT_S
 
-MAX_DURATION_S = 600.0
+MAX_DURATION_S = LONGEST_FLIGHT_S
 MAX_KNOTS = 1000
 
 EXAMPLE_SCHEDULE: dict[str, Any] = {

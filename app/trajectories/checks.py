@@ -1,51 +1,37 @@
-"""Checks of the rows of one flight."""
+"""Checks of the rows of one flight, by the rules that the library has too."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 
 from app.errors import Fault
 from app.schemas.samples import TrajectoryColumns
-
-MAX_DURATION_S = 600.0
-MIN_STEP_S = 1e-6
-COLUMN_NAMES = tuple(TrajectoryColumns.model_fields)
+from samplefiles.fault import FileFault, as_sentence
+from samplefiles.flight import INLINE, flight_faults
 
 
 def columns_faults(columns: TrajectoryColumns, pointer: str) -> list[Fault]:
-    """Check that the columns are equally long and that time rises."""
-    faults = []
-    rows = len(columns.time_s)
-    for name in COLUMN_NAMES:
-        length = len(getattr(columns, name))
-        if length != rows:
-            faults.append(
-                Fault(
-                    "unequal_lengths",
-                    f"{name} has {length} rows, time_s has {rows}.",
-                    f"{pointer}/{name}",
-                    f"Give one {name} for every time.",
-                )
-            )
-    for row, (before, after) in enumerate(pairwise(columns.time_s), start=1):
-        if after - before < MIN_STEP_S:
-            faults.append(
-                Fault(
-                    "time_not_rising",
-                    f"Time goes from {before:g} s to {after:g} s at row {row}.",
-                    f"{pointer}/time_s/{row}",
-                    f"Sort the rows by time and drop repeated ones; steps must be at least {MIN_STEP_S:g} s.",
-                )
-            )
-            break
-    duration = columns.time_s[-1] - columns.time_s[0]
-    if duration > MAX_DURATION_S:
-        faults.append(
-            Fault(
-                "too_long_a_flight",
-                f"The flight takes {duration:g} s.",
-                f"{pointer}/time_s",
-                f"Cut it to at most {MAX_DURATION_S:g} s, or check that time is in seconds.",
-            )
-        )
-    return faults
+    """What is wrong with a flight that stands in a JSON document."""
+    named = {name: getattr(columns, field) for name, field in INLINE.items()}
+    return [
+        _fault(fault, f"{pointer}/{INLINE[fault.title]}{_row(fault)}")
+        for fault in flight_faults(named, INLINE)
+    ]
+
+
+def file_faults(columns: Mapping[str, Sequence[float]], pointer: str) -> list[Fault]:
+    """What is wrong with a flight that came in a file, whose columns are called as in `FLIGHT`."""
+    return [
+        _fault(fault, f"{pointer}/{INLINE[fault.title]}{_row(fault)}")
+        if fault.title == "t"
+        else _fault(fault, f"{pointer}{_row(fault)}/{INLINE[fault.title]}")
+        for fault in flight_faults(columns)
+    ]
+
+
+def _row(fault: FileFault) -> str:
+    return "" if fault.row is None else f"/{fault.row}"
+
+
+def _fault(fault: FileFault, pointer: str) -> Fault:
+    return Fault(fault.code, as_sentence(fault.detail), pointer, as_sentence(fault.hint))

@@ -13,11 +13,11 @@ from app.errors import Fault, InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge_bytes
 from app.parsing.pool import refusal
-from app.schemas.fields import MIN_ROWS
-from app.trajectories.checks import columns_faults
+from app.trajectories.checks import columns_faults, file_faults
 from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
 from app.trajectories.schemas import TrajectoryUpload
 from samplefiles.fault import FileFault
+from samplefiles.flight import INLINE
 from samplefiles.reading import kind_of
 
 
@@ -52,12 +52,10 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
     InvalidRequest
         Naming row and column.
     """
-    named = {"time_s" if key == "t" else f"{key}_rad": values for key, values in columns.items()}
-    if len(named["time_s"]) < MIN_ROWS:
-        hint = "Send the whole flight."
-        raise InvalidRequest.of(
-            [Fault("too_short", f"The file has fewer than {MIN_ROWS} rows.", "/file", hint)]
-        )
+    faults = file_faults(columns, "/file")
+    if faults:
+        raise InvalidRequest.of(faults)
+    named = {INLINE[key]: values for key, values in columns.items()}
     try:
         return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **named)
     except ValidationError as error:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from cli.exits import CommandError, Exit
-from cli.files import read_json
+from cli.files import matching_files, read_json
 from cli.request import Request
 
 EXIT_CODES = (
@@ -54,10 +54,14 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")
 AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
 FlightFile = Annotated[Path, flight_option("--flight", help="Flight condition, JSON.")]
 Samples = Annotated[
-    list[Path], flight_option("--sample", help="Sample flight to fit: CSV, JSON, Parquet, MATLAB; repeat.")
+    list[Path],
+    flight_option(
+        "--sample", help="Sample flights to fit: CSV, JSON, Parquet, MATLAB; several, or a pattern."
+    ),
 ]
 HeldOut = Annotated[
-    list[Path] | None, flight_option("--held-out", help="Sample flight to predict, not to fit; repeat.")
+    list[Path] | None,
+    flight_option("--held-out", help="Sample flights to predict, not to fit; several, or a pattern."),
 ]
 
 Parameters = Annotated[
@@ -100,8 +104,8 @@ def sample_request(
 ) -> Request:
     """Begin a request that has sample flights."""
     request = flight_request(operation, aircraft, flight)
-    request.add_samples(samples, "train", "--sample")
-    request.add_samples(held_out, "held_out", "--held-out")
+    request.add_samples(matching_files(samples, "--sample"), "train", "--sample")
+    request.add_samples(matching_files(held_out, "--held-out"), "held_out", "--held-out")
     return request
 
 

@@ -15,14 +15,15 @@ from morphcore.errors import InvalidInput, UnsupportedRegime
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.section import GivenSection, Material
 from morphcore.geometry.surface import DEFAULT_HINGE_RANGE_RAD, Hinge, Surface
+from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 
 MACH_LIMIT = 0.7  # beyond, Prandtl-Glauert's linear compressibility does not hold
 
 
-@dataclass(frozen=True)
-class Fuselage:
+@dataclass(frozen=True, repr=False)
+class Fuselage(Shown):
     """A rigid body without aerodynamic force.
 
     ``centre_of_mass_B`` in m from the reference point; ``inertia_B`` (3, 3) in kg m^2 about the centre of
@@ -34,8 +35,8 @@ class Fuselage:
     centre_of_mass_B: Array
 
 
-@dataclass(frozen=True)
-class Aircraft:
+@dataclass(frozen=True, repr=False)
+class Aircraft(Shown):
     """A rigid fuselage with lifting surfaces on prescribed hinges."""
 
     name: str
@@ -57,8 +58,8 @@ class Start:
     moment_B: Array
 
 
-@dataclass(frozen=True)
-class Flight:
+@dataclass(frozen=True, repr=False)
+class Flight(Shown):
     """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s."""
 
     airspeed_m_s: float

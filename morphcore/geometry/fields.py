@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 import reprlib
@@ -15,6 +16,43 @@ from morphcore.errors import InvalidInput
 
 Array = NDArray[np.float64]
 _MISSING = object()
+
+
+def _bound_broken(value: float, least: float, most: float, above: float = -math.inf) -> str:
+    """The bound that a number does not keep, in the words of the service; empty when it keeps all."""
+    if value <= above:
+        return f"it must be more than {above:g}"
+    if value < least:
+        return f"it must be at least {least:g}"
+    return f"it must be at most {most:g}" if value > most else ""
+
+
+def whole_number(
+    value: Any, name: str, *, pointer: str = "", least: float = -math.inf, most: float = math.inf
+) -> int:
+    """A whole number as Python's own: out of numpy's, and out of a float without a fraction.
+
+    Raises
+    ------
+    InvalidInput : it is no number, a truth value, not whole, or beyond its bounds.
+    """
+    whole = not isinstance(value, bool | np.bool_) and (
+        isinstance(value, int | np.integer)
+        or (isinstance(value, float | np.floating) and float(value).is_integer())
+    )
+    broken = _bound_broken(value, least, most) if whole else "give a whole number"
+    if broken:
+        raise InvalidInput(f"{name} is {reprlib.repr(value)}", pointer=pointer or f"/{name}", hint=broken)
+    return int(value)
+
+
+class WholeNumbers:
+    """Settings whose fields of the type int are Python's own, whoever gave them; anything else is refused."""
+
+    def __post_init__(self) -> None:
+        for item in dataclasses.fields(self):  # type: ignore[arg-type]  # of a subclass, which is a dataclass
+            if item.type == "int":
+                object.__setattr__(self, item.name, whole_number(getattr(self, item.name), item.name))
 
 
 class Fields:
@@ -88,24 +126,20 @@ class Fields:
         return self._checked(name, self._document[name], least, most, above)
 
     def _checked(self, name: str, value: Any, least: float, most: float, above: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
+        if not _is_number(value) or not _finite(value):
             raise self._error(
                 name, f"{name} is {reprlib.repr(value)}, not a finite number", "give a number in SI units"
             )
-        if value <= above:
-            raise self._error(name, f"{name} is {value:g}", f"it must be greater than {above:g}")
-        if not least <= value <= most:
-            raise self._error(name, f"{name} is {value:g}", f"it must lie in {least:g}..{most:g}")
+        broken = _bound_broken(value, least, most, above)
+        if broken:
+            raise self._error(name, f"{name} is {value:g}", broken)
         return float(value)
 
     def whole(self, name: str, *, default: int, least: int, most: int) -> int:
-        """An integer with least <= value <= most."""
-        value = self.raw(name, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise self._error(
-                name, f"{name} is {reprlib.repr(value)}", f"give a whole number in {least}..{most}"
-            )
-        return value
+        """An integer with least <= value <= most; 3.0 is one, as in JSON Schema."""
+        return whole_number(
+            self.raw(name, default), name, pointer=f"{self.pointer}/{name}", least=least, most=most
+        )
 
     def series(self, name: str) -> Array:
         """A list of finite numbers as a read-only vector."""
@@ -167,6 +201,10 @@ class Fields:
                 )
                 escaped = str(name).replace("~", "~0").replace("/", "~1")  # RFC 6901, section 3
                 raise self._error(escaped, f"{str(name)[:60]} is not a known field", hint)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
 def _finite(value: float) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.frames import axis_rotation
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ DEFAULT_CORE = VortexCore()
 
 
 @dataclass(frozen=True)
-class LatticeSettings:
+class LatticeSettings(WholeNumbers):
     """Panels of every surface, along chord and span, and the core of their vortices."""
 
     chordwise: int = CHORDWISE_PANELS

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.geometry.section import GivenSection, Material, SectionProperties, solid_box
+from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
@@ -43,8 +44,8 @@ class Hinge:
         return np.flatnonzero((angle_rad < low) | (angle_rad > high))
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, repr=False)
+class Surface(Shown):
     """A flat lifting surface: straight mid-chord line along its own y, linear taper.
 
     Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from morphcore.errors import InvalidInput
 from morphcore.evolution import Evolution, EvolutionState, first_evolution
@@ -24,9 +23,10 @@ from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
-from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphcore.steps import Step
-from morphcore.stopping import Stop
+from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
 
@@ -79,6 +79,8 @@ class Identification:
         names = [sample.name for sample in samples]
         if len(set(names)) != len(names):
             raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
+        for number, sample in enumerate(samples):
+            require_flight(sample, f"/samples/{number}")
         if not any(sample.role == "train" for sample in samples):
             raise InvalidInput(
                 "no sample has the role train", pointer="/samples", hint="mark at least one with role train"
@@ -149,24 +151,24 @@ class Identification:
         checkpoint : of an earlier step; None starts anew.
         stop : asked between chunks of well under a second; True raises Interrupted.
         """
-        state = decode(checkpoint) if checkpoint is not None else None
+        state = self._state(checkpoint) if checkpoint is not None else None
         while state is None or state.phase != "done":
             begin = self._clock()
             with one_blas_thread():
-                self._chosen_step(stop)
-                state = self._baseline(stop) if state is None else self._advance(state, stop)
+                state = self._first(stop) if state is None else self._within_time(state, stop)
             state = self._timed(state, self._clock() - begin)
             yield self._step(state)
 
     def result(self, checkpoint: bytes) -> IdentifyResult:
         """The identified model at any step, with its fit, uncertainty and cost."""
+        say("judging what was found")
         with one_blas_thread():
-            return identify_result(self, decode(checkpoint))
+            return identify_result(self, self._state(checkpoint))
 
     def best_so_far(self, checkpoint: bytes) -> IdentifyResult:
         """Give the result without uncertainty and timing, fast: someone waits for a cancelled search."""
         with one_blas_thread():
-            return identify_result(self, decode(checkpoint), judged=False)
+            return identify_result(self, self._state(checkpoint), judged=False)
 
     # a generation asked for and told, so that others may fly it
 
@@ -189,13 +191,42 @@ class Identification:
         ------
         ValueError : there is no such task, or it has another number of points.
         """
-        state = decode(checkpoint)
+        state = self._state(checkpoint)
         if state.phase not in ASKED or cost.shape != self._task(state).points.shape[:1]:
             raise ValueError(f"costs {cost.shape} do not answer the task after {state.phase}")
         with one_blas_thread():
             return self._step(self._timed(self._moved(state, cost), wall_s))
 
+    def _state(self, checkpoint: bytes) -> SearchState:
+        """The state in a checkpoint, whose flights are flown in the steps that it was begun with."""
+        state = decode(checkpoint)
+        self._step_s = state.step_s if self._step_s is None else self._step_s
+        return state
+
     # one step each
+
+    def _first(self, stop: Stop | None) -> SearchState:
+        """Choose the step, in the search's time, and fly what is known, which always is flown."""
+        deadline = Deadline(self.search.max_seconds, stop)
+        try:
+            self._chosen_step(deadline)
+        except Interrupted:
+            if not deadline.passed:
+                raise
+            self._step_s = STEP_S
+        say("flying the first guess")
+        return self._baseline(stop)
+
+    def _within_time(self, state: SearchState, stop: Stop | None) -> SearchState:
+        """The next state; where the time is up before it is reached, the search ends with this one."""
+        budget_s = self.search.max_seconds
+        deadline = Deadline(None if budget_s is None else budget_s - state.wall_s, stop)
+        try:
+            return self._advance(state, deadline)
+        except Interrupted:
+            if not deadline.passed:
+                raise
+            return replace(state, phase="done")
 
     def _baseline(self, stop: Stop | None) -> SearchState:
         """Fly what is known before: from here on there is a best so far."""
@@ -208,6 +239,7 @@ class Identification:
             float(cost[best]),
             flights=cost.size * len(self.training),
             polish=first_polish(self.known, cost) if phase == "polish" else None,
+            step_s=self._step_s,
         )
         return _recorded(state, "baseline", 0)
 
@@ -368,6 +400,8 @@ class Identification:
 
 def _even_normals(count: int, d: int, seed: int) -> Array:
     """(count, d) normal numbers spread more evenly than independent draws: a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # as large as half of the library, and many searches need no screen
+
     draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
     return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])
 

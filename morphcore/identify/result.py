@@ -17,6 +17,7 @@ from morphcore.identify.state import SearchState
 from morphcore.identify.uncertainty import Uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
+from morphcore.shown import Shown, Summary
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -26,8 +27,8 @@ Array = NDArray[np.float64]
 ANGLES = ("phi", "theta", "psi")
 
 
-@dataclass(frozen=True)
-class SampleFit:
+@dataclass(frozen=True, repr=False)
+class SampleFit(Shown):
     """Attitudes (k, 3) flown against one sample by the rigid, the guessed and the identified model, rad."""
 
     case: SampleCase
@@ -85,8 +86,8 @@ class SampleFit:
         }
 
 
-@dataclass(frozen=True)
-class IdentifyResult:
+@dataclass(frozen=True, repr=False)
+class IdentifyResult(Shown):
     """An identified equivalent model (``parameters``, a batch of one) with its proof.
 
     ``settings`` : as asked for; step and corrections that were left to the search are filled in.
@@ -116,6 +117,26 @@ class IdentifyResult:
             "search": self.search,
             "cost": self.cost,
         }
+
+    def summary(self) -> Summary:
+        """How well each sample is met, and by which model."""
+        angles = [f"rms {angle}, mrad" for angle in ANGLES]
+        documents = [fit.to_document() for fit in self.fits]
+        return Summary(
+            f"IdentifyResult: {self.parameters.links} links per wing",
+            {
+                "stiffness, N m/rad": self.parameters.stiffness,
+                "damping, N m s/rad": self.parameters.damping,
+                "division": self.parameters.division,
+                "search": {name: self.search.get(name) for name in ("method", "seed", "flights", "wall_s")},
+            },
+            ("sample", "role", "J rigid, rad^2", "J identified", *angles),
+            [
+                [fit["sample"], fit["role"], fit["J_rigid"], fit["J_identified"]]
+                + [None if fit["rms_rad"][angle] is None else 1e3 * fit["rms_rad"][angle] for angle in ANGLES]
+                for fit in documents
+            ],
+        )
 
     def curves(self) -> dict[str, Any]:
         """Time histories of all samples for plots and tables."""

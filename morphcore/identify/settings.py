@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.evolution import FEWEST, EvolutionSettings
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import BOUND_NAMES
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
@@ -33,7 +33,7 @@ WARM_SCREEN = 32
 
 
 @dataclass(frozen=True)
-class ModelSettings:
+class ModelSettings(WholeNumbers):
     """The model whose parameters are sought.
 
     ``aero_coefficients`` : the corrections to seek; None: those that the flights to fit can tell (see
@@ -51,7 +51,7 @@ class ModelSettings:
 
 
 @dataclass(frozen=True)
-class SearchSettings:
+class SearchSettings(WholeNumbers):
     """How they are sought: ``swarm`` rules "pso", ``evolution`` "cma".
 
     "least_squares" descends from what is known beforehand (the physical guess, ``warm_start``) in up to

@@ -24,7 +24,8 @@ class SearchState:
     """A search between two steps.
 
     phase : what comes next. best : (d,) search point with the least J so far. history : one row per
-    generation. screened : whether candidates away from the physical guess were flown.
+    generation. screened : whether candidates away from the physical guess were flown. step_s : of all
+    flights; one that was chosen when the time was up follows from the inputs no more.
     """
 
     phase: Phase
@@ -38,6 +39,7 @@ class SearchState:
     polish: PolishState | None = field(default=None, repr=False)
     evolution: EvolutionState | None = field(default=None, repr=False)
     screened: bool = False
+    step_s: float | None = None
 
 
 def encode(state: SearchState) -> bytes:

@@ -15,7 +15,7 @@ from typing import Any
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, whole_number
 from morphcore.identify import identification_from_document
 from morphcore.identify.identification import Clock, Identification
 from morphcore.identify.settings import ModelSettings, SearchSettings
@@ -58,10 +58,9 @@ class Study:
         search: SearchSettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
-        self.links = tuple(links)
+        self.links = _different_links(links)
         self.search = search or SearchSettings()
         self._clock = clock
-        _require_links(self.links)
         settings = model or ModelSettings()
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = tuple(
@@ -285,24 +284,21 @@ def _listed(given: Any) -> tuple[int, ...]:
             pointer="/model/links_per_wing",
             hint=f"give the numbers to study, such as {list(LINKS)}",
         )
-    _require_links(given)
-    return tuple(given)
+    return _different_links(given)
 
 
-def _require_links(links: Sequence[Any]) -> None:
-    """All different, whole and in range."""
+def _different_links(links: Sequence[Any]) -> tuple[int, ...]:
+    """Numbers of links, all different, whole and in range."""
     pointer = "/model/links_per_wing"
     if not links:
         raise InvalidInput("no number of links is given", pointer=pointer, hint=f"give {list(LINKS)}")
-    for index, n in enumerate(links):
-        if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_LINKS:
-            raise InvalidInput(
-                f"a number of links is {n!r:.60}",
-                pointer=f"{pointer}/{index}",
-                hint=f"give whole numbers in 1..{MOST_LINKS}",
-            )
-        if n in links[:index]:
+    found: list[int] = []
+    for index, given in enumerate(links):
+        n = whole_number(given, "a number of links", pointer=f"{pointer}/{index}", least=1, most=MOST_LINKS)
+        if n in found:
             raise InvalidInput(f"{n} is listed twice", pointer=f"{pointer}/{index}", hint="drop one")
+        found.append(n)
+    return tuple(found)
 
 
 def _found(row: StudyRow) -> str:

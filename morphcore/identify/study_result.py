@@ -8,12 +8,13 @@ from typing import Any
 from morphcore.identify.study_choice import Recommendation, recommend
 from morphcore.identify.study_row import Document, StudyRow
 from morphcore.identify.study_timing import FLIGHT_S
+from morphcore.shown import Shown, Summary
 
 TIMING_THREADS = 1  # see FlightTiming.round
 
 
-@dataclass(frozen=True)
-class StudyResult:
+@dataclass(frozen=True, repr=False)
+class StudyResult(Shown):
     """Accuracy and cost of the numbers of links studied, in rising order (the paper's Table 1).
 
     recommended : one of them, with the reason. rigid : J over the flights of each role (rad^2) and wall time
@@ -30,6 +31,24 @@ class StudyResult:
     def row(self, links_per_wing: int) -> StudyRow:
         """The row of one number of links."""
         return next(row for row in self.rows if row.links_per_wing == links_per_wing)
+
+    def summary(self) -> Summary:
+        """Accuracy and cost of each number of links, and which to take."""
+        return Summary(
+            f"StudyResult: {len(self.rows)} models, recommended: {self.recommended.links_per_wing} links",
+            {"rigid J, rad^2": self.rigid["J_train"], "rigid J held out": self.rigid["J_held_out"]},
+            ("links", "J train, rad^2", "J held out", "flight, ms"),
+            [
+                [
+                    row.links_per_wing,
+                    row.J_train,
+                    row.J_held_out,
+                    None if row.flight_s is None else 1e3 * row.flight_s,
+                ]
+                for row in self.rows
+            ],
+            [self.recommended.reason],
+        )
 
     def to_document(self) -> dict[str, Any]:
         """JSON form."""

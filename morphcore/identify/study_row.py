@@ -9,6 +9,7 @@ import numpy as np
 
 from morphcore.identify.result import ANGLES, IdentifyResult
 from morphcore.models.parameters_document import parameters_from_document
+from morphcore.shown import Shown
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -18,8 +19,8 @@ Document = dict[str, Any]
 Role = Literal["train", "held_out"]
 
 
-@dataclass(frozen=True)
-class StudyRow:
+@dataclass(frozen=True, repr=False)
+class StudyRow(Shown):
     """One row of a study; its fields have the names of the document.
 
     links_per_wing : 1 is the rigid model with its aerodynamic corrections identified. bodies : rigid bodies

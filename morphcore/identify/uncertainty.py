@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.parameters import SearchSpace
+from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 
@@ -22,8 +23,8 @@ UNSEEN_SPREAD = 1.0
 NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left out of the report
 
 
-@dataclass(frozen=True)
-class Uncertainty:
+@dataclass(frozen=True, repr=False)
+class Uncertainty(Shown):
     """Uncertainty of an identified model (d search coordinates, m named parameters).
 
     names : (d,) search coordinates. covariance : (d, d) in search coordinates. singular_values : (d,) of the

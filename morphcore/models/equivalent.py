@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_MEAN_LAG
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
-from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.mirror import Mirror, mirror_of
 from morphcore.geometry.surface import Surface
@@ -27,6 +27,7 @@ from morphcore.models.kernels.layout import (
 )
 from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
 from morphcore.multibody.kernels.articulated import LINK_ROWS
+from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -36,8 +37,8 @@ NEUTRAL_LIFT_FACTOR = 1.0
 SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
 
 
-@dataclass(frozen=True)
-class ParameterBatch:
+@dataclass(frozen=True, repr=False)
+class ParameterBatch(Shown):
     """Parameters of many equivalent models of one aircraft (p particles, w wing sets, n links).
 
     ``w`` is 1 where all flexible surfaces share their parameters, else the number of flexible surfaces.
@@ -75,8 +76,8 @@ class ParameterBatch:
         return ParameterBatch(**{name: value[index] for name, value in vars(self).items()})
 
 
-@dataclass(frozen=True)
-class ChainModel:
+@dataclass(frozen=True, repr=False)
+class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model: all that its parameter sets share.
 
     surfaces : (s, 6) first link, links, first strip, strips, first overlap pair of each surface, and whether
@@ -154,13 +155,10 @@ def chain_model(
     ------
     InvalidInput : the number of links is out of range.
     """
-    if not 1 <= links_per_wing <= MOST_LINKS:
-        raise InvalidInput(
-            f"links_per_wing is {links_per_wing}",
-            pointer="/model/links_per_wing",
-            hint=f"give a whole number in 1..{MOST_LINKS}",
-        )
-    return _chain_model(aircraft, flight, links_per_wing, lattice)
+    links = whole_number(
+        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", least=1, most=MOST_LINKS
+    )
+    return _chain_model(aircraft, flight, links, lattice)
 
 
 def _chain_model(

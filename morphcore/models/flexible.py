@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from morphcore.aero.kernels.loads import JONES_B1, JONES_B2
 from morphcore.aero.moving_lattice import Riders
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
-from morphcore.errors import InvalidInput
 from morphcore.frames import skew
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
+from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, SurfaceLattice
 from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
@@ -67,12 +67,7 @@ def flexible_model(
     ------
     InvalidInput : the number of elements is out of range.
     """
-    if not 1 <= elements <= MOST_ELEMENTS:
-        raise InvalidInput(
-            f"elements is {elements}",
-            pointer="/model/elements",
-            hint=f"give a whole number in 1..{MOST_ELEMENTS}; 10 hold attitude to 1e-4 rad on the example",
-        )
+    elements = whole_number(elements, "elements", pointer="/model/elements", least=1, most=MOST_ELEMENTS)
     parts = aircraft_lattice(aircraft, lattice)
     ends: list[list[int]] = []
     rest, sections, damping = [], [], []

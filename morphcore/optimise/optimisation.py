@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,16 +34,16 @@ from morphcore.optimise.goals import (
 from morphcore.optimise.limits import MorphSpace
 from morphcore.optimise.progress import Told, best_cost, effort, shown_cost
 from morphcore.optimise.result import ScheduleResult, schedule_result
-from morphcore.optimise.search import SearchRun
+from morphcore.optimise.search import SearchRun, SearchState
 from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
 from morphcore.optimise.state import OptimisationState, Verified, decode, encode
 from morphcore.simulate.flight import flight_steps
-from morphcore.simulate.plan import CommonPath, common_path
+from morphcore.simulate.plan import STEP_S, CommonPath, common_path
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trim import StartMode
 from morphcore.steps import Step
-from morphcore.stopping import Stop
+from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ class ScheduleOptimisation:
         self.morph, self.limits, self.weights = morph, limits or Limits(), weights or Weights()
         self.search, self.verify = search or ScheduleSearch(), verify
         self.flexible = flexible or FlexibleSettings()
-        self.lattice, self.start, self._asked_step_s = lattice, start, step_s
+        self.lattice, self.start, self._step_s = lattice, start, step_s
         self._clock = clock
         if model.particles != 1:
             raise InvalidInput(
@@ -122,17 +123,23 @@ class ScheduleOptimisation:
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
         return common_path(self.chain("rigid")[0], *ends, may_halve=self.parameters.wing_sets == 1)
 
-    @cached_property
+    @property
     def step_s(self) -> float:
-        """The longest step, s, of the rigid and the equivalent model."""
-        if self._asked_step_s is not None:
-            return self._asked_step_s
+        """The longest step, s, of the rigid and the equivalent model: asked for, or chosen."""
+        return self._chosen_step()
+
+    def _chosen_step(self, stop: Stop | None = None) -> float:
+        if self._step_s is None:
+            self._step_s = self._found_step(stop)
+        return self._step_s
+
+    def _found_step(self, stop: Stop | None) -> float:
         constant = self.constant(self.morph.duration_s)
         flight = [constant] * len(self.aircraft.surfaces), busiest_part([constant], self.times_s)
         chains = [self.chain(name) for name in ("rigid", "equivalent")]
         halved = self.parameters.wing_sets == 1
         return min(
-            choose_step(model, [flight], batch, start=self.start, may_halve=halved).step_s
+            choose_step(model, [flight], batch, start=self.start, may_halve=halved, stop=stop).step_s
             for model, batch in chains
         )
 
@@ -198,7 +205,7 @@ class ScheduleOptimisation:
         checkpoint : of an earlier step; None starts anew. The result is the same to the bit, but for times.
         stop : asked several times a second; True raises Interrupted.
         """
-        state = OptimisationState("search") if checkpoint is None else decode(checkpoint)
+        state = OptimisationState("search") if checkpoint is None else self._state(checkpoint)
         while state.phase != "done":
             begin, before = self._clock(), state
             # a step of a search is one state; a flight of the flexible model tells its progress in many
@@ -212,15 +219,48 @@ class ScheduleOptimisation:
 
     def result(self, checkpoint: bytes) -> ScheduleResult:
         """The schedule at any step, flown in the rigid and the equivalent model beside the others."""
+        say("judging what was found")
         with one_blas_thread():
-            return schedule_result(self, decode(checkpoint))
+            return schedule_result(self, self._state(checkpoint))
 
     def best_so_far(self, checkpoint: bytes) -> ScheduleResult:
         """Give the result without torques: someone waits for a cancelled run."""
         with one_blas_thread():
-            return schedule_result(self, decode(checkpoint), judged=False)
+            return schedule_result(self, self._state(checkpoint), judged=False)
+
+    def _state(self, checkpoint: bytes) -> OptimisationState:
+        """The state in a checkpoint, whose flights are flown in the steps that it was begun with."""
+        state = decode(checkpoint)
+        self._step_s = state.step_s if self._step_s is None else self._step_s
+        return state
 
     # one step each
+
+    def _prepared(self, state: OptimisationState, stop: Stop | None) -> OptimisationState:
+        """The state with its step, chosen in the time of the searches, and with the search that comes."""
+        budget_s = self.search.max_seconds
+        deadline = Deadline(None if budget_s is None else budget_s - state.search_s, stop)
+        try:
+            self._chosen_step(deadline)
+        except Interrupted:
+            if not deadline.passed:
+                raise
+            self._step_s = STEP_S
+        say("flying the first schedules")
+        return self._begun(replace(state, step_s=self._step_s))
+
+    def _advanced(
+        self, task: Task, search: SearchState, stop: Stop | None
+    ) -> tuple[SearchState, dict[str, Any]]:
+        """The next state of a search; where its time is up before, and a schedule is known, it ends."""
+        left_s = search.budget_s - search.wall_s if search.feasible and search.budget_s is not None else None
+        deadline = Deadline(left_s, stop)
+        try:
+            return self._run(task).advance(search, deadline)
+        except Interrupted:
+            if not deadline.passed:
+                raise
+            return replace(search, phase="done"), {"phase": search.phase, "particles": 0}
 
     def _searched(
         self, state: OptimisationState, stop: Stop | None
@@ -228,12 +268,11 @@ class ScheduleOptimisation:
         """One step of the search that runs, with what follows when it is over."""
         with one_blas_thread():
             if state.task is None:
-                state = self._begun(state)
+                state = self._prepared(state, stop)
             task, search = state.task, state.search
             assert task is not None and search is not None  # noqa: S101, PT018 - the phase says so
             begin = self._clock()
-            run = self._run(task)
-            moved, row = run.advance(search, stop)
+            moved, row = self._advanced(task, search, stop)
             moved = replace(moved, wall_s=search.wall_s + self._clock() - begin)
             if moved.feasible and moved.budget_s is not None and moved.wall_s >= moved.budget_s:
                 moved = replace(moved, phase="done")

@@ -14,6 +14,7 @@ from morphcore.optimise.flights import Flown
 from morphcore.optimise.goals import Found
 from morphcore.optimise.settings import Limits, Morph, Weights
 from morphcore.optimise.state import OptimisationState
+from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ MODELS = ("rigid", "equivalent", "flexible")
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
 
 
-@dataclass(frozen=True)
-class ComparedFlight:
+@dataclass(frozen=True, repr=False)
+class ComparedFlight(Shown):
     """One schedule flown in one model.
 
     departure : (k, 3) of phi, theta, psi from the start, rad. variation : its sum of squares, rad^2; None if
@@ -40,8 +41,8 @@ class ComparedFlight:
     torque: float | None
 
 
-@dataclass(frozen=True)
-class FrontPoint:
+@dataclass(frozen=True, repr=False)
+class FrontPoint(Shown):
     """One duration, s: its best schedule and variation, beside the constant rate's (rad^2).
 
     ``beaten`` : a shorter morph varies no more. ``constant`` : None where it was not flown, or diverged.
@@ -54,8 +55,8 @@ class FrontPoint:
     beaten: bool
 
 
-@dataclass(frozen=True)
-class ScheduleResult:
+@dataclass(frozen=True, repr=False)
+class ScheduleResult(Shown):
     """An optimised morph with its comparison.
 
     schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
@@ -97,6 +98,18 @@ class ScheduleResult:
             if constant and other is not None:
                 return 100.0 * (1.0 - other / constant), model
         return None, "equivalent"
+
+    def summary(self) -> Summary:
+        """The schedule, and what it gains over the others."""
+        reduction, model = self.reduction()
+        gain = "" if reduction is None else f", {reduction:.1f} % below constant rate ({model} model)"
+        return Summary(
+            f"ScheduleResult: {self.best.duration_s:g} s{gain}",
+            {"knot times, s": self.schedule.knot_time_s, "knot angles, rad": self.schedule.knot_angle_rad},
+            ("variation, rad^2", *MODELS),
+            [[name, *(self.variation(name, model) for model in MODELS)] for name in SCHEDULES],
+            self.notes,
+        )
 
     def to_document(self) -> Document:
         """JSON form with the names that the API fixes, and more beside."""

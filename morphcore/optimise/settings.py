@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import LatticeSettings, lattice_settings
 from morphcore.swarm import SwarmSettings
 
@@ -35,7 +35,7 @@ DEFAULT_FRONT_POINTS = 7
 
 
 @dataclass(frozen=True)
-class Morph:
+class Morph(WholeNumbers):
     """The change of shape that is wanted; all hinges follow one schedule.
 
     initial_rad, final_rad : angles before and after it. duration_s : its time; of the goals "minimum_time"
@@ -91,7 +91,7 @@ class Weights:
 
 
 @dataclass(frozen=True)
-class ScheduleSearch:
+class ScheduleSearch(WholeNumbers):
     """How the schedule is sought.
 
     "hybrid" descends from ``starts`` of ``screen`` schedules by constrained Gauss-Newton steps,
@@ -108,7 +108,7 @@ class ScheduleSearch:
 
 
 @dataclass(frozen=True)
-class FlexibleSettings:
+class FlexibleSettings(WholeNumbers):
     """The flexible model that verifies.
 
     elements : of each surface. lattice : None for the equivalent model's.

@@ -40,7 +40,7 @@ class OptimisationState:
 
     phase : what comes next. task, search : the search that runs. found : those that are done. verified :
     flights of the flexible model that are done. history : one row for each step of a search. search_s : wall
-    time of the searches, s; wall_s : of everything.
+    time of the searches, s; wall_s : of everything. step_s : of the flights, once it is chosen.
     """
 
     phase: Phase
@@ -53,6 +53,7 @@ class OptimisationState:
     search_s: float = 0.0
     wall_s: float = 0.0
     history: tuple[dict[str, Any], ...] = field(default=(), repr=False)
+    step_s: float | None = None
 
 
 def encode(state: OptimisationState) -> bytes:

@@ -17,6 +17,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
+from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
@@ -28,17 +29,17 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
 from samplefiles.csv_table import write_table
+from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Schedules = Sequence[Schedule] | Mapping[str, Schedule] | Trajectory
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 
 OUTPUT_STEP_S = 0.01  # as the example flights
-LARGEST_ROWS = 200_000  # of a trajectory
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """A flown flight.
 
     trajectory : attitude and sweep (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
@@ -52,6 +53,23 @@ class Simulation:
     trajectory: Trajectory
     trim: Trim
     step_s: float
+
+    def summary(self) -> Summary:
+        """How the flight began, and how far the attitude went."""
+        flown = self.trajectory
+        return Summary(
+            f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
+            {"angle of attack at the start, rad": self.trim.alpha},
+            ("", "from", "to"),
+            [
+                [f"{name}, rad", values.min(), values.max()]
+                for name, values in (
+                    ("sweep left", flown.sweep_left),
+                    ("sweep right", flown.sweep_right),
+                    *zip(("phi", "theta", "psi"), flown.euler.T, strict=True),
+                )
+            ],
+        )
 
 
 @dataclass(frozen=True)
@@ -248,12 +266,18 @@ def _output_times(
     for name, value in (("duration_s", duration_s), ("output_step_s", output_step_s), ("step_s", step_s)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidInput(f"{name} is {value}", pointer=f"/{name}", hint="give a positive time in s")
+    if duration_s > LONGEST_FLIGHT_S:
+        raise InvalidInput(
+            f"duration_s is {duration_s:g}",
+            pointer="/duration_s",
+            hint=f"it must be at most {LONGEST_FLIGHT_S:g}",
+        )
     rows = int(np.floor(min(duration_s / output_step_s, 1e9) + 1e-9)) + 1
-    if not 3 <= rows <= LARGEST_ROWS:
+    if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise InvalidInput(
             f"{duration_s:g} s in steps of {output_step_s:g} s make {rows} rows",
             pointer="/output_step_s",
-            hint=f"choose duration_s and output_step_s for 3 to {LARGEST_ROWS} rows",
+            hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
         )
     return begin + output_step_s * np.arange(rows, dtype=np.float64)
 

@@ -15,6 +15,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.shown import Shown
 from morphcore.simulate.kernels.interpolate import blend
 from morphcore.simulate.schedule import HingeMotion, Schedule
 
@@ -74,8 +75,8 @@ def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
     return TimeGrid(float(times[0]), float(times[-1] - times[0]) / steps, steps, None)
 
 
-@dataclass(frozen=True)
-class OperatorTable:
+@dataclass(frozen=True, repr=False)
+class OperatorTable(Shown):
     """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
 
     matrices : (nodes, rows, columns); strips : (nodes, strips, 3); position : (steps + 1,) of each grid time
@@ -102,8 +103,8 @@ class OperatorTable:
         return _blended(self.matrices, weights, base), _blended(self.strips, weights, base)
 
 
-@dataclass(frozen=True)
-class Middles:
+@dataclass(frozen=True, repr=False)
+class Middles(Shown):
     """What the stages of a flight read, in the middles of its steps.
 
     hinges : (steps, s, HINGE_ROWS) for the kernels. wind_N : (steps, 3) m/s. table : the plan's own, at the
@@ -115,8 +116,8 @@ class Middles:
     table: OperatorTable
 
 
-@dataclass(frozen=True)
-class FlightPlan:
+@dataclass(frozen=True, repr=False)
+class FlightPlan(Shown):
     """Everything about a flight that does not depend on the parameters.
 
     angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)

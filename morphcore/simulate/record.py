@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.simulate.trajectory import Trajectory, checked
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import Trim
 
 Array = NDArray[np.float64]
@@ -78,4 +78,6 @@ def recorded_trajectory(aircraft: Aircraft, times: Array, record: FlightRecord) 
         psi=psi,
         extra=extra,
     )
-    return checked(trajectory, "/flight")
+    for column in (times, phi, theta, psi, *sweeps.values()):
+        column.setflags(write=False)
+    return trajectory

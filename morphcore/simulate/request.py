@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
+from morphcore.shown import Shown
 from morphcore.simulate.flight import OUTPUT_STEP_S, Simulation, flight_steps
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.schedule_document import SIDES, require_hinge_ranges, schedules_from_document
@@ -29,7 +30,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
-from samplefiles.columns import MOST_ROWS
+from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -38,7 +39,6 @@ Clock = Callable[[], float]
 
 KINDS: tuple[Kind, ...] = ("rigid", "equivalent", "flexible")
 ANGLES = ("phi", "theta", "psi")
-LONGEST_FLIGHT_S = 3600.0
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 0.02
 MOST_ELEMENTS = 100
 LARGEST_SEED = 2**53 - 1
@@ -53,7 +53,7 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class FlownModel:
+class FlownModel(WholeNumbers):
     """What flies.
 
     parameters : of the equivalent model, a batch of one. elements : of each surface, in the flexible model.
@@ -94,8 +94,8 @@ class SimulationStep:
     message: str
 
 
-@dataclass(frozen=True)
-class SimulationResult:
+@dataclass(frozen=True, repr=False)
+class SimulationResult(Shown):
     """A flown flight and what it cost: wall time of trim, preparation and flight together, s."""
 
     model: FlownModel
@@ -132,7 +132,7 @@ class SimulationResult:
 
 
 @dataclass
-class SimulationRun:
+class SimulationRun(WholeNumbers):
     """One flight, ready to be flown.
 
     schedules : of each side. seed : of the turbulence.
@@ -204,11 +204,11 @@ def simulation_from_document(document: Document, threads: int | None = None) -> 
     fields.raw("execution", None)  # how a service runs it: no number depends on that
     fields.done()
     rows = duration_s / output_step_s + 1
-    if not 3 <= rows <= MOST_ROWS:
+    if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise InvalidInput(
             f"{duration_s:g} s in steps of {output_step_s:g} s make {rows:.0f} rows",
             pointer="/output_step_s",
-            hint=f"choose duration_s and output_step_s for 3 to {MOST_ROWS} rows",
+            hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
         )
     if model.start == "given" and flight.start is None:
         raise InvalidInput(

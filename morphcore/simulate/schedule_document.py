@@ -13,13 +13,13 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.surface import Side
 from morphcore.simulate.schedule import ConstantRate, Hold, Quadratic, Schedule, Spline, Tabulated
-from morphcore.simulate.schedule_table import LEAST_ROWS, MOST_ROWS
+from morphcore.simulate.schedule_table import LEAST_ROWS
+from samplefiles.flight import LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 
 SIDES: tuple[Side, ...] = ("left", "right")
 LARGEST_ANGLE_RAD = 2.0 * np.pi  # degrees taken for radians are beyond it; hinges have ranges of their own
-LONGEST_S = 3600.0
 LARGEST_RATE_RAD_S = 100.0
 DEFAULT_RAMP_S = 0.1
 FEWEST_KNOTS, MOST_KNOTS = 2, 1000
@@ -115,9 +115,9 @@ def _hold(fields: Fields) -> Schedule:
 
 def _constant_rate(fields: Fields) -> Schedule:
     initial, final = _angle(fields, "initial_rad", default=0.0), _angle(fields, "final_rad")
-    start_s = fields.number("start_s", default=0.0, least=0.0, most=LONGEST_S)
+    start_s = fields.number("start_s", default=0.0, least=0.0, most=LONGEST_FLIGHT_S)
     duration_s = _duration(fields, abs(final - initial))
-    ramp_s = fields.number("ramp_s", default=DEFAULT_RAMP_S, least=0.0, most=LONGEST_S)
+    ramp_s = fields.number("ramp_s", default=DEFAULT_RAMP_S, least=0.0, most=LONGEST_FLIGHT_S)
     if ramp_s > duration_s / 2:
         raise InvalidInput(
             f"two ramps of {ramp_s:g} s do not fit into {duration_s:g} s",
@@ -129,7 +129,7 @@ def _constant_rate(fields: Fields) -> Schedule:
 
 def _duration(fields: Fields, change_rad: float) -> float:
     """Duration of a morph at constant rate, s: given, or out of the mean rate."""
-    duration_s = fields.optional_number("duration_s", above=0.0, most=LONGEST_S)
+    duration_s = fields.optional_number("duration_s", above=0.0, most=LONGEST_FLIGHT_S)
     rate = fields.optional_number("rate_rad_s", above=0.0, most=LARGEST_RATE_RAD_S)
     if duration_s is not None and rate is None:
         return duration_s
@@ -139,11 +139,11 @@ def _duration(fields: Fields, change_rad: float) -> float:
             pointer=f"{fields.pointer}/{'rate_rad_s' if rate else 'duration_s'}",
             hint="give one of them",
         )
-    if not 0.0 < change_rad / rate <= LONGEST_S:
+    if not 0.0 < change_rad / rate <= LONGEST_FLIGHT_S:
         raise InvalidInput(
             f"at {rate:g} rad/s the morph of {change_rad:g} rad takes {change_rad / rate:g} s",
             pointer=f"{fields.pointer}/rate_rad_s",
-            hint=f"it must take more than 0 and at most {LONGEST_S:g} s; the kind hold does not move",
+            hint=f"it must take more than 0 and at most {LONGEST_FLIGHT_S:g} s; the kind hold does not move",
         )
     return change_rad / rate
 
@@ -152,8 +152,8 @@ def _quadratic(fields: Fields) -> Schedule:
     return Quadratic(
         initial_rad=_angle(fields, "initial_rad", default=0.0),
         final_rad=_angle(fields, "final_rad"),
-        duration_s=fields.number("duration_s", above=0.0, most=LONGEST_S),
-        start_s=fields.number("start_s", default=0.0, least=0.0, most=LONGEST_S),
+        duration_s=fields.number("duration_s", above=0.0, most=LONGEST_FLIGHT_S),
+        start_s=fields.number("start_s", default=0.0, least=0.0, most=LONGEST_FLIGHT_S),
     )
 
 

@@ -12,12 +12,12 @@ from morphcore.errors import InvalidInput
 from morphcore.simulate.file_columns import read_file_columns
 from morphcore.simulate.schedule import Schedule, Tabulated
 from samplefiles.csv_table import write_table
+from samplefiles.flight import MOST_ROWS
 
 Array = NDArray[np.float64]
 
 SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
 LEAST_ROWS = 3  # fewer do not tell how the hinge moves between them
-MOST_ROWS = 200_000
 
 
 def load_schedule_csv(path: str | Path) -> dict[str, Tabulated]:

@@ -15,7 +15,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
-from morphcore.stopping import Stop, heed
+from morphcore.stopping import Stop, heed, say
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,8 @@ def choose_step(
     error = np.inf
     for step_s in candidates_s:
         error = 0.0
-        for flight in tried:
+        for number, flight in enumerate(tried, start=1):
+            say(f"choosing the time step: {1e3 * step_s:g} ms, flight {number} of {len(tried)}")
             error = max(error, flight.error(step_s))
             if not error <= tolerance_rad:
                 break  # one flight that asks for less is enough

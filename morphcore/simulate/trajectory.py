@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
+from morphcore.shown import Shown
 from morphcore.simulate.file_columns import read_file_columns
-from samplefiles.columns import MOST_ROWS
+from samplefiles.flight import INLINE, flight_faults, from_first_row
 from samplefiles.titles import FLIGHT
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Shown):
     """One flight: ``time_s`` (k,) rising; hinge and Euler angles (k,) in rad; other columns in ``extra``."""
 
     name: str
@@ -52,25 +53,27 @@ class Trajectory:
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     """Read a CSV, JSON, Parquet or MATLAB file with the columns t, sweep_left, sweep_right, phi, theta, psi.
 
-    The ending of its name tells the kind. Units in the names are accepted (``t_ms``, ``theta_deg``); other
-    columns of numbers land in ``extra`` as they are. In JSON the columns are lists of one object, in MATLAB
-    vectors or the fields of one struct; Parquet needs pyarrow.
+    The ending of its name tells the kind. Units in the names are accepted (``t_ms``, ``theta [deg]``); other
+    columns of numbers land in ``extra`` as they are. Time that counts from an epoch, and dates, count from
+    the first row. In JSON the columns are lists of one object, in MATLAB vectors or the fields of one struct;
+    Parquet needs pyarrow.
 
     Raises
     ------
     InvalidInput : the file cannot be read, a column is missing or holds something that is not a finite
-        number, or time does not rise.
+        number, time does not rise, the flight is longer than 600 s, or an angle is no angle in rad.
     """
     columns = read_file_columns(path, FLIGHT)
-    return checked(
-        Trajectory(
-            name=columns.path.stem,
-            time_s=columns.values["t"],
-            **{name: columns.values[name] for name in FLIGHT if name != "t"},  # type: ignore[arg-type]
-            role=role,
-            extra=columns.others,
-        ),
-        pointer=f"/{columns.path.name}",
+    fault = next(flight_faults({name: values.tolist() for name, values in columns.values.items()}), None)
+    if fault is not None:
+        place = columns.path if fault.row is None else columns.place(fault.row)
+        raise InvalidInput(f"{place}: {fault.detail}", hint=fault.hint)
+    return Trajectory(
+        name=columns.path.stem,
+        time_s=columns.values["t"],
+        **{name: columns.values[name] for name in FLIGHT if name != "t"},  # type: ignore[arg-type]
+        role=role,
+        extra=columns.others,
     )
 
 
@@ -80,7 +83,7 @@ def trajectory_from_document(document: dict[str, Any], pointer: str) -> Trajecto
     role = fields.choice("role", ("train", "held_out")) if fields.has("role") else "train"
     trajectory = Trajectory(
         name=fields.text("name"),
-        time_s=fields.series("time_s"),
+        time_s=_counted(fields.series("time_s")),
         sweep_left=fields.series("sweep_left_rad"),
         sweep_right=fields.series("sweep_right_rad"),
         phi=fields.series("phi_rad"),
@@ -90,38 +93,20 @@ def trajectory_from_document(document: dict[str, Any], pointer: str) -> Trajecto
         weight=fields.number("weight", default=1.0, least=0.0, most=1e6),
     )
     fields.done()
-    return checked(trajectory, pointer)
-
-
-def checked(trajectory: Trajectory, pointer: str) -> Trajectory:
-    """The trajectory, if it makes sense; else InvalidInput."""
-    rows = trajectory.time_s.size
-    if not 3 <= rows <= MOST_ROWS:
-        raise InvalidInput(f"{rows} rows", pointer=f"{pointer}/time_s", hint=f"give 3 to {MOST_ROWS} rows")
-    for name in ("sweep_left", "sweep_right", "phi", "theta", "psi"):
-        column = getattr(trajectory, name)
-        if column.size != rows:
-            raise InvalidInput(
-                f"{name} has {column.size} rows, time has {rows}",
-                pointer=f"{pointer}/{name}_rad",
-                hint="give equal lengths",
-            )
-    for name in ("time_s", "sweep_left", "sweep_right", "phi", "theta", "psi"):
-        bad = np.flatnonzero(~np.isfinite(getattr(trajectory, name)))
-        if bad.size:
-            raise InvalidInput(
-                f"{name} is not finite at row {bad[0]}",
-                pointer=f"{pointer}/{name}/{bad[0]}",
-                hint="remove or repair the row",
-            )
-    falls = np.flatnonzero(np.diff(trajectory.time_s) <= 0)
-    if falls.size:
-        raise InvalidInput(
-            f"time does not rise at row {falls[0] + 1}",
-            pointer=f"{pointer}/time_s/{falls[0] + 1}",
-            hint="sort the rows by time and drop doubles",
-        )
-    for value in vars(trajectory).values():
-        if isinstance(value, np.ndarray):
-            value.setflags(write=False)
+    require_flight(trajectory, pointer)
     return trajectory
+
+
+def require_flight(trajectory: Trajectory, pointer: str) -> None:
+    """Raise InvalidInput where a sample makes no sense, by the rules of `samplefiles.flight`."""
+    columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in FLIGHT if name != "t"}}
+    for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, INLINE):
+        row = "" if fault.row is None else f"/{fault.row}"
+        raise InvalidInput(fault.detail, pointer=f"{pointer}/{INLINE[fault.title]}{row}", hint=fault.hint)
+
+
+def _counted(time_s: Array) -> Array:
+    """Times that count from an epoch, from the first row; others as they are."""
+    counted: Array = np.array(from_first_row(time_s.tolist()))
+    counted.setflags(write=False)
+    return counted

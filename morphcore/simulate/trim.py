@@ -20,6 +20,7 @@ from morphcore.models.equivalent import (
 )
 from morphcore.models.kernels.layout import FORCE_C, JOINTS, OMEGA
 from morphcore.models.kinematics import link_poses
+from morphcore.shown import Shown
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.plan import FlightPlan
 
@@ -35,8 +36,8 @@ LARGEST_STEP = 0.2  # rad in one Newton step: further, the linear model means no
 SLAB = 256  # particles at a time; bounds the memory of the Jacobian's probes
 
 
-@dataclass(frozen=True)
-class Trim:
+@dataclass(frozen=True, repr=False)
+class Trim(Shown):
     """A start of flight for each parameter set p.
 
     alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
+from samplefiles.fault import Pickled
+
 Document = dict[str, Any]
 Stop = Callable[[], bool]
 
@@ -21,7 +23,7 @@ class WorkInterrupted(Exception):
     """The work saw its stop signal and ended between two chunks; the last step's checkpoint holds."""
 
 
-class WorkRefused(Exception):
+class WorkRefused(Pickled, Exception):
     """The work cannot be done as requested; carries what the user is told.
 
     Parameters
@@ -129,7 +131,7 @@ OPERATIONS: Mapping[str, str] = {
 }
 
 
-class UnknownOperation(LookupError):
+class UnknownOperation(Pickled, LookupError):
     """This worker does not know the operation of a job; a newer one may."""
 
     def __init__(self, name: str) -> None:
