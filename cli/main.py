@@ -7,7 +7,10 @@ a port, a program or a writable directory; 130 Ctrl-C.
 
 from __future__ import annotations
 
+from typing import Any
+
 import typer
+from typer.core import TyperGroup
 
 from cli.commands.audit import audit
 from cli.commands.bench import bench
@@ -22,9 +25,24 @@ from cli.commands.paper import paper
 from cli.commands.serve import serve
 from cli.commands.simulate import simulate
 from cli.commands.study import study
+from cli.streams import flush_streams, prepare_streams
+
+
+class Morphid(TyperGroup):
+    """All commands, on outputs that take every character and whose readers may leave."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run a command line."""
+        prepare_streams()
+        try:
+            return super().main(*arguments, **options)
+        finally:
+            flush_streams()
+
 
 app = typer.Typer(
     name="morphid",
+    cls=Morphid,
     help="Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.",
     epilog=EXIT_CODES,
     no_args_is_help=True,

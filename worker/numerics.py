@@ -24,7 +24,7 @@ def usable_cores() -> int:
     """Count the cores this process may use: affinity, and the container's quota rounded up."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
-        quota, period = CGROUP_CPU_LIMIT.read_text().split()
+        quota, period = CGROUP_CPU_LIMIT.read_text("ascii").split()
         if quota != "max":
             cores = min(cores, -(-int(quota) // int(period)))
     except (OSError, ValueError):

@@ -115,7 +115,7 @@ def test_a_compiler_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_more_workers_than_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Jobs that would fight for cores and memory are told of."""
-    assert states(machine.cores())["cores"] is State.OK
+    assert states(machine.cores(1))["cores"] is State.OK
     monkeypatch.setenv("MORPHID_WORKERS", "1000")
     assert states(machine.cores()) == {"cores": State.WARN, "memory": State.WARN}
 
