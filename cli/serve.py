@@ -18,6 +18,7 @@ from cli.exits import CommandError, Exit
 from cli.migrate import upgrade_to
 from cli.screen import print_json_line, stdout
 from cli.supervisor import Child, ChildSpec, Supervisor
+from worker.numerics import ensure_cache
 
 if TYPE_CHECKING:
     from app.settings import Settings
@@ -55,6 +56,7 @@ def serve(settings: Settings, *, json_events: bool) -> None:
     CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
     """
     announcer = Announcer(json_events=json_events)
+    ensure_cache()  # here, where its warning is seen; the workers inherit the folder
     data_dir = settings.data_dir
     with _own_data_dir(data_dir):
         port = _api_port(settings.host, settings.port)

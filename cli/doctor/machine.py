@@ -9,12 +9,12 @@ import resource
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
 from cli.doctor.findings import Finding, fail, ok, warn
+from worker.numerics import share_cores, takes_files, usable_cores
 
 LEAST_PYTHON = (3, 11)
 EXTRAS = ("server", "telemetry")  # of the installation; what only developers need is not examined
@@ -118,7 +118,7 @@ def compiler() -> Iterator[Finding]:
     told = json.loads(done.stdout.splitlines()[-1])
     yield ok("compiler", f"numba {told['numba']} compiles")
     cache = Path(told["cache"]) if told["cache"] else None
-    if cache is None or not _takes_files(cache):
+    if cache is None or not takes_files(cache):
         yield warn(
             "kernel cache",
             f"compiled kernels cannot be kept in {cache}: each start of a worker compiles for minutes",
@@ -128,24 +128,8 @@ def compiler() -> Iterator[Finding]:
         yield ok("kernel cache", f"compiled kernels are kept in {cache}")
 
 
-def _takes_files(folder: Path) -> bool:
-    """Whether a file can really be made there: permission bits do not tell of read-only and full disks.
-
-    Of a folder that is not there yet the nearest one above it is asked.
-    """
-    there = next(each for each in (folder, *folder.parents) if each.exists())
-    try:
-        with tempfile.TemporaryFile(dir=there) as file:
-            file.write(b"x" * 4096)
-    except OSError:
-        return False
-    return True
-
-
 def cores(workers: int) -> Iterator[Finding]:
     """Do the workers have a core each, and memory."""
-    from worker.numerics import share_cores, usable_cores
-
     here, usable = os.cpu_count() or 1, usable_cores()
     limited = "" if usable == here else f" (of {here}; affinity or a container's quota keeps the others away)"
     shared = f"{workers} x {share_cores(workers)} threads on {usable} cores{limited}"
@@ -192,7 +176,7 @@ def files() -> Iterator[Finding]:
 def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
     """Can the data directory be written, and is there room."""
     folder = home.expanduser().resolve()
-    if not _takes_files(folder):
+    if not takes_files(folder):
         yield fail(
             "data directory",
             f"{folder} cannot be written",

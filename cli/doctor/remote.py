@@ -32,13 +32,19 @@ def served_version(client: httpx.Client) -> str | None:
 
 def service(url: str, api_key: str | None) -> Iterator[Finding]:
     """Does it live, is it ready, do our key and our clock fit."""
+    import httpx
+
     try:
         client = client_for(url, timeout=TIMEOUT_S)
     except CommandError as error:
         yield fail("service", error.message, error.hint)
         return
     with client:
-        yield from _service(client, url, api_key)
+        try:
+            yield from _service(client, url, api_key)
+        except httpx.HTTPError as error:
+            remedy = "start it with `morphid serve`, or correct --url"
+            yield fail("service", f"{url} does not answer: {type(error).__name__} {error}", remedy)
 
 
 def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Finding]:
@@ -47,13 +53,7 @@ def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Fi
     from app.version import VERSION
 
     began = time.monotonic()
-    try:
-        alive = client.get("/livez")
-    except httpx.HTTPError as error:
-        yield fail(
-            "service", f"{url} does not answer: {error}", "start it with `morphid serve`, or correct --url"
-        )
-        return
+    alive = client.get("/livez")
     took_s = time.monotonic() - began
     version = served_version(client)
     if version is None:
