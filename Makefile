@@ -17,7 +17,7 @@ SIDE_BY_SIDE = $(MAKE) --no-print-directory --keep-going --jobs=2 $(if $(filter 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-slow faults faults-postgres faults-others conformance bench check openapi format clean
+.PHONY: help setup demo serve test test-api test-library test-slow faults faults-postgres faults-others conformance bench check openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -96,6 +96,14 @@ check: setup  ## formatting, lint, types, import contracts, OpenAPI document, mi
 
 openapi: setup  ## write docs/openapi.json from the code
 	@$(BIN)/python -m app.openapi
+
+locked: setup  ## write requirements-server.txt: the service's packages of constraints.txt with their hashes
+	@{ echo "# Every package of the service with its hashes, for \`pip install --require-hashes -r\`: what the image is made of."; \
+		echo "# Made from pyproject.toml and constraints.txt by \`make locked\`."; \
+		echo setuptools | $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra server \
+			-c constraints.txt --generate-hashes --no-header --no-annotate --no-emit-index-url \
+			--no-emit-find-links pyproject.toml -; } > requirements-server.txt.new
+	@mv requirements-server.txt.new requirements-server.txt
 
 format: setup  ## let ruff format and repair
 	@$(BIN)/ruff check --fix-only -q . ; $(BIN)/ruff format .

@@ -14,6 +14,7 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
 
+from app.database_address import normal_url
 from app.database_errors import DatabaseTrouble, trouble_of
 from app.private_files import close_to_others, make_private_folder, touch_private
 from app.reserve import Reserve
@@ -74,14 +75,6 @@ def insert_new(session: Session, table: Table) -> Any:
     from sqlalchemy.dialects import postgresql  # lazy: slow to import, and not needed with SQLite
 
     return postgresql.insert(table)
-
-
-def normal_url(url: str) -> str:
-    """Name the driver that is installed: ``postgres://`` and ``postgresql://`` mean psycopg 3."""
-    for prefix in ("postgres://", "postgresql://"):
-        if url.startswith(prefix):
-            return "postgresql+psycopg://" + url.removeprefix(prefix)
-    return url
 
 
 def make_engine(url: str) -> Engine:
@@ -213,7 +206,8 @@ def migration_config(url: str) -> Any:
     import migrations
 
     config = Config()
-    config.set_main_option("script_location", str(Path(migrations.__file__).parent))
+    folder = str(Path(migrations.__file__).parent)
+    config.set_main_option("script_location", folder.replace("%", "%%"))  # else taken for an interpolation
     config.attributes["url"] = url
     return config
 

@@ -1,8 +1,14 @@
-"""Settings of the service, read from ``MORPHID_*`` environment variables, refusing unsafe combinations."""
+"""Settings of the service: options, then ``MORPHID_*`` variables, then defaults; unsafe ones are refused.
+
+Every process and every command reads them here, so that an option, a variable or a default means the same in
+all of them.
+"""
 
 from __future__ import annotations
 
-import ipaddress
+import os
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal, Self
 from urllib.parse import unquote, urlsplit
@@ -10,7 +16,13 @@ from urllib.parse import unquote, urlsplit
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-LOOPBACK_NAMES = frozenset({"localhost", "ip6-localhost"})
+from app.database_address import UnusableAddress, require_usable, sqlite_url
+from app.loopback import is_loopback
+
+PREFIX = "MORPHID_"
+# variables that others read: the command line (where the service is), the examples, a worker's children
+NO_SETTINGS = frozenset({"url", "api_key", "search", "stop_file"})
+CLOSE = 0.75  # likeness of a name to a setting's that calls for a question
 # what examples, images and tutorials come with, and what is tried first
 DEFAULT_PASSWORDS = frozenset(
     {"morphid", "postgres", "password", "passwort", "changeme", "secret", "admin", "root", "test"}
@@ -21,21 +33,15 @@ class UnsafeSettings(ValueError):
     """The settings contradict one another or would expose the service; the message says what to change."""
 
 
-def is_loopback(host: str) -> bool:
-    """Tell whether `host` (a name or an address, with or without brackets) reaches this machine only."""
-    bare = host.strip("[]").lower()
-    if bare in LOOPBACK_NAMES:
-        return True
-    try:
-        return ipaddress.ip_address(bare).is_loopback
-    except ValueError:
-        return False
-
-
 class Settings(BaseSettings):
     """Everything that an operator may set; defaults serve one user on one machine."""
 
-    model_config = SettingsConfigDict(env_prefix="MORPHID_", extra="forbid", frozen=True)
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX,
+        env_ignore_empty=True,  # `VARIABLE=` in a shell or a compose file means: not set
+        extra="forbid",
+        frozen=True,
+    )
 
     data_dir: Path = Field(default=Path("var"), description="Folder of the SQLite file and local state.")
     database_url: str = Field(
@@ -47,6 +53,9 @@ class Settings(BaseSettings):
     )
     host: str = Field(default="127.0.0.1", description="Address the API listens on.")
     port: int = Field(default=8000, ge=0, le=65535)
+    workers: int = Field(
+        default=1, ge=1, le=1024, description="Jobs that run at once; they share the cores of a machine."
+    )
     auth: Literal["auto", "keys", "off"] = Field(
         default="auto",
         description="`keys`: every request needs an API key; `off`: none; `auto`: beyond this machine.",
@@ -103,6 +112,12 @@ class Settings(BaseSettings):
     republish_after_s: float = Field(
         default=15.0, gt=0.0, description="A queued job not claimed for this long gets a new wake-up message."
     )
+    reap_every_s: float = Field(
+        default=10.0,  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
+        gt=0.0,
+        le=3600.0,
+        description="How often it is looked for jobs whose worker is gone.",
+    )
     job_max_attempts: int = Field(default=3, ge=1, le=100)
     job_max_seconds: float = Field(
         default=6 * 3600.0, gt=0.0, description="Deadline of a job without its own."
@@ -145,9 +160,13 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _fill_and_refuse(self) -> Self:
+        object.__setattr__(self, "data_dir", _found_from_everywhere(self.data_dir))
         if not self.database_url:
-            url = f"sqlite:///{self.data_dir.expanduser().resolve() / 'morphid.sqlite3'}"
-            object.__setattr__(self, "database_url", url)
+            object.__setattr__(self, "database_url", sqlite_url(self.data_dir / "morphid.sqlite3"))
+        try:
+            require_usable(self.database_url)
+        except UnusableAddress as error:
+            raise UnsafeSettings(f"MORPHID_DATABASE_URL: {error}") from None
         if self.auth == "off" and not self.allow_open and not is_loopback(self.host):
             raise UnsafeSettings(
                 f"host {self.host} is reachable from other machines and MORPHID_AUTH=off demands no keys. "
@@ -193,6 +212,11 @@ class Settings(BaseSettings):
         return self.auth == "keys"
 
     @property
+    def names_broker(self) -> bool:
+        """Whether the operator said where the broker is; `morphid serve` brings one otherwise."""
+        return "broker_url" in self.model_fields_set
+
+    @property
     def host_names(self) -> frozenset[str]:
         """Names that the operator allows in the Host header."""
         return _listed(self.allowed_hosts)
@@ -214,8 +238,32 @@ def _listed(text: str) -> frozenset[str]:
     return frozenset(name for name in names if name)
 
 
+def _found_from_everywhere(folder: Path) -> Path:
+    """Give a folder in full: ``~`` is the home folder, and ``~name`` a folder where nobody has that name."""
+    try:
+        return folder.expanduser().resolve()
+    except RuntimeError:
+        if folder.parts[0] != "~":
+            return folder.resolve()
+        raise UnsafeSettings(
+            f"MORPHID_DATA_DIR: the home folder of {folder} is not known. Write the path in full."
+        ) from None
+
+
+def doubtful_variables(environment: Mapping[str, str] = os.environ) -> Iterator[str]:
+    """Give a sentence for each ``MORPHID_...`` variable that is no setting but is nearly called like one."""
+    known = Settings.model_fields.keys() | NO_SETTINGS
+    for name in sorted(environment):
+        bare = name.lower().removeprefix(PREFIX.lower())
+        if not name.upper().startswith(PREFIX) or bare in known:
+            continue
+        meant = get_close_matches(bare, Settings.model_fields, n=1, cutoff=CLOSE)
+        if meant:
+            yield f"{name} is no setting; is {PREFIX}{meant[0].upper()} meant?"
+
+
 def load_settings(**overrides: object) -> Settings:
-    """Read the environment, with `overrides` on top.
+    """Read the environment, with `overrides` on top; one that is None was not given.
 
     Raises
     ------
@@ -223,7 +271,7 @@ def load_settings(**overrides: object) -> Settings:
         With one sentence per problem, fit to be printed to the operator.
     """
     try:
-        return Settings(**overrides)  # type: ignore[arg-type]  # checked by pydantic itself
+        return Settings(**{name: value for name, value in overrides.items() if value is not None})  # type: ignore[arg-type]  # checked by pydantic itself
     except ValidationError as error:
         sentences = []
         for item in error.errors():
@@ -231,3 +279,11 @@ def load_settings(**overrides: object) -> Settings:
             message = item["msg"].removeprefix("Value error, ")
             sentences.append(f"MORPHID_{where.upper()}: {message}" if where else message)
         raise UnsafeSettings("\n".join(sentences)) from None
+
+
+def settings_or_exit(**overrides: object) -> Settings:
+    """Read the settings of a process that an operator started; refused ones end it with a sentence."""
+    try:
+        return load_settings(**overrides)
+    except UnsafeSettings as error:
+        raise SystemExit(f"error: {error}") from None

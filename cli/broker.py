@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import os
 import platform
 import secrets
 import shutil
@@ -95,7 +96,7 @@ def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> B
         "bind": LOOPBACK,
         "port": str(port),
         "requirepass": password,
-        "dir": f'"{home.resolve()}"',
+        "dir": _quoted(home.resolve()),
         "appendonly": "yes",  # queued wake-ups survive a restart
         "appendfsync": "everysec",
         "save": '""',  # no snapshots: the journal is enough, and lost hints are published again
@@ -116,6 +117,16 @@ def free_port(preferred: int, host: str = LOOPBACK) -> int:
     raise CommandError(
         f"no free TCP port on {host}", code=Exit.ENVIRONMENT, hint="end some programs and try again"
     )
+
+
+def _quoted(path: Path) -> str:
+    """Write a path for the broker's configuration, byte by byte: it may hold quotes, blanks, any letters."""
+    special = b'"\\'
+    shown = (
+        chr(byte) if 0x20 <= byte < 0x7F and byte not in special else f"\\x{byte:02x}"
+        for byte in os.fsencode(path)
+    )
+    return f'"{"".join(shown)}"'
 
 
 def _family(host: str) -> socket.AddressFamily:

@@ -7,9 +7,10 @@ a port, a program or a writable directory; 130 Ctrl-C.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from cli.commands.audit import audit
 from cli.commands.bench import bench
@@ -25,6 +26,19 @@ from cli.commands.serve import serve
 from cli.commands.simulate import simulate
 from cli.commands.study import study
 from cli.several_values import SeveralValues
+from cli.streams import flush_streams, prepare_streams
+
+
+class Morphid(TyperGroup):
+    """All commands, on outputs that take every character and whose readers may leave."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run a command line."""
+        prepare_streams()
+        try:
+            return super().main(*arguments, **options)
+        finally:
+            flush_streams()
 
 
 def print_version(wanted: bool) -> None:
@@ -38,6 +52,7 @@ def print_version(wanted: bool) -> None:
 
 app = typer.Typer(
     name="morphid",
+    cls=Morphid,
     epilog=EXIT_CODES,
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,

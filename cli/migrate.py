@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from cli.configured import settings_for
 from cli.exits import CommandError, Exit
 
 
@@ -40,20 +41,15 @@ def configured_url(data_dir: Path | None = None) -> str:
 
     Raises
     ------
-    CommandError : the settings contradict one another.
+    CommandError : a setting is refused.
     """
-    from app.settings import UnsafeSettings, load_settings
-
-    try:
-        return load_settings(**({} if data_dir is None else {"data_dir": data_dir})).database_url
-    except UnsafeSettings as error:
-        raise CommandError(str(error), code=Exit.USAGE) from None
+    return settings_for(data_dir=data_dir).database_url
 
 
 @contextmanager
 def _sentences() -> Iterator[None]:
     from alembic.util import CommandError as MigrationError
-    from sqlalchemy.exc import ArgumentError, OperationalError
+    from sqlalchemy.exc import OperationalError
 
     try:
         yield
@@ -62,12 +58,6 @@ def _sentences() -> Iterator[None]:
             f"the database cannot be reached: {error.orig}",
             code=Exit.ENVIRONMENT,
             hint="start it, or correct MORPHID_DATABASE_URL; without that variable an SQLite file is used",
-        ) from None
-    except ArgumentError as error:
-        raise CommandError(
-            f"MORPHID_DATABASE_URL: {error}",
-            code=Exit.USAGE,
-            hint="postgresql://user:password@host:5432/name",
         ) from None
     except MigrationError as error:
         raise CommandError(

@@ -5,8 +5,13 @@ from __future__ import annotations
 import socket
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from cli.configured import settings_for
 from cli.exits import CommandError, Exit
+
+if TYPE_CHECKING:
+    from app.settings import Settings
 
 POLL_S = 0.5
 
@@ -26,9 +31,10 @@ def wait_until_ready(data_dir: Path | None, *, worker_here: bool, within_s: floa
     ------
     CommandError : not ready in time; says which part.
     """
+    settings = settings_for(data_dir=data_dir)
     deadline = time.monotonic() + within_s
     while True:
-        ready, sentence = _look(data_dir, worker_here=worker_here)
+        ready, sentence = _look(settings, worker_here=worker_here)
         if ready:
             return sentence
         if time.monotonic() >= deadline:
@@ -38,16 +44,11 @@ def wait_until_ready(data_dir: Path | None, *, worker_here: bool, within_s: floa
         time.sleep(POLL_S)
 
 
-def _look(data_dir: Path | None, *, worker_here: bool) -> tuple[bool, str]:
+def _look(settings: Settings, *, worker_here: bool) -> tuple[bool, str]:
     from app.database import Database
     from app.health.broker import BROKER_GOOD, broker_state
     from app.health.service import database_state, worker_state
-    from app.settings import UnsafeSettings, load_settings
 
-    try:
-        settings = load_settings(**({} if data_dir is None else {"data_dir": data_dir}))
-    except UnsafeSettings as error:
-        raise CommandError(str(error), code=Exit.USAGE) from None
     host = socket.gethostname() if worker_here else None
     store = Database(settings.database_url)
     try:

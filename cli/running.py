@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import typer
 
+from cli.connections import at_service_of_environment
 from cli.exits import CommandError, Exit
 from cli.files import STANDARD_OUTPUT, require_file, save_files, write_json
 from cli.interrupt import first_interrupt
@@ -47,6 +48,8 @@ def run(request: Request, url: str | None, api_key: str | None = None) -> Answer
     ------
     CommandError : the request is refused; the error names the option at fault.
     """
+    if at_service_of_environment(url):
+        stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
     try:
         with meter() as bar:
             if url is None:

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TextIO, TypeVar
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from cli.exits import CommandError, Exit, package_missing
+from cli.streams import Terminal, prepare_streams, silence
 
 Document = Mapping[str, Any]
 P = ParamSpec("P")
@@ -36,17 +37,34 @@ STATUS_COLOURS = {
 
 def stdout() -> Console:
     """Give the console for answers."""
-    return Console(highlight=False)
+    prepare_streams()
+    return Terminal(highlight=False)
 
 
 def stderr() -> Console:
     """Give the console for progress and errors."""
-    return Console(stderr=True, highlight=False)
+    prepare_streams()
+    return Terminal(stderr=True, highlight=False)
 
 
 def print_json(document: object) -> None:
     """Print a document for machines."""
-    sys.stdout.write(json.dumps(document, indent=1) + "\n")
+    _write(sys.stdout, json.dumps(document, indent=1) + "\n")
+
+
+def print_json_line(document: object) -> bool:
+    """Print one of several documents for machines, at once; False where nobody reads them any more."""
+    return _write(sys.stdout, json.dumps(document) + "\n")
+
+
+def _write(stream: TextIO, text: str) -> bool:
+    try:
+        stream.write(text)
+        stream.flush()
+    except BrokenPipeError:
+        silence(stream)
+        return False
+    return True
 
 
 def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
@@ -61,7 +79,7 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
         except ModuleNotFoundError as error:
             refusal = package_missing(error)
         if kwargs.get("as_json") or str(kwargs.get("json_out")) == "-":
-            sys.stderr.write(json.dumps(refusal.to_document()) + "\n")
+            _write(sys.stderr, json.dumps(refusal.to_document()) + "\n")
         else:
             _print_error(refusal)
         raise typer.Exit(int(refusal.code))

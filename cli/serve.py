@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 import socket
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import closing, contextmanager
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException
 from pathlib import Path
-from urllib.error import URLError
-from urllib.request import urlopen
-
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from app.private_files import OTHERS, close_to_others, make_private_folder, open_private
 from cli.broker import LOOPBACK, Broker, free_port, prepare_broker
 from cli.exits import CommandError, Exit
 from cli.migrate import upgrade_to
-from cli.screen import stderr
+from cli.screen import print_json_line, stderr, stdout
 from cli.supervisor import Child, ChildSpec, Supervisor
+from worker.numerics import ensure_cache
+
+if TYPE_CHECKING:
+    from app.settings import Settings
 
 BROKER_WITHIN_S = 10.0
 API_WITHIN_S = 30.0
@@ -29,61 +30,47 @@ WORKER_STOP_S = 25.0  # a running job is checkpointed and handed back in this ti
 LOCK_NAME = "serve.lock"
 
 
-@dataclass(frozen=True)
-class ServeOptions:
-    """What the user asked of ``morphid serve``.
-
-    Parameters
-    ----------
-    host, port : where the API listens; port 0 takes a free one.
-    workers : jobs that run at once; each gets its share of the cores.
-    data_dir : database, queue journal and logs.
-    json_events : one JSON object per line instead of sentences.
-    """
-
-    host: str
-    port: int
-    workers: int
-    data_dir: Path
-    json_events: bool
-
-
 class Announcer:
     """Tell the user what happens, in sentences or as JSON lines."""
 
     def __init__(self, *, json_events: bool) -> None:
         self._json = json_events
-        self._console = Console(highlight=False, soft_wrap=True)
 
     def event(self, kind: str, sentence: str, **data: object) -> None:
         """Announce one event."""
         if self._json:
-            sys.stdout.write(json.dumps({"event": kind, "message": sentence, **data}) + "\n")
-            sys.stdout.flush()
+            print_json_line({"event": kind, "message": sentence, **data})
         else:
-            self._console.print(sentence, markup=False)
+            stdout().print(sentence, markup=False, soft_wrap=True)
 
 
-def serve(options: ServeOptions) -> None:
+def serve(settings: Settings, *, json_events: bool) -> None:
     """Run the service until Ctrl-C or SIGTERM.
+
+    Parameters
+    ----------
+    settings : where the API listens (port 0 takes a free one), jobs at once, data directory and all else.
+    json_events : one JSON object per line instead of sentences.
 
     Raises
     ------
     CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
     """
-    announcer = Announcer(json_events=options.json_events)
-    with _own_data_dir(options.data_dir) as data_dir:
-        port = _api_port(options.host, options.port)
-        environment = _environment(options, data_dir, port)
+    announcer = Announcer(json_events=json_events)
+    ensure_cache()  # here, where its warning is seen; the workers inherit the folder
+    data_dir = settings.data_dir
+    with _own_data_dir(data_dir):
+        port = _api_port(settings.host, settings.port)
+        environment = _environment(settings, port)
         upgrade_to(environment["MORPHID_DATABASE_URL"])
         supervisor = Supervisor(
             data_dir / "logs", report=lambda sentence: announcer.event("restart", f"morphid: {sentence}")
         )
         supervisor.on_signals()
         try:
-            _start_children(supervisor, environment, options, port, data_dir)
+            _start_children(supervisor, environment, settings, port)
             if not supervisor.stopping:
-                url = f"http://{_in_url(options.host)}:{port}"
+                url = f"http://{_in_url(settings.host)}:{port}"
                 announcer.event(
                     "ready",
                     f"MorphID is ready at {url} (documentation at {url}/docs, logs in {data_dir / 'logs'}). "
@@ -99,19 +86,19 @@ def serve(options: ServeOptions) -> None:
 
 
 def _start_children(
-    supervisor: Supervisor, environment: dict[str, str], options: ServeOptions, port: int, data_dir: Path
+    supervisor: Supervisor, environment: dict[str, str], settings: Settings, port: int
 ) -> None:
-    if "MORPHID_BROKER_URL" not in os.environ:
-        broker = prepare_broker(data_dir)
+    if not settings.names_broker:
+        broker = prepare_broker(settings.data_dir)
         environment["MORPHID_BROKER_URL"] = broker.url
         _start_broker(supervisor, broker)
     if supervisor.stopping:
         return
-    api = supervisor.start(_api(environment, options.host, port))
+    api = supervisor.start(_api(environment, settings.host, port))
     # the worker loads while the API does; a wake-up that comes early waits in the queue
-    supervisor.start(_worker(environment, options.workers))
+    supervisor.start(_worker(environment, settings.workers))
     supervisor.start(_beat(environment))
-    _expect(supervisor, api, lambda: _alive(options.host, port), API_WITHIN_S)
+    _expect(supervisor, api, lambda: _alive(settings.host, port), API_WITHIN_S)
 
 
 def _start_broker(supervisor: Supervisor, broker: Broker) -> None:
@@ -150,27 +137,21 @@ def _python(module: str, *arguments: str) -> list[str]:
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
-def _environment(options: ServeOptions, data_dir: Path, port: int) -> dict[str, str]:
-    from app.settings import UnsafeSettings, load_settings
-
-    try:
-        settings = load_settings(data_dir=data_dir, host=options.host, port=port)
-    except UnsafeSettings as error:
-        raise CommandError(str(error), code=Exit.USAGE) from None
+def _environment(settings: Settings, port: int) -> dict[str, str]:
+    """Hand on what options said: the children read variables."""
     return {
-        "MORPHID_DATA_DIR": str(data_dir),
-        "MORPHID_HOST": options.host,
+        "MORPHID_DATA_DIR": str(settings.data_dir),
+        "MORPHID_HOST": settings.host,
         "MORPHID_PORT": str(port),
         "MORPHID_DATABASE_URL": settings.database_url,
-        "MORPHID_WORKERS": str(options.workers),
+        "MORPHID_WORKERS": str(settings.workers),
         "PYTHONUNBUFFERED": "1",
     }
 
 
 @contextmanager
-def _own_data_dir(data_dir: Path) -> Iterator[Path]:
+def _own_data_dir(home: Path) -> Iterator[None]:
     """Make the data directory and hold it alone."""
-    home = data_dir.expanduser().resolve()
     try:
         make_private_folder(home)
         _close_to_others(home)
@@ -190,7 +171,7 @@ def _own_data_dir(data_dir: Path) -> Iterator[Path]:
                 code=Exit.ENVIRONMENT,
                 hint="end it first, or choose another: morphid serve --data-dir DIR",
             ) from None
-        yield home
+        yield
 
 
 def _close_to_others(home: Path) -> None:
@@ -233,7 +214,8 @@ def _in_url(host: str) -> str:
 
 def _alive(host: str, port: int) -> bool:
     try:
-        with urlopen(f"http://{_in_url(host)}:{port}/livez", timeout=1.0) as answer:
-            return bool(answer.status == 200)
-    except (URLError, OSError):
+        with closing(HTTPConnection(_in_url(host), port, timeout=1.0)) as link:  # which knows no proxies
+            link.request("GET", "/livez")
+            return link.getresponse().status == HTTPStatus.OK
+    except (HTTPException, OSError):
         return False

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import httpx
 
+from cli.connections import client_for
 from cli.exits import CommandError, Exit
 
 Document = dict[str, Any]
@@ -37,7 +38,7 @@ class Service:
     ) -> None:
         self.url = url.rstrip("/")
         headers = {"Authorization": f"Bearer {_sendable(api_key)}"} if api_key else {}
-        self._http = httpx.Client(base_url=self.url, timeout=30.0, headers=headers, transport=transport)
+        self._http = client_for(self.url, timeout=30.0, headers=headers, transport=transport)
 
     def __enter__(self) -> Self:
         return self

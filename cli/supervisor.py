@@ -131,7 +131,7 @@ class Child:
     def last_words(self, lines: int = 12) -> str:
         """Give the end of the log."""
         with contextlib.suppress(OSError):
-            return "\n".join(self.log_path.read_text(errors="replace").splitlines()[-lines:])
+            return "\n".join(self.log_path.read_text("utf-8", "replace").splitlines()[-lines:])
         return ""
 
     def _kill_group(self) -> None:

@@ -31,7 +31,7 @@ ANGLES = ("phi", "theta", "psi")
 
 def sample(name: str) -> dict[str, Any]:
     """Read a sample flight as it stands in a request (s, rad)."""
-    with (EXAMPLES / f"{name}.csv").open(newline="") as stream:
+    with (EXAMPLES / f"{name}.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     columns = {"time_s": "t", "sweep_left_rad": "sweep_left", "sweep_right_rad": "sweep_right"}
     columns |= {f"{angle}_rad": angle for angle in ANGLES}
@@ -42,8 +42,8 @@ def sample(name: str) -> dict[str, Any]:
 def request() -> dict[str, Any]:
     """Ask for an equivalent model with three links per wing that repeats the three example flights."""
     return {
-        "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text()),
-        "flight": json.loads((EXAMPLES / "flight.json").read_text()),
+        "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text("utf-8")),
+        "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")),
         "samples": [sample(name) for name in SAMPLES],
         "model": {"links_per_wing": 3},
         "search": {"seed": 1},

@@ -7,7 +7,7 @@
   cache; and it gained nothing measurable. ``nnan`` and ``ninf`` are left out too: a diverged flight must stay
   recognisable as such.
 - ``nogil``: kernels run side by side in plain threads, and heartbeats and cancellation go on beside them.
-- ``cache``, of entries: compiled code is kept beside the source, or in ``NUMBA_CACHE_DIR``.
+- ``cache``, of entries: compiled code is kept in ``NUMBA_CACHE_DIR``, beside the source, or in a home folder.
 - ``boundscheck=False``: shapes are checked once, in the typed shells.
 
 With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the same tests.
@@ -15,12 +15,17 @@ With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the sa
 
 from __future__ import annotations
 
+import functools
+import logging
 from collections.abc import Callable
 from typing import Any
 
 import numba
 from numba.core.registry import CPUDispatcher
 
+log = logging.getLogger(__name__)
+
+NO_CACHE = "no locator available"  # numba's words where it finds no folder for compiled code
 FAST_MATH = {"nsz"}
 WITHOUT_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -54,8 +59,22 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel that Python calls; cached."""
-    return compiled(function, cache=True)
+    """Compile a kernel that Python calls; cached where there is a folder to keep it in."""
+    try:
+        return compiled(function, cache=True)
+    except RuntimeError as error:
+        if NO_CACHE not in str(error):
+            raise
+        _warn_of_no_cache()
+        return compiled(function)
+
+
+@functools.cache
+def _warn_of_no_cache() -> None:
+    log.warning(
+        "compiled kernels cannot be kept: they fit neither beside morphcore nor in a home folder. Each "
+        "process compiles anew, for minutes; set NUMBA_CACHE_DIR to a folder that this user may write"
+    )
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

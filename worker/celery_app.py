@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-import os
+import logging
 from typing import Any
 
 from celery import Celery
@@ -21,9 +21,11 @@ from celery.signals import (
 
 from app.observability.logs import configure_logging
 from app.observability.tracing import stop_tracing
-from app.settings import Settings, load_settings
+from app.settings import Settings, doubtful_variables, settings_or_exit
 from worker import numerics, shutdown
 from worker.presence import Presence
+
+log = logging.getLogger(__name__)
 
 QUEUE = "morphid"
 RUN_JOB = "morphid.run_job"
@@ -31,10 +33,9 @@ REAP = "morphid.reap"
 REAP_EXPIRES_S = (
     24 * 3600.0
 )  # by the worker's clock, which may be hours off: short lives would never reach it
-REAP_EVERY_S = 10.0  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
 
 
-def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celery:
+def make_app(settings: Settings) -> Celery:
     """Configure Celery for work that our own tables keep track of."""
     celery = Celery("morphid", broker=settings.broker_url, include=["worker.tasks"])
     celery.conf.update(
@@ -43,7 +44,7 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
         task_ignore_result=True,  # results belong in our tables
         worker_prefetch_multiplier=1,
         worker_disable_prefetch=True,  # a busy worker must not sit on a hint that an idle one could take
-        worker_concurrency=int(os.environ.get("MORPHID_WORKERS", "1")),
+        worker_concurrency=settings.workers,
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
@@ -54,7 +55,7 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
         beat_schedule={
             "reap": {
                 "task": REAP,
-                "schedule": reap_every_s,
+                "schedule": settings.reap_every_s,
                 "options": {"expires": REAP_EXPIRES_S, "queue": QUEUE},
             }
         },
@@ -65,21 +66,25 @@ def make_app(settings: Settings, *, reap_every_s: float = REAP_EVERY_S) -> Celer
 
 def threads_per_job() -> int:
     """Numeric threads of one job: this machine's cores shared by the jobs that run at once."""
-    return numerics.share_cores(int(os.environ.get("MORPHID_WORKERS", "1")))
+    return numerics.share_cores(app.conf.worker_concurrency)
 
 
-settings = load_settings()
-app = make_app(settings, reap_every_s=float(os.environ.get("MORPHID_REAP_EVERY_S", str(REAP_EVERY_S))))
+settings = settings_or_exit()
+app = make_app(settings)
 
 
 @setup_logging.connect
 def _log_in_our_way(**_: Any) -> None:
     configure_logging(settings.log_format, settings.log_level)
+    for sentence in doubtful_variables():
+        log.warning(sentence)
 
 
 @worker_init.connect
-def _before_the_pool(**_: Any) -> None:
+def _before_the_pool(sender: Any, **_: Any) -> None:
     shutdown.arm()
+    if isinstance(sender.concurrency, int):  # `--concurrency` comes before MORPHID_WORKERS
+        app.conf.worker_concurrency = sender.concurrency
     numerics.prepare_environment(threads_per_job())
 
 

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import logging
 import os
+import stat
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 log = logging.getLogger(__name__)
@@ -24,7 +26,7 @@ def usable_cores() -> int:
     """Count the cores this process may use: affinity, and the container's quota rounded up."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     try:
-        quota, period = CGROUP_CPU_LIMIT.read_text().split()
+        quota, period = CGROUP_CPU_LIMIT.read_text("ascii").split()
         if quota != "max":
             cores = min(cores, -(-int(quota) // int(period)))
     except (OSError, ValueError):
@@ -56,28 +58,70 @@ def prepare_environment(threads: int) -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     os.environ.setdefault("MPLBACKEND", "Agg")
-    _ensure_cache()
+    ensure_cache()
 
 
-def _ensure_cache() -> None:
-    """Point numba to a folder of the user's when the one it was told to use cannot be written."""
+def ensure_cache() -> None:
+    """Point numba and matplotlib to a folder of the user's where they can write in none of their own."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if not chosen:
-        return  # numba itself finds one: beside the source, else in the user's cache
+    if chosen and not takes_files(Path(chosen)):
+        _keep_kernels_elsewhere(f"NUMBA_CACHE_DIR {chosen} cannot be written")
+    elif not chosen and not any(takes_files(folder) for folder in _own_cache_folders()):
+        _keep_kernels_elsewhere("compiled kernels fit neither beside this installation nor in a home folder")
+    # without a folder matplotlib makes one at each start and complains
+    if not os.environ.get("MPLCONFIGDIR") and not takes_files(_home("XDG_CONFIG_HOME", ".config")):
+        folder = os.environ.get("NUMBA_CACHE_DIR") or _private_folder()
+        if folder is not None:
+            os.environ["MPLCONFIGDIR"] = str(folder)
+
+
+def takes_files(folder: Path) -> bool:
+    """Whether a file can really be made there: permission bits do not tell of read-only and full disks.
+
+    Of a folder that is not there yet the nearest one above it is asked.
+    """
     try:
-        Path(chosen).mkdir(parents=True, exist_ok=True)
-        if os.access(chosen, os.W_OK | os.X_OK):
-            return
+        there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+        with tempfile.TemporaryFile(dir=there) as file:
+            file.write(b"x" * 4096)
     except OSError:
-        pass
-    fallback = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
-    fallback.mkdir(mode=0o700, exist_ok=True)
-    if fallback.stat().st_uid != os.getuid():
-        fallback = Path(
-            tempfile.mkdtemp(prefix="morphid-kernels-")
-        )  # compiled code of others is not ours to run
-    log.warning("NUMBA_CACHE_DIR %s cannot be written; kernels are kept in %s", chosen, fallback)
-    os.environ["NUMBA_CACHE_DIR"] = str(fallback)
+        return False
+    return True
+
+
+def _own_cache_folders() -> Iterator[Path]:
+    """Where numba keeps what it compiled when nobody says: beside the source, else in the user's cache."""
+    library = find_spec("morphcore")  # found, not imported
+    if library is not None and library.origin is not None:
+        yield Path(library.origin).parent / "__pycache__"
+    yield _home("XDG_CACHE_HOME", ".cache")
+
+
+def _home(variable: str, name: str) -> Path:
+    return Path(os.environ.get(variable) or os.path.expanduser(f"~/{name}"))  # noqa: PTH111 - raises for nobody
+
+
+def _keep_kernels_elsewhere(reason: str) -> None:
+    folder = _private_folder()
+    if folder is None:
+        return  # morphcore.jit then compiles anew in each process, and says so
+    log.warning(
+        "%s; they are kept in %s. Set NUMBA_CACHE_DIR to a folder that this user may write", reason, folder
+    )
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+
+
+def _private_folder() -> Path | None:
+    """A temporary folder of this user alone: we run no code that others compiled. None: no room for one."""
+    try:
+        folder = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077:
+            return folder
+        return Path(tempfile.mkdtemp(prefix="morphid-kernels-"))
+    except OSError:
+        return None
 
 
 class Kernels:

@@ -21,7 +21,8 @@ from sqlalchemy import Engine, create_engine, make_url
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
-from app.database import Session, normal_url
+from app.database import Session
+from app.database_address import normal_url
 from app.health.broker import BROKER_GOOD, broker_state
 from app.health.presence import Sign, note_seen, note_started, note_stopped
 from app.settings import load_settings

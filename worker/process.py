@@ -1,7 +1,7 @@
-"""Run a worker or the beat: ``python -P -m worker.process worker`` (or ``beat``), then options of Celery's.
+"""Run a worker or the beat: ``python -P -m worker.process worker``, then options of Celery's.
 
-Celery's own command puts the working folder on the import path, where a user's own package ``app`` or ``worker``
-may lie. This entry point does not, and ``-P`` keeps Python from doing it.
+Celery's own command puts the working folder on the import path, where a user's own package ``app`` or
+``worker`` may lie. This entry point does not, and ``-P`` keeps Python from doing it.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ from starlette.datastructures import Headers
 from starlette.types import Scope
 
 from app.errors import CrossSiteRequest, ServiceError, WrongHost
-from app.settings import Settings, is_loopback
+from app.loopback import is_loopback
+from app.settings import Settings
 
 OWN_SITES = frozenset({"same-origin", "none"})  # none: typed, or a bookmark
 

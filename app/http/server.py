@@ -15,6 +15,7 @@ import resource
 import socket
 import sys
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import h11
@@ -24,7 +25,7 @@ from uvicorn.server import ServerState
 
 from app.errors import ServiceBusy, ServiceError
 from app.http.problems import MEDIA_TYPE, problem_document
-from app.settings import Settings, load_settings
+from app.settings import Settings, settings_or_exit
 
 MAX_HEADER_BYTES = 32 * 1024  # request line and headers
 END_OF_HEADERS = re.compile(rb"\n\r?\n")
@@ -315,17 +316,20 @@ def guarded_config(app: Any, settings: Settings, **others: Any) -> GuardedConfig
 
 def main(arguments: list[str] | None = None) -> None:
     """Serve until SIGTERM or SIGINT."""
-    settings = load_settings()
+    from app.main import create_app
+
     parser = argparse.ArgumentParser(prog="python -m app.http.server", description="Serve the API.")
-    parser.add_argument("--host", default=settings.host)
-    parser.add_argument("--port", type=int, default=settings.port)
+    parser.add_argument("--host", help="MORPHID_HOST where it is left out")
+    parser.add_argument("--port", type=int, help="MORPHID_PORT where it is left out")
     chosen = parser.parse_args(arguments)
+    settings = settings_or_exit(host=chosen.host, port=chosen.port)
     config = guarded_config(
-        "app.main:create_app",
+        # the options too decide whether keys are demanded
+        partial(create_app, settings),
         settings,
         factory=True,
-        host=chosen.host,
-        port=chosen.port,
+        host=settings.host,
+        port=settings.port,
         timeout_graceful_shutdown=STOP_S,
     )
     server = uvicorn.Server(config)

@@ -12,6 +12,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
+from urllib.parse import urlsplit
+
+from app.loopback import is_loopback
 
 ENDPOINT_VARIABLES = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
 TRACES_PATH = "/v1/traces"
@@ -72,11 +75,24 @@ def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
     provider = TracerProvider(resource=resource, shutdown_on_exit=False)
     if exporter is None:
         endpoint = traces.rstrip("/") + TRACES_PATH if traces and TRACES_PATH not in traces else traces
-        provider.add_span_processor(BatchSpanProcessor(OTLPSpanExporter(endpoint=endpoint or None)))
+        sent_by = OTLPSpanExporter(endpoint=endpoint or None, session=_session_for(traces))
+        provider.add_span_processor(BatchSpanProcessor(sent_by))
     else:
         provider.add_span_processor(SimpleSpanProcessor(exporter))
     _tracing.provider, _tracing.tracer = provider, provider.get_tracer("morphid", VERSION)
     return True
+
+
+def _session_for(traces: str) -> Any:
+    """An HTTP session that asks for no proxy, for a collector on this machine; None: the exporter's own."""
+    from requests import Session  # which the exporter brings
+
+    address = traces or next(filter(None, map(os.environ.get, ENDPOINT_VARIABLES)), "")
+    if not is_loopback(urlsplit(address).hostname or ""):
+        return None
+    session = Session()
+    session.trust_env = False
+    return session
 
 
 def stop_tracing() -> None:

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from cli.commands import options
-from cli.commands.keys import DataDir
 from cli.screen import print_json, reports_errors, stdout
 
 audit = typer.Typer(help="Look at the audit log.", no_args_is_help=True, epilog=options.EXIT_CODES)
@@ -19,7 +18,7 @@ def list_entries(
     owner: Annotated[str | None, typer.Option(help="Only deeds of this owner.")] = None,
     action: Annotated[str | None, typer.Option(help="Only deeds of this kind, such as auth.refused.")] = None,
     limit: Annotated[int, typer.Option(min=1, max=10_000, help="At most so many.")] = 50,
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """List the newest deeds: jobs posted, cancelled and deleted, keys made and refused."""

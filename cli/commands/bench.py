@@ -9,6 +9,7 @@ import typer
 
 from cli.commands import options
 from cli.exits import CommandError, Exit
+from cli.interrupt import first_interrupt
 from cli.screen import print_json, reports_errors, stdout
 
 
@@ -29,9 +30,15 @@ def bench(
     numerics.prepare_environment(numerics.usable_cores())
     from morphcore.bench import benchmark_table, run_benchmarks
     from morphcore.errors import MorphError
+    from morphcore.stopping import Interrupted, stoppable
 
     try:
-        figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples, sections=only or None)
+        with first_interrupt() as interrupted, stoppable(interrupted):
+            figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples, sections=only or None)
+    except (Interrupted, KeyboardInterrupt):  # the second: pressed twice
+        raise CommandError(
+            "stopped", code=Exit.INTERRUPTED, hint="no figures: they stand side by side"
+        ) from None
     except MorphError as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
     if as_json:

@@ -13,37 +13,37 @@ from cli.screen import print_json, reports_errors, stdout
 if TYPE_CHECKING:
     from cli.backup import Backup
 
-DataDir = Annotated[
-    Path | None,
-    typer.Option(help="Of the service (`morphid serve --data-dir`); or set MORPHID_DATABASE_URL."),
-]
-
 database = typer.Typer(help="Migrate, copy and put back the database.", no_args_is_help=True)
 
 
 @database.command("upgrade")
 @reports_errors
-def upgrade_database(revision: Annotated[str, typer.Argument()] = "head") -> None:
-    """Migrate the database (MORPHID_DATABASE_URL) up."""
+def upgrade_database(
+    revision: Annotated[str, typer.Argument()] = "head", data_dir: options.DataDir = None
+) -> None:
+    """Migrate the database up: MORPHID_DATABASE_URL's, else the one in the data directory."""
     from cli.migrate import configured_url, upgrade_to
 
-    upgrade_to(configured_url(), revision)
+    upgrade_to(configured_url(data_dir), revision)
 
 
 @database.command("downgrade")
 @reports_errors
-def downgrade_database(revision: Annotated[str, typer.Argument(help="`base` empties the database.")]) -> None:
-    """Migrate the database (MORPHID_DATABASE_URL) down."""
+def downgrade_database(
+    revision: Annotated[str, typer.Argument(help="`base` empties the database.")],
+    data_dir: options.DataDir = None,
+) -> None:
+    """Migrate the database down."""
     from cli.migrate import configured_url, downgrade_to
 
-    downgrade_to(configured_url(), revision)
+    downgrade_to(configured_url(data_dir), revision)
 
 
 @database.command("backup")
 @reports_errors
 def backup_database(
     target: Annotated[Path, typer.Argument(metavar="FILE", help="Is made; must not exist.")],
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Copy the SQLite database to FILE while the service goes on."""
@@ -57,7 +57,7 @@ def backup_database(
 @reports_errors
 def restore_database(
     source: Annotated[Path, typer.Argument(metavar="FILE", help="Made by `morphid db backup`.")],
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Put FILE in the place of the SQLite database of a service that has ended."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cli.commands import options
-from cli.exits import Exit
+from cli.connections import URL_VARIABLE, at_service_of_environment
+from cli.exits import CommandError, Exit
 from cli.screen import print_json, reports_errors, stdout
 
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
@@ -17,12 +17,15 @@ COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 @reports_errors
 def doctor(
     url: Annotated[
-        str | None, typer.Option(help="Examine the service there instead of this installation.")
+        str | None,
+        typer.Option(
+            "--url",
+            envvar=URL_VARIABLE,
+            help="Examine the service there instead of this installation; not with --data-dir.",
+        ),
     ] = None,
     api_key: options.ApiKey = None,
-    data_dir: Annotated[
-        Path | None, typer.Option(help="Of the service (`morphid serve --data-dir`).")
-    ] = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Say what is wrong with this installation, with a remedy for each; 6 when something fails."""
@@ -30,6 +33,14 @@ def doctor(
     from cli.doctor.round import round_here, round_there
 
     found = []
+    if data_dir is not None and at_service_of_environment(url):
+        url = None  # an option comes before a variable
+    if url is not None and data_dir is not None:
+        raise CommandError(
+            "--url is a service elsewhere, --data-dir is one here",
+            code=Exit.USAGE,
+            hint="give one of the two",
+        )
     for finding in round_here(data_dir) if url is None else round_there(url, api_key):
         found.append(finding)
         if not as_json:
@@ -53,9 +64,7 @@ def ready(
         bool, typer.Option("--worker", help="Only: does this machine's worker take messages?")
     ] = False,
     wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
-    data_dir: Annotated[
-        Path | None, typer.Option(help="Of the service (`morphid serve --data-dir`).")
-    ] = None,
+    data_dir: options.DataDir = None,
 ) -> None:
     """Tell by the exit code whether jobs that are posted now will run: 0 yes, 6 no."""
     from cli.ready import wait_until_ready

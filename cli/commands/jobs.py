@@ -12,12 +12,15 @@ from cli.commands.identify import show_model
 from cli.commands.optimize import show_schedule
 from cli.commands.simulate import show_flight
 from cli.commands.study import show_study
+from cli.connections import DEFAULT_URL
+from cli.exits import Exit
 from cli.screen import (
     exit_for,
     jobs_table,
     meter,
     print_job_error,
     print_json,
+    print_json_line,
     progress_detail,
     reports_errors,
     stdout,
@@ -42,7 +45,7 @@ jobs = typer.Typer(help="Look after the jobs of a service.", no_args_is_help=Tru
 def list_jobs(
     status: Annotated[str | None, typer.Option(help="Only jobs in this state.")] = None,
     limit: Annotated[int, typer.Option(min=1, max=100, help="At most so many.")] = 20,
-    url: options.Url = options.DEFAULT_URL,
+    url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
@@ -61,7 +64,7 @@ def list_jobs(
 @reports_errors
 def show_job(
     job: JobId,
-    url: options.Url = options.DEFAULT_URL,
+    url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
@@ -89,7 +92,7 @@ def show_job(
 @reports_errors
 def watch_job(
     job: JobId,
-    url: options.Url = options.DEFAULT_URL,
+    url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
@@ -102,14 +105,13 @@ def watch_job(
 
 def _follow(service: Service, job: str, *, as_json: bool) -> NoReturn:
     """Show a job until it has ended, and exit as it did."""
-    import json
-
     last: dict[str, Any] = {}
     with meter() as bar:
         for seen in service.watch(job):
-            if as_json and seen != last:
-                stdout().print(json.dumps(seen), markup=False, soft_wrap=True)
-            elif not as_json:
+            if as_json:
+                if seen != last and not print_json_line(seen):
+                    raise typer.Exit(int(Exit.OK))  # `| head`: seen enough
+            else:
                 bar.show(seen.get("progress"), seen["status"])
             last = seen
     if not as_json:
@@ -156,7 +158,7 @@ def rerun_job(
 @reports_errors
 def cancel_job(
     job: JobId,
-    url: options.Url = options.DEFAULT_URL,
+    url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:

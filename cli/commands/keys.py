@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,10 +11,6 @@ from cli.screen import print_json, reports_errors, stderr, stdout
 
 keys = typer.Typer(help="Make, list and revoke API keys.", no_args_is_help=True, epilog=options.EXIT_CODES)
 
-DataDir = Annotated[
-    Path | None,
-    typer.Option(help="Of the service (`morphid serve --data-dir`); or set MORPHID_DATABASE_URL."),
-]
 quota_option = "Quotas"
 
 
@@ -40,7 +35,7 @@ def create_key(
     max_bytes: Annotated[
         int | None, typer.Option(min=1, help="Stored bytes.", rich_help_panel=quota_option)
     ] = None,
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Make a key and show it: now or never, for only a digest of it is stored."""
@@ -70,7 +65,7 @@ def create_key(
 @reports_errors
 def list_keys(
     owner: Annotated[str | None, typer.Option(help="Only keys of this owner.")] = None,
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """List the keys: whose, what for, what they may do, when they were used; never their secrets."""
@@ -87,7 +82,7 @@ def list_keys(
 @reports_errors
 def revoke_key(
     key: Annotated[str, typer.Argument(metavar="KEY", help="Its prefix or its id.")],
-    data_dir: DataDir = None,
+    data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Revoke a key; running services refuse it two seconds later."""

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cli.connections import KEY_VARIABLE, URL_VARIABLE
 from cli.exits import CommandError, Exit
 from cli.files import matching_files, read_json
 from cli.request import Request
@@ -20,7 +21,6 @@ EXIT_CODES = (
     "6 machine not ready, 130 Ctrl-C."
 )
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters of an identified model
-DEFAULT_URL = "http://127.0.0.1:8000"
 
 # groups of options, as a command's help shows them
 flight_option = partial(typer.Option, rich_help_panel="Aircraft and flights")
@@ -43,11 +43,33 @@ class Start(StrEnum):
     GIVEN = "given"
 
 
+def setting(name: str, default: str, what: str, **more: Any) -> Any:
+    """Describe an option that is a setting of the service: the option, then its variable, then the default.
+
+    The option's own default is None, for `cli.configured.settings_for` reads the others.
+    """
+    return typer.Option(
+        f"--{name.replace('_', '-')}",
+        help=what,
+        show_default=f"MORPHID_{name.upper()}, else {default}",
+        **more,
+    )
+
+
+DataDir = Annotated[
+    Path | None, setting("data_dir", "var", "Database, queue and logs of the service on this machine.")
+]
+Host = Annotated[str | None, setting("host", "127.0.0.1", "Address the API listens on.")]
+Port = Annotated[
+    int | None, setting("port", "8000", "Port of the API; 0 takes a free one.", min=0, max=65535)
+]
+Workers = Annotated[int | None, setting("workers", "1", "Jobs that run at once.", min=1, max=1024)]
+
 # of commands that talk to a service anyway
-Url = Annotated[str, typer.Option(envvar="MORPHID_URL", help="Address of the service.")]
+Url = Annotated[str, typer.Option("--url", envvar=URL_VARIABLE, help="Address of the service.")]
 API_KEY_HELP = "Key of the service; better set MORPHID_API_KEY, which no process list shows."
 ApiKey = Annotated[
-    str | None, typer.Option("--api-key", envvar="MORPHID_API_KEY", show_default=False, help=API_KEY_HELP)
+    str | None, typer.Option("--api-key", envvar=KEY_VARIABLE, show_default=False, help=API_KEY_HELP)
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -91,9 +113,12 @@ WarmStart = Annotated[
     Path | None, search_option("--warm-start", help="Begin from the model of this earlier result (JSON).")
 ]
 
-AtUrl = Annotated[str | None, answer_option("--url", help="Run at this service instead of in this process.")]
+AtUrl = Annotated[
+    str | None,
+    answer_option("--url", envvar=URL_VARIABLE, help="Run at this service instead of in this process."),
+]
 AtUrlKey = Annotated[
-    str | None, answer_option("--api-key", envvar="MORPHID_API_KEY", show_default=False, help=API_KEY_HELP)
+    str | None, answer_option("--api-key", envvar=KEY_VARIABLE, show_default=False, help=API_KEY_HELP)
 ]
 JsonFile = Annotated[Path | None, answer_option("--json", help="Write the result here; `-` prints it.")]
 Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and curves into this folder.")]

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
 from cli.doctor.findings import Finding, fail, ok, warn
+from worker.numerics import share_cores, takes_files, usable_cores
 
 LEAST_PYTHON = (3, 11)
 EXTRAS = ("server", "telemetry")  # of the installation; what only developers need is not examined
@@ -23,6 +24,7 @@ LEAST_MEMORY = 2 * 2**30  # bytes; the kernels' compiler alone takes 0.5 GiB
 LEAST_SPACE, SCARCE_SPACE = 200 * 2**20, 2 * 2**30
 LEAST_FILES, FEW_FILES = 256, 1024
 CGROUP_MEMORY = Path("/sys/fs/cgroup/memory.max")
+OCTAL = re.compile(r"\\([0-7]{3})")  # how /proc/mounts writes blanks and other characters
 NETWORK_FILE_SYSTEMS = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "9p", "fuse.sshfs"})
 COMPILE = """
 import json, numba
@@ -70,7 +72,7 @@ def _differing() -> Iterator[Finding]:
         return  # installed without its repository
     from packaging.requirements import Requirement
 
-    lines = [line.partition("#")[0].strip() for line in CONSTRAINTS.read_text().splitlines()]
+    lines = [line.partition("#")[0].strip() for line in CONSTRAINTS.read_text("utf-8").splitlines()]
     tested = {each.name: each.specifier for line in lines if line for each in [Requirement(line)]}
     other = {
         name: found
@@ -116,7 +118,7 @@ def compiler() -> Iterator[Finding]:
     told = json.loads(done.stdout.splitlines()[-1])
     yield ok("compiler", f"numba {told['numba']} compiles")
     cache = Path(told["cache"]) if told["cache"] else None
-    if cache is None or not _takes_files(cache):
+    if cache is None or not takes_files(cache):
         yield warn(
             "kernel cache",
             f"compiled kernels cannot be kept in {cache}: each start of a worker compiles for minutes",
@@ -126,25 +128,9 @@ def compiler() -> Iterator[Finding]:
         yield ok("kernel cache", f"compiled kernels are kept in {cache}")
 
 
-def _takes_files(folder: Path) -> bool:
-    """Whether a file can really be made there: permission bits do not tell of read-only and full disks.
-
-    Of a folder that is not there yet the nearest one above it is asked.
-    """
-    there = next(each for each in (folder, *folder.parents) if each.exists())
-    try:
-        with tempfile.TemporaryFile(dir=there) as file:
-            file.write(b"x" * 4096)
-    except OSError:
-        return False
-    return True
-
-
-def cores() -> Iterator[Finding]:
+def cores(workers: int) -> Iterator[Finding]:
     """Do the workers have a core each, and memory."""
-    from worker.numerics import share_cores, usable_cores
-
-    here, usable, workers = os.cpu_count() or 1, usable_cores(), int(os.environ.get("MORPHID_WORKERS", "1"))
+    here, usable = os.cpu_count() or 1, usable_cores()
     limited = "" if usable == here else f" (of {here}; affinity or a container's quota keeps the others away)"
     shared = f"{workers} x {share_cores(workers)} threads on {usable} cores{limited}"
     if workers > usable:
@@ -167,7 +153,7 @@ def cores() -> Iterator[Finding]:
 def _memory_limit() -> int:
     installed = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     try:
-        return min(installed, int(CGROUP_MEMORY.read_text()))
+        return min(installed, int(CGROUP_MEMORY.read_text("ascii")))
     except (OSError, ValueError):
         return installed  # no limit that we could read
 
@@ -190,7 +176,7 @@ def files() -> Iterator[Finding]:
 def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
     """Can the data directory be written, and is there room."""
     folder = home.expanduser().resolve()
-    if not _takes_files(folder):
+    if not takes_files(folder):
         yield fail(
             "data directory",
             f"{folder} cannot be written",
@@ -221,9 +207,9 @@ def _file_system(folder: Path) -> str:
     """Type of the file system that holds `folder`; empty where there is no /proc."""
     found = ("", "")
     try:
-        for line in Path("/proc/mounts").read_text().splitlines():
+        for line in Path("/proc/mounts").read_text("utf-8", "surrogateescape").splitlines():
             _, place, kind, *_ = line.split()
-            mount = place.replace("\\040", " ")
+            mount = OCTAL.sub(lambda found: chr(int(found[1], 8)), place)
             if folder.is_relative_to(mount) and len(mount) >= len(found[0]):
                 found = (mount, kind)
     except OSError:

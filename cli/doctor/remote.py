@@ -5,21 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from email.utils import parsedate_to_datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from cli.connections import client_for
 from cli.doctor.findings import Finding, fail, ok, warn
+from cli.exits import CommandError
+
+if TYPE_CHECKING:
+    import httpx
 
 TIMEOUT_S = 5.0
 SLOW_S = 1.0
 SKEW_S = 5.0  # the Date header has whole seconds
 
 
-def served_version(url: str) -> str | None:
-    """Version of the service at `url`, None when there is none."""
+def served_version(client: httpx.Client) -> str | None:
+    """Version of the service at a client's address, None when there is none."""
     import httpx
 
     try:
-        told = httpx.get(f"{url}/livez", timeout=TIMEOUT_S).json()
+        told = client.get("/livez").json()
     except (httpx.HTTPError, ValueError):
         return None
     return str(told["version"]) if isinstance(told, dict) and told.get("status") == "alive" else None
@@ -29,18 +34,28 @@ def service(url: str, api_key: str | None) -> Iterator[Finding]:
     """Does it live, is it ready, do our key and our clock fit."""
     import httpx
 
+    try:
+        client = client_for(url, timeout=TIMEOUT_S)
+    except CommandError as error:
+        yield fail("service", error.message, error.hint)
+        return
+    with client:
+        try:
+            yield from _service(client, url, api_key)
+        except httpx.HTTPError as error:
+            remedy = "start it with `morphid serve`, or correct --url"
+            yield fail("service", f"{url} does not answer: {type(error).__name__} {error}", remedy)
+
+
+def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Finding]:
+    import httpx
+
     from app.version import VERSION
 
     began = time.monotonic()
-    try:
-        alive = httpx.get(f"{url}/livez", timeout=TIMEOUT_S)
-    except httpx.HTTPError as error:
-        yield fail(
-            "service", f"{url} does not answer: {error}", "start it with `morphid serve`, or correct --url"
-        )
-        return
+    alive = client.get("/livez")
     took_s = time.monotonic() - began
-    version = served_version(url)
+    version = served_version(client)
     if version is None:
         yield fail("service", f"{url} answers {alive.status_code}, but is no MorphID", "correct --url")
         return
@@ -51,9 +66,9 @@ def service(url: str, api_key: str | None) -> Iterator[Finding]:
     else:
         yield ok("service", f"MorphID {version} at {url}")
     yield from _clock(alive)
-    yield from _readiness(httpx.get(f"{url}/readyz", timeout=TIMEOUT_S).json())
+    yield from _readiness(client.get("/readyz").json())
     headers = {"Authorization": f"Bearer {api_key}"} if api_key else {}
-    listed = httpx.get(f"{url}/jobs", params={"limit": 1}, headers=headers, timeout=TIMEOUT_S)
+    listed = client.get("/jobs", params={"limit": 1}, headers=headers)
     if listed.status_code == httpx.codes.OK:
         yield ok("access", "jobs can be listed")
     else:

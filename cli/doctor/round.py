@@ -12,38 +12,36 @@ from cli.doctor.findings import Check, Finding, examined, fail, ok
 
 def round_here(data_dir: Path | None) -> Iterator[Finding]:
     """Examine this installation, and the service that the settings describe."""
-    from app.settings import UnsafeSettings, load_settings
+    from cli.configured import settings_for
+    from cli.exits import CommandError
 
     checks: list[tuple[str, Check]] = [
         ("python", machine.python),
         ("packages", machine.packages),
         ("compiler", machine.compiler),
-        ("cores", machine.cores),
         ("open files", machine.files),
     ]
     yield from examined(checks)
     try:
-        settings = load_settings(**({} if data_dir is None else {"data_dir": data_dir}))
-    except UnsafeSettings as error:
-        yield fail("settings", str(error), "correct the MORPHID_ variables; docs/operations.md lists them")
+        settings = settings_for(data_dir=data_dir)
+    except CommandError as error:
+        yield fail("settings", error.message, "correct the MORPHID_ variables; docs/service.md lists them")
         return
     yield from examined(
         [
             ("data directory", partial(machine.data_dir, settings.data_dir, sqlite=settings.uses_sqlite)),
+            ("cores", partial(machine.cores, settings.workers)),
             ("settings", partial(service.unsafe, settings)),
             ("database", partial(service.database, settings)),
-            ("broker", _broker(settings.broker_url)),
+            (
+                "broker",
+                partial(service.broker, settings.broker_url) if settings.names_broker else _own_broker,
+            ),
             ("jobs", partial(service.work, settings)),
             ("keys", partial(service.keys, settings)),
             ("port", partial(service.port, settings.host, settings.port)),
         ]
     )
-
-
-def _broker(url: str) -> Check:
-    import os
-
-    return partial(service.broker, url) if "MORPHID_BROKER_URL" in os.environ else _own_broker
 
 
 def _own_broker() -> Iterator[Finding]:

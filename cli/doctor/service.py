@@ -22,7 +22,7 @@ LARGE_DATABASE = 2 * 2**30  # bytes; its pages are not read one by one
 
 def unsafe(settings: Any) -> Iterator[Finding]:
     """Do the settings let in whom they should not."""
-    from app.settings import is_loopback
+    from app.loopback import is_loopback
 
     beyond = not is_loopback(settings.host)
     if beyond and not settings.demands_keys:
@@ -254,7 +254,8 @@ def keys(settings: Any) -> Iterator[Finding]:
 
 def port(host: str, number: int) -> Iterator[Finding]:
     """Is the port free, or ours."""
-    from cli.doctor.remote import served_version
+    from cli.connections import client_for
+    from cli.doctor.remote import TIMEOUT_S, served_version
 
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
@@ -267,7 +268,9 @@ def port(host: str, number: int) -> Iterator[Finding]:
             yield ok("port", f"{host}:{number} is free")
             return
     there = "127.0.0.1" if host in {"0.0.0.0", "::"} else host  # noqa: S104 - recognised, not bound
-    version = served_version(f"http://{f'[{there}]' if ':' in there else there}:{number}")
+    url = f"http://{f'[{there}]' if ':' in there else there}:{number}"
+    with client_for(url, direct=True, timeout=TIMEOUT_S) as client:
+        version = served_version(client)
     if version is None:
         yield fail(
             "port", f"{host}:{number}: {reason}, by something else than MorphID", "take another: --port"

@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urlsplit
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent
@@ -36,7 +37,7 @@ def generate(url: str) -> None:
 
 def sample(name: str) -> dict[str, object]:
     """Read a sample flight as it stands in a request (s, rad)."""
-    with (EXAMPLES / f"{name}.csv").open(newline="") as stream:
+    with (EXAMPLES / f"{name}.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     series = {key: [float(row[column]) for row in rows] for key, column in COLUMNS.items()}
     return {"name": name, "role": "train", **series}
@@ -52,8 +53,8 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
 
     request = IdentifyRequest.from_dict(
         {
-            "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text()),
-            "flight": json.loads((EXAMPLES / "flight.json").read_text()),
+            "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text("utf-8")),
+            "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")),
             "samples": [sample("train_rate_0.8")],
             "model": {"links_per_wing": 3},
             "search": json.loads(os.environ.get("MORPHID_SEARCH", "{}")),
@@ -61,7 +62,10 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
     )
     key = os.environ.get("MORPHID_API_KEY")
     headers = {"Authorization": f"Bearer {key}"} if key else {}
-    with Client(base_url=url, timeout=60.0, headers=headers) as service:
+    # a service on this machine is never reached through a proxy, whatever http_proxy and ALL_PROXY say
+    here = urlsplit(url).hostname in {"127.0.0.1", "localhost", "::1"}
+    options = {"trust_env": not here}
+    with Client(base_url=url, timeout=60.0, headers=headers, httpx_args=options) as service:
         job = identify.sync(client=service, body=request)
         while isinstance(job, Job) and job.status in {
             JobStatus.QUEUED,
@@ -77,7 +81,7 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> i
         print("the service gave no result")
         return 1
     Path(folder).mkdir(parents=True, exist_ok=True)
-    (Path(folder) / "result.json").write_text(json.dumps(result.to_dict(), indent=1))
+    (Path(folder) / "result.json").write_text(json.dumps(result.to_dict(), indent=1), "utf-8")
     for row in result.fit:
         print(f"{row.sample:<16} J {row.j_rigid:.3g} -> {row.j_identified:.3g} rad^2")
     return 0

@@ -7,6 +7,8 @@ url=${1:-http://127.0.0.1:8000}
 folder=${2:-client-output}
 here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$folder"
+# a service on this machine is never reached through a proxy
+export no_proxy="localhost,127.0.0.1,::1,${no_proxy:-${NO_PROXY:-}}"
 
 # a service that demands keys gets the one in MORPHID_API_KEY; by a file, for a process list shows arguments
 call() {

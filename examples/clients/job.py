@@ -26,17 +26,21 @@ def service_at(url: str) -> httpx.Client:
     """Open a client; a service that demands keys gets the one in MORPHID_API_KEY."""
     key = os.environ.get("MORPHID_API_KEY")
     headers = {"Authorization": f"Bearer {key}"} if key else {}
-    return httpx.Client(base_url=url, timeout=30.0, headers=headers)
+    # a service on this machine is never reached through a proxy, whatever http_proxy and ALL_PROXY say
+    here = httpx.URL(url).host in {"127.0.0.1", "localhost", "::1"}
+    return httpx.Client(base_url=url, timeout=30.0, headers=headers, trust_env=not here)
 
 
 def vehicle() -> dict[str, Any]:
     """Read the example aircraft and flight condition."""
-    return {name: json.loads((EXAMPLES / f"{name}.json").read_text()) for name in ("aircraft", "flight")}
+    return {
+        name: json.loads((EXAMPLES / f"{name}.json").read_text("utf-8")) for name in ("aircraft", "flight")
+    }
 
 
 def sample(name: str, role: str) -> dict[str, Any]:
     """Read a sample flight as it stands in a request (s, rad)."""
-    with (EXAMPLES / f"{name}.csv").open(newline="") as stream:
+    with (EXAMPLES / f"{name}.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     series = {key: [float(row[column]) for row in rows] for key, column in COLUMNS.items()}
     return {"name": name, "role": role, **series}
@@ -66,4 +70,4 @@ def run(service: httpx.Client, operation: str, body: dict[str, Any]) -> tuple[di
 def save(result: dict[str, Any], folder: str) -> None:
     """Write a result into a folder."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    (Path(folder) / "result.json").write_text(json.dumps(result, indent=1))
+    (Path(folder) / "result.json").write_text(json.dumps(result, indent=1), "utf-8")

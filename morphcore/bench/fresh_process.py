@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from morphcore.bench.setting import Figures
+from morphcore.stopping import heed
 
 
 def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, str] | None = None) -> Figures:
@@ -18,6 +19,7 @@ def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, s
     Raises
     ------
     RuntimeError : the process failed; with the end of what it said.
+    Interrupted : it failed and the surrounding `stoppable` block asks for the end.
     """
     module, _, name = function.partition(":")
     program = (
@@ -31,6 +33,7 @@ def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, s
         check=False,
     )
     if done.returncode:
+        heed()  # Ctrl-C reaches that process too
         raise RuntimeError(f"{function} ended with {done.returncode}: {done.stderr[-2000:]}")
     found: Figures = json.loads(done.stdout.splitlines()[-1])
     return found

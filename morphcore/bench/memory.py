@@ -49,7 +49,7 @@ def generation_memory(samples_dir: str, particles: int, longer: int, more_rows: 
     warm_up()
     samples = [stretched(bench.samples[name], longer, more_rows) for name in RATE_SAMPLES]
     costs(model, benchmark_swarm(model, WARM), sample_cases(model, samples[:1]), "trim")
-    FORGET.write_text("5")  # the peak begins anew
+    FORGET.write_text("5", "ascii")  # the peak begins anew
     before = _status("VmRSS")
     costs(model, benchmark_swarm(model, particles), sample_cases(model, samples), "trim")
     return {"before_mb": before, "beyond_mb": _status("VmHWM") - before}

@@ -22,6 +22,7 @@ from morphcore.bench.start_up import cold_compilation, first_generation
 from morphcore.bench.work_precision import quick_work_precision
 from morphcore.errors import InvalidInput
 from morphcore.simulate.plan import STEP_S
+from morphcore.stopping import heed
 from morphcore.threads import use_threads
 from morphcore.warming import warm_up
 
@@ -88,6 +89,7 @@ def run_benchmarks(
     Raises
     ------
     InvalidInput : the example flights are not there, or there is no such section.
+    Interrupted : the surrounding `stoppable` block says so.
     """
     chosen = (
         tuple(s for s in SECTIONS if not (quick and s in SLOW_SECTIONS)) if sections is None else sections
@@ -116,6 +118,7 @@ def run_benchmarks(
         }
         for name, section in SECTIONS.items():
             if name in chosen:
+                heed()
                 figures |= section(bench)
         return {**figures, "requirements": judged(figures)}
     finally:

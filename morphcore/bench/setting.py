@@ -17,6 +17,7 @@ from morphcore.identify.cost import SampleCase, sample_cases
 from morphcore.models.equivalent import ChainModel
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphcore.stopping import heed
 from morphcore.threads import thread_count
 
 Array = NDArray[np.float64]
@@ -75,6 +76,7 @@ class Bench:
 
     def timed(self, work: Callable[[], object]) -> float:
         """Computing time of some work on this thread, s."""
+        heed()
         begin = self.computing()
         work()
         return self.computing() - begin

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.settings import UnsafeSettings, is_loopback, load_settings
+from app.loopback import is_loopback
+from app.settings import UnsafeSettings, load_settings
 
 EVERYWHERE = "0.0.0.0"  # noqa: S104 - what the tests are about
 
