@@ -23,11 +23,13 @@ UNCERTAINTY: Document = {
         "stiffness_nm_rad.joint_1.torsion": [1.2, 3.4],
         "stiffness_nm_rad.joint_1.lag": [None, None],
         "damping_nms_rad.joint_1.flap": [None, 0.31],
+        "damping_nms_rad.joint_1.lag": [0.002, 45.0],
         "lift_factor": [0.99498, 1.00502],
     },
     "at_bound": ["damping_nms_rad.joint_1.torsion"],
     "correlation": [[1.0]],
-    "unidentifiable": [{"spread": 40.0, "direction": {"damping_nms_rad.joint_1.lag": -0.99, "lag_s": 0.01}}],
+    "undetermined": ["damping_nms_rad.joint_1.lag", "stiffness_nm_rad.joint_1.lag"],
+    "unidentifiable": [],
 }
 WARNINGS: list[Document] = [
     {
@@ -60,13 +62,14 @@ def test_intervals_stand_beside_the_parameters(service: RunningService, page: Pa
 
     assert cells("Share of the span", "link 1") == ["0.500", "± 0.022"]
     assert cells("Stiffness, N m/rad", "joint 1, flap") == ["1.000", "± 0.042"]
-    assert cells("Stiffness, N m/rad", "joint 1, torsion") == ["2.0", "1.2 to 3.4"]
+    assert cells("Stiffness, N m/rad", "joint 1, torsion") == ["2.00", "1.20 to 3.40"]
     assert cells("Damping, N m s/rad", "joint 1, flap") == ["0.1", "at most 0.31"]
+    assert cells("Damping, N m s/rad", "joint 1, edgewise") == ["0.30", "0.002 to 45"]
     assert cells("Aerodynamic corrections", "Lift factor") == ["1.0000", "± 0.0050"]
 
 
 def test_what_the_samples_do_not_determine_is_grey(service: RunningService, page: Page) -> None:
-    """A parameter without interval, or moved by a direction that the samples cannot see, is grey, with the reason."""
+    """A parameter that the samples hardly bound, or do not bound at all, is grey, with the reason."""
     shown(page, service, ended(service, "identify", identify_document(), result(uncertainty=UNCERTAINTY)))
     grey = page.locator("tr.undetermined")
     assert grey.count() == 2
@@ -78,6 +81,13 @@ def test_what_the_samples_do_not_determine_is_grey(service: RunningService, page
         assert row.locator("td").first.evaluate(colour) != known.locator("td").first.evaluate(colour)
     assert "at its bound" in parameter(page, "Damping, N m s/rad", "joint 1, torsion").inner_text()
     assert "At a bound: damping, joint 1, torsion" in page.locator("main").inner_text()
+
+
+def test_a_search_without_a_flying_model_shows_none(service: RunningService, page: Page) -> None:
+    """A search that was stopped before it found a model that flies says so instead of parameters."""
+    lost = {**result(model=None, warnings=WARNINGS), "partial": True}
+    text = shown(page, service, ended(service, "identify", identify_document(), lost))
+    assert "None was found yet that flies the samples." in text
 
 
 def test_warnings_come_first(service: RunningService, page: Page) -> None:
@@ -119,7 +129,7 @@ def test_a_model_that_cannot_fly_has_no_ratio(service: RunningService, page: Pag
 
 
 def test_one_chart_of_the_convergence(service: RunningService, page: Page) -> None:
-    """The chart that grows while the search runs is the one that stays; the plot of the same is a file only."""
+    """The chart that grows while the search runs is the one that stays; the same plot is but a file."""
     job_id = posted(service, "identify", identify_document())
     page.goto(f"{service.url}/#/jobs/{job_id}")
     claim = service.claim(job_id)

@@ -22,7 +22,7 @@ def rows(page: Page, count: int) -> list[str]:
 
 
 def test_filters_narrow_the_list_and_stand_in_the_address(service: RunningService, page: Page) -> None:
-    """Status (several), operation and label narrow the list; a reload keeps them; clearing shows all again."""
+    """Status (several), operation and label narrow the list; a reload keeps them; clearing shows all."""
     posted(service, "identify", identify_document(), "wing B, third fit")
     failed(service, "simulate", simulate_document(), code="diverged", detail="it does")
     ended(service, "simulate", simulate_document(), SIMULATE_RESULT)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 PHONE = {"width": 390, "height": 844}
 LABEL = "measured_flights_of_" + 79 * "x"  # as long as a label can be, and without a place to break
 # the document, and every part that could scroll or hide by itself
-TOO_WIDE = """() => [document.documentElement, ...document.querySelectorAll('main, .card, table, dl, pre, ul')]
+TOO_WIDE = """() => [document.documentElement,
+        ...document.querySelectorAll('main, .card, table, dl, pre, ul')]
     .filter(part => part.scrollWidth > part.clientWidth && part.clientWidth > 0
                     || part.getBoundingClientRect().right > 390)
     .map(part => `${part.tagName}.${part.className} ${part.scrollWidth} > ${part.clientWidth}`)"""

@@ -48,18 +48,19 @@ function roundedTo(width, largest) {
   return (value) => ((Math.round(value / unit) * unit) / 10 ** exponent).toLocaleString("en", digits) + (exponent ? `·${power(exponent)}` : "");
 }
 
-/* A value and its interval [low, high] (null: open on that side) as two texts, rounded to the interval's width. */
+/* A value and its interval [low, high] (null: open on that side) as two texts, rounded to the interval's width: of
+   one that is even to both sides its half. */
 function showMeasured(value, interval) {
   if (!known(value)) return ["–", ""];
   const [low, high] = interval ?? [null, null];
   if (!known(low) && !known(high)) return [show.number(value), ""];
   if (!known(low)) return [show.number(value), `at most ${show.number(high, 2)}`];
   if (!known(high)) return [show.number(value), `at least ${show.number(low, 2)}`];
-  const half = (high - low) / 2;
-  if (half <= 0) return [show.number(value), ""];
-  const largest = Math.max(Math.abs(value), Math.abs(low), Math.abs(high));
-  if (half < 1e-6 * largest) return [show.number(value, 6), `± ${show.number(half, 2)}`];
-  const write = roundedTo(half, largest);
-  const lopsided = Math.abs((low + high) / 2 - value) > 0.1 * half;
-  return [write(value), lopsided ? `${write(low)} to ${write(high)}` : `± ${write(half)}`];
+  const near = Math.min(high - value, value - low), largest = Math.max(Math.abs(value), Math.abs(low), Math.abs(high));
+  if (near <= 1e-6 * largest) return [show.number(value), `${show.number(low)} to ${show.number(high)}`];
+  const write = roundedTo(near, largest);
+  if (Math.abs(high + low - 2 * value) < 0.2 * near) return [write(value), `± ${write((high - low) / 2)}`];
+  const far = (end) => Math.abs(end - value) > 10 * near || Math.abs(end) < 0.1 * near; // so near's digits mean nothing there
+  const [from, to] = [low, high].map((end) => (far(end) ? show.number(end, 2) : write(end)));
+  return [write(value), `${from} to ${to}`];
 }

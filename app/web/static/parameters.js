@@ -14,7 +14,6 @@ const GROUPS = {
   damping_nms_rad: "Damping, N m s/rad",
   aero: "Aerodynamic corrections",
 };
-const UNSEEN_SPREAD = 1; // of a search coordinate (a factor e of a stiffness): the samples say nothing beyond it
 
 /* All parameters in groups: [[group, [{name, title, value}, ...]], ...]; names as in result.uncertainty. */
 function parameterGroups(model) {
@@ -40,33 +39,25 @@ function parameterTitle(name) {
   return name.split(".").map((part) => words[part] ?? (/^\d+$/.test(part) ? `link ${part}` : part.replaceAll("_", " "))).join(", ");
 }
 
-/* Names of the parameters that the samples do not determine: no interval, or large parts of a direction without effect. */
+/* Names of the parameters that the samples do not determine. */
 function undeterminedNames(uncertainty) {
-  const names = new Set();
-  for (const [name, [low, high]] of Object.entries(uncertainty?.interval_95 ?? {})) {
-    if (low === null && high === null) names.add(name);
-  }
-  for (const unseen of uncertainty?.unidentifiable ?? []) {
-    if (typeof unseen === "string") names.add(unseen);
-    for (const [name, part] of Object.entries(unseen.direction ?? {})) {
-      if (unseen.spread === null || Math.abs(part) * unseen.spread > UNSEEN_SPREAD) names.add(name);
-    }
-  }
-  return names;
+  const open = Object.entries(uncertainty?.interval_95 ?? {}).filter(([, [low, high]]) => low === null && high === null);
+  return new Set([...(uncertainty?.undetermined ?? []), ...open.map(([name]) => name)]);
 }
 
 /* Why a parameter has no interval or a doubtful one; null where there is nothing to say. */
 function remark(name, result, undetermined) {
   const searched = result.search?.aero_coefficients;
   if (AERO[name] && searched && !searched.includes(name)) return "kept fixed, not searched";
-  if (undetermined.has(name)) return "not determined: the samples fit about as well with another value";
-  if (result.uncertainty?.at_bound?.includes(name)) return "at its bound: the best value may lie outside";
-  return null;
+  const said = [
+    undetermined.has(name) ? "not determined: the samples fit about as well with another value" : null,
+    result.uncertainty?.at_bound?.includes(name) ? "at its bound: the best value may lie outside" : null,
+  ];
+  return said.filter(Boolean).join("; ") || null;
 }
 
 function parameterRow({ name, title, value }, result, undetermined) {
-  const interval = undetermined.has(name) ? null : result.uncertainty?.interval_95?.[name];
-  const [shown, spread] = showMeasured(value, interval);
+  const [shown, spread] = showMeasured(value, result.uncertainty?.interval_95?.[name]);
   const why = remark(name, result, undetermined);
   const told = [element("span", {}, title), why && element("small", {}, why)].filter(Boolean);
   return element(
@@ -76,8 +67,10 @@ function parameterRow({ name, title, value }, result, undetermined) {
   );
 }
 
-/* The identified model as a table; result: {model, uncertainty, search}, the last two where they are known. */
+/* The identified model as a table; result: {model, uncertainty, search}, the last two where they are known. The model
+   is null where a search was stopped before it had found one that flies. */
 function modelCard(result, title = "Identified model") {
+  if (!result.model) return card(title, {}, element("p", {}, "None was found yet that flies the samples."));
   const undetermined = undeterminedNames(result.uncertainty);
   const measured = Object.keys(result.uncertainty?.interval_95 ?? {}).length > 0;
   const heads = [["", null], ["Value", "number"], [measured ? "95 % interval" : "", "number"]];
