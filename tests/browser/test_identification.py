@@ -50,7 +50,12 @@ def result(**changes: object) -> Document:
 def parameter(page: Page, group: str, title: str) -> Locator:
     """Find the row of a parameter below the heading of its group."""
     body = page.locator("tbody").filter(has=page.get_by_role("rowheader", name=group, exact=True))
-    return body.locator("tr").filter(has=page.locator("span", has_text=re.compile(f"^{title}$")))
+    return body.locator("tr").filter(has=page.get_by_role("rowheader", name=title, exact=True))
+
+
+def remark(row: Locator) -> str:
+    """Give what is said below a parameter."""
+    return row.locator("xpath=following-sibling::tr[1]").inner_text()
 
 
 def test_intervals_stand_beside_the_parameters(service: RunningService, page: Page) -> None:
@@ -75,11 +80,11 @@ def test_what_the_samples_do_not_determine_is_grey(service: RunningService, page
     assert grey.count() == 2
     for group in ("Stiffness, N m/rad", "Damping, N m s/rad"):
         row = parameter(page, group, "joint 1, edgewise")
-        assert "not determined" in row.inner_text()
+        assert "not determined" in remark(row)
         known = parameter(page, group, "joint 1, flap")
         colour = "node => getComputedStyle(node).color"
         assert row.locator("td").first.evaluate(colour) != known.locator("td").first.evaluate(colour)
-    assert "at its bound" in parameter(page, "Damping, N m s/rad", "joint 1, torsion").inner_text()
+    assert "at its bound" in remark(parameter(page, "Damping, N m s/rad", "joint 1, torsion"))
     assert "At a bound: damping, joint 1, torsion" in page.locator("main").inner_text()
 
 

@@ -43,8 +43,14 @@ def wide_identification() -> Document:
         "stiffness_nm_rad": 2 * [3 * [[77618.27780998389, 29410.36461889574, 472500000.000000001]]],
         "damping_nms_rad": 2 * [3 * [[7.000000000000004, 859.2222955622997, 2027.1747171912352]]],
     }
-    name = "wing_1.stiffness_nm_rad.joint_1."
-    intervals = {f"{name}flap": [-1e9, 1e9], f"{name}torsion": [29000.0, 33000.0], f"{name}lag": [None, None]}
+    name, other = "wing_1.stiffness_nm_rad.joint_1.", "wing_2.stiffness_nm_rad.joint_1."
+    intervals = {
+        f"{name}flap": [57000.0, 104000.0],
+        f"{name}torsion": [29000.0, 33000.0],
+        f"{name}lag": [None, None],
+        f"{other}flap": [-1e9, 1e9],
+        f"{other}lag": [None, 4.8e8],
+    }
     doubts = {**UNCERTAINTY, "interval_95": intervals, "at_bound": [f"{name}flap", "lift_factor"]}
     fit = {**RESULT["fit"][0], "sample": "flight_of_" + 50 * "y", "J_identified": 2.5608950869167485e-06}
     return {

@@ -54,6 +54,16 @@ def test_schedules_are_compared(service: RunningService, page: Page) -> None:
     assert page.get_by_role("heading", name="Duration against variation").is_visible()
 
 
+def test_a_search_without_a_schedule_shows_none(service: RunningService, page: Page) -> None:
+    """A search that was stopped before a schedule flew to its end says so, and shows its warnings."""
+    nothing = {name: dict.fromkeys(values) for name, values in OPTIMIZE_RESULT["variation"].items()}
+    warning = {"code": "not_flyable", "message": "nothing has flown", "hint": "fly slower", "pointer": ""}
+    result = {**OPTIMIZE_RESULT, "schedule": None, "variation": nothing, "warnings": [warning]}
+    text = shown(page, service, ended(service, "optimize", optimize_document(), result))
+    assert "None was found yet that flies to its end." in text
+    assert "1 warning" in text
+
+
 def test_the_list_tells_operations_apart(service: RunningService, page: Page) -> None:
     """The list names operation and what was asked for, for jobs that wait too."""
     post(service, "/simulate", {**simulate_document(), "duration_s": 1.25}).raise_for_status()

@@ -56,15 +56,12 @@ function remark(name, result, undetermined) {
   return said.filter(Boolean).join("; ") || null;
 }
 
-function parameterRow({ name, title, value }, result, undetermined) {
+/* The row of a parameter, and one below it where there is something to say. */
+function parameterRows({ name, title, value }, result, undetermined) {
   const [shown, spread] = showMeasured(value, result.uncertainty?.interval_95?.[name]);
-  const why = remark(name, result, undetermined);
-  const told = [element("span", {}, title), why && element("small", {}, why)].filter(Boolean);
-  return element(
-    "tr",
-    { class: undetermined.has(name) ? "undetermined" : null },
-    element("th", { scope: "row" }, ...told), element("td", { class: "number" }, shown), element("td", { class: "number" }, spread),
-  );
+  const why = remark(name, result, undetermined), grey = undetermined.has(name) ? "undetermined" : "";
+  const row = element("tr", { class: grey }, element("th", { scope: "row" }, title), element("td", { class: "number" }, shown), element("td", { class: "number" }, spread));
+  return why ? [row, element("tr", { class: "remark" }, element("td", { colspan: 3 }, why))] : [row];
 }
 
 /* The identified model as a table; result: {model, uncertainty, search}, the last two where they are known. The model
@@ -79,7 +76,7 @@ function modelCard(result, title = "Identified model") {
     "tbody",
     {},
     element("tr", {}, element("th", { class: "group", scope: "rowgroup", colspan: 3 }, group)),
-    ...rows.map((row) => parameterRow(row, result, undetermined)),
+    ...rows.flatMap((row) => parameterRows(row, result, undetermined)),
   ));
   return card(
     title, { help: "parameters" },

@@ -101,15 +101,21 @@ function reductionSentence(result) {
   return element("p", {}, `The optimum varies ${show.number(Math.abs(reduction))} per cent ${reduction < 0 ? "more" : "less"} than the constant rate${where}.`);
 }
 
+/* The knots of a schedule; null stands for a search that was stopped before it had flown one to its end. */
+function knotTable(schedule) {
+  if (!schedule) return element("p", {}, "None was found yet that flies to its end.");
+  const knots = schedule.knot_time_s.map((time, i) => [String(i + 1), show.number(time), show.number(schedule.knot_sweep_rad[i])]);
+  return table(["Knot", "time, s", "sweep, rad"].map(number), knots, { wide: false });
+}
+
 function optimizeCards(result) {
   const rows = SCHEDULES.filter(([name]) => result.variation[name]).map(([name, title]) => [title, ...FLOWN_IN.map((model) => show.cost(result.variation[name][model]))]);
   const titles = ["Schedule", ...FLOWN_IN.map((model) => number(`flown in the ${model} model`))];
   const marked = rows.findIndex(([title]) => title === "optimum");
-  const knots = result.schedule.knot_time_s.map((time, i) => [String(i + 1), show.number(time), show.number(result.schedule.knot_sweep_rad[i])]);
   const notes = (result.notes ?? []).map((note) => element("p", { class: "soft" }, note));
   const cards = [
     card("Attitude variation, rad²", { help: "schedule" }, reductionSentence(result), table(titles, rows, { marked, stack: true }), ...notes),
-    card("Schedule", { help: "schedule" }, table(["Knot", "time, s", "sweep, rad"].map(number), knots, { wide: false }), facts(limitFacts(result))),
+    card("Schedule", { help: "schedule" }, knotTable(result.schedule), facts(limitFacts(result))),
   ];
   if (result.pareto?.length) {
     const front = result.pareto.map((point) => [show.number(point.duration_s), show.cost(point.variation_rad2), show.cost(point.constant_rad2)]);
