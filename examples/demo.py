@@ -1,6 +1,7 @@
-"""The whole way: start the service, post the example flights, watch the job, save and show what comes out.
+"""The whole way: start the service, post the example flights, watch the job, show, judge and save the result.
 
-Run by ``make demo``. Everything it writes is in ``demo-output/``.
+One flight is held out: the model is judged by how well it predicts that one. Run by ``make demo``.
+Everything it writes is in ``demo-output/``.
 """
 
 from __future__ import annotations
@@ -18,33 +19,38 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+from verdict import verdict
+
 from cli.broker import free_port
+from cli.commands.identify import show_model
 from cli.exits import CommandError
-from cli.screen import fit_table, meter, model_table, stdout
+from cli.screen import meter, print_job_error, stdout
 from cli.service import Service
 
 EXAMPLES = Path(__file__).resolve().parent
 OUTPUT = EXAMPLES.parent / "demo-output"
-SAMPLES = ("train_rate_0.2", "train_rate_0.5", "train_rate_0.8")
+SAMPLES = {"train_rate_0.2": "train", "train_rate_0.5": "held_out", "train_rate_0.8": "train"}
 ANGLES = ("phi", "theta", "psi")
 
 
-def sample(name: str) -> dict[str, Any]:
+def sample(name: str, role: str) -> dict[str, Any]:
     """Read a sample flight as it stands in a request (s, rad)."""
     with (EXAMPLES / f"{name}.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     columns = {"time_s": "t", "sweep_left_rad": "sweep_left", "sweep_right_rad": "sweep_right"}
     columns |= {f"{angle}_rad": angle for angle in ANGLES}
     series = {key: [float(row[column]) for row in rows] for key, column in columns.items()}
-    return {"name": name, "role": "train", **series}
+    return {"name": name, "role": role, **series}
 
 
 def request() -> dict[str, Any]:
-    """Ask for an equivalent model with three links per wing that repeats the three example flights."""
+    """Ask for an equivalent model with three links per wing, fitted to two flights and tested on a third."""
     return {
         "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text("utf-8")),
-        "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")),
-        "samples": [sample(name) for name in SAMPLES],
+        # the program that made the examples takes the air for incompressible, at Mach 0.47 as well
+        "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")) | {"mach": 0.0},
+        "samples": [sample(name, role) for name, role in SAMPLES.items()],
         "model": {"links_per_wing": 3},
         "search": {"seed": 1},
     }
@@ -74,6 +80,29 @@ def service() -> Iterator[str]:
         process.communicate()
 
 
+def show_verdict(console: Console, result: dict[str, Any]) -> None:
+    """Print warnings, verdict and what to do next."""
+    for warning in result.get("warnings") or ():
+        console.print(f"Warning: {warning['message']}. {warning['hint']}.", style="yellow", markup=False)
+    use = (
+        "Find a smooth morph with the model: .venv/bin/morphid optimize --aircraft examples/aircraft.json "
+        f"--flight examples/flight.json --parameters {shown(OUTPUT / 'result.json')} "
+        "--final 1.0 --duration 2.0"
+    )
+    judged = verdict(result, use)
+    console.print(f"Verdict: {judged.grade}", style="bold")
+    for reason in judged.reasons:
+        console.print(f"  {reason}", markup=False, soft_wrap=True)
+    console.print("What to do next", style="bold")
+    for step in judged.next_steps:
+        console.print(f"  {step}", markup=False, soft_wrap=True)
+
+
+def shown(path: Path) -> str:
+    """Give a path as it is from where ``make demo`` runs."""
+    return str(path.relative_to(EXAMPLES.parent))
+
+
 def main() -> int:
     """Run the demonstration; 0 when a model was identified."""
     begun = time.monotonic()
@@ -82,28 +111,32 @@ def main() -> int:
     with service() as url, Service(url) as client:
         console.print(f"The service runs at {url} ({time.monotonic() - begun:.1f} s).")
         job = client.submit("identify", request())
-        console.print(f"POST /identify -> 202, job {job['id']}: {', '.join(SAMPLES)}, three links per wing")
+        flights = ", ".join(
+            name + (" (held out)" if role == "held_out" else "") for name, role in SAMPLES.items()
+        )
+        console.print(
+            f"POST /identify -> 202, job {job['id']}: {flights}, three links per wing", soft_wrap=True
+        )
         with meter() as bar:
             for seen in client.watch(job["id"]):
                 bar.show(seen.get("progress"), seen["status"])
                 job = seen
         if job["status"] != "succeeded":
-            console.print(
-                f"The job {job['status']}: {json.dumps(job.get('error'))}", style="red", markup=False
-            )
+            console.print(f"The job {job['status']}.", style="red")
+            print_job_error(job.get("error") or {})
             return 1
         result, files = client.result(job["id"]), client.artifacts(job["id"])
-    console.print(fit_table(result))
-    console.print(model_table(result))
     for name, content in files.items():
         (OUTPUT / name).write_bytes(content)
+    show_model(result)
+    show_verdict(console, result)
     search = result["search"]
     console.print(
         f"{search['flights']:,} flights in {search['wall_s']:.1f} s; "
-        f"{time.monotonic() - begun:.0f} s from start to plots. Saved:"
+        f"{time.monotonic() - begun:.0f} s from start to end. "
+        f"Saved: {len(files)} files (plots, curves, result.json) in {shown(OUTPUT)}/",
+        soft_wrap=True,
     )
-    for name in sorted(files):
-        console.print(f"  {(OUTPUT / name).relative_to(EXAMPLES.parent)}", markup=False)
     return 0
 
 

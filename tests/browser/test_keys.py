@@ -56,15 +56,15 @@ def test_the_page_asks_for_a_key_and_works_with_it(service: RunningService, page
     page.get_by_text("a quarter").first.wait_for(timeout=10_000)
     files = {"picture.svg": PLOT, "table.csv": b"t\n0\n"}
     service.finish(claim, "succeeded", result=SIMULATE_RESULT, artifacts=files)
-    picture = page.locator("img[alt='picture.svg']")
+    picture = page.locator("img[alt='picture']")
     picture.wait_for(timeout=10_000)
-    page.wait_for_function("document.querySelector(\"img[alt='picture.svg']\").naturalWidth > 0")
+    page.wait_for_function("document.querySelector(\"img[alt='picture']\").naturalWidth > 0")
     with page.expect_download() as saved:
         page.get_by_role("link", name="table.csv").click()
     assert saved.value.path().read_bytes() == b"t\n0\n"
 
     page.reload()
-    page.locator("img[alt='picture.svg']").wait_for(timeout=10_000)
+    page.locator("img[alt='picture']").wait_for(timeout=10_000)
     page.get_by_role("button", name="Forget the key").click()
     page.get_by_label("API key").wait_for(timeout=10_000)
     assert page.evaluate("sessionStorage.length") == 0

@@ -2,52 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import pytest
-
-from app.settings import Settings
 from tests.app.calls import post
 from tests.app.request_documents import (
     OPTIMIZE_RESULT,
     SIMULATE_RESULT,
     STUDY_RESULT,
-    Document,
     optimize_document,
     simulate_document,
     study_document,
 )
-from tests.app.running_service import DEAD_BROKER, RunningService, running_service
+from tests.app.running_service import RunningService
+from tests.browser.jobs import ended, shown
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
-
-PLOT = b"<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'/>"
-
-
-@pytest.fixture(scope="module")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """A service whose worker is the test."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('page') / 'service.sqlite3'}"
-    with running_service(Settings(database_url=url, broker_url=DEAD_BROKER, event_poll_s=0.05)) as running:
-        yield running
-
-
-def ended(service: RunningService, operation: str, request: Document, result: Document) -> str:
-    """Post a job, end it with a result and a plot, give its id."""
-    job_id: str = post(service, f"/{operation}", request).raise_for_status().json()["id"]
-    files = {"picture.svg": PLOT, "table.csv": b"t\n0\n"}
-    service.finish(service.claim(job_id), "succeeded", result=result, artifacts=files)
-    return job_id
-
-
-def shown(page: Page, service: RunningService, job_id: str) -> str:
-    """Open a job's view, wait for its result, give its text."""
-    page.goto(f"{service.url}/#/jobs/{job_id}")
-    page.locator("img[src*='picture.svg']").wait_for(timeout=10_000)
-    page.get_by_role("link", name="table.csv").wait_for(timeout=10_000)
-    return page.locator("main").inner_text()
 
 
 def test_a_study_is_a_table_with_a_recommendation(service: RunningService, page: Page) -> None:
@@ -55,7 +25,7 @@ def test_a_study_is_a_table_with_a_recommendation(service: RunningService, page:
     text = shown(page, service, ended(service, "study", study_document(), STUDY_RESULT))
     assert "1, 2, 3 links, hybrid" in text
     assert STUDY_RESULT["recommended"]["reason"] in text
-    assert page.locator("tr.marked td").first.inner_text() == "2"
+    assert page.locator("tr.marked td").first.inner_text() == "2 links"
     assert "Fit with 2 links per wing" in text
     page.get_by_role("link", name="identified model").wait_for()
 
@@ -82,6 +52,16 @@ def test_schedules_are_compared(service: RunningService, page: Page) -> None:
     assert "Largest acceleration, rad/s²\n3\n" in text
     assert "torque" not in text, "nothing is told that is not known"
     assert page.get_by_role("heading", name="Duration against variation").is_visible()
+
+
+def test_a_search_without_a_schedule_shows_none(service: RunningService, page: Page) -> None:
+    """A search that was stopped before a schedule flew to its end says so, and shows its warnings."""
+    nothing = {name: dict.fromkeys(values) for name, values in OPTIMIZE_RESULT["variation"].items()}
+    warning = {"code": "not_flyable", "message": "nothing has flown", "hint": "fly slower", "pointer": ""}
+    result = {**OPTIMIZE_RESULT, "schedule": None, "variation": nothing, "warnings": [warning]}
+    text = shown(page, service, ended(service, "optimize", optimize_document(), result))
+    assert "None was found yet that flies to its end." in text
+    assert "1 warning" in text
 
 
 def test_the_list_tells_operations_apart(service: RunningService, page: Page) -> None:

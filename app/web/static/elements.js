@@ -1,5 +1,5 @@
 "use strict";
-/* Building blocks of the page: elements from data (never from HTML text), numbers and times for people. */
+/* Building blocks of the page: elements from data, never from HTML text. */
 
 function element(name, options = {}, ...children) {
   const node = document.createElement(name);
@@ -19,64 +19,66 @@ function svg(name, attributes = {}, text = "") {
   return node;
 }
 
-const show = {
-  number: (value, digits = 3) => {
-    if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-    const size = Math.abs(value);
-    if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(digits - 1);
-    return value.toLocaleString("en", { maximumSignificantDigits: digits + 1 });
-  },
-  milliradians: (value) => (value === null || value === undefined ? "–" : (value * 1000).toPrecision(3)),
-  milliseconds: (seconds) => (seconds === null || seconds === undefined ? "–" : (seconds * 1000).toPrecision(3)),
-  duration: (seconds) => {
-    if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
-    if (seconds < 60) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-    const minutes = Math.floor(seconds / 60);
-    return minutes < 60 ? `${minutes} min ${Math.round(seconds % 60)} s` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
-  },
-  time: (text) => (text ? new Date(text).toLocaleString() : "–"),
-  bytes: (size) => (size < 1024 ? `${size} B` : `${(size / 1024).toFixed(0)} kB`),
-};
+/* Replace what a container shows; the keyboard's focus stays on the control of the same place. */
+function refill(container, ...children) {
+  const controls = () => [...container.querySelectorAll("a, button, summary")];
+  const focused = controls().indexOf(document.activeElement);
+  container.replaceChildren(...children);
+  if (focused >= 0) controls()[focused]?.focus({ preventScroll: true });
+}
 
 function pill(status) {
   return element("span", { class: `pill ${status}` }, status);
 }
 
 function bar(job) {
-  const fraction = job.status === "succeeded" ? 1 : job.progress?.fraction ?? 0;
+  const percent = Math.round(100 * (job.status === "succeeded" ? 1 : job.progress?.fraction ?? 0));
   const fill = element("div");
-  fill.style.width = `${Math.round(100 * fraction)}%`;
-  return element(
-    "div",
-    { class: `bar ${job.status === "succeeded" ? "done" : ""}`, role: "progressbar", "aria-valuenow": Math.round(100 * fraction), "aria-valuemin": 0, "aria-valuemax": 100 },
-    fill,
+  fill.style.width = `${percent}%`;
+  const options = { role: "progressbar", "aria-label": "progress", "aria-valuenow": percent, "aria-valuemin": 0, "aria-valuemax": 100 };
+  return element("div", { class: `bar ${job.status === "succeeded" ? "done" : ""}`, ...options }, fill);
+}
+
+/* A table of `titles` ("text", or {text, number: true}). On a narrow screen one with `stack` shows each row as a
+   list of "title value" lines; roles are spelled out because such a layout would take them away.
+
+   options: marked: the number of the row that stands out; stack; wide: false keeps it as narrow as its content */
+function table(titles, rows, { marked = -1, stack = false, wide = true } = {}) {
+  const kind = (title) => (title.number ? "number" : null);
+  const heads = titles.map((title) => element("th", { class: kind(title), role: "columnheader", scope: "col" }, title.text ?? title));
+  const body = element("tbody", { role: "rowgroup" }, ...rows.map((cells, row) => tableRow(titles, cells, row === marked ? { class: "marked" } : {})));
+  const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads));
+  return element("table", { class: [stack && "stack", !wide && "narrow"].filter(Boolean).join(" "), role: "table" }, head, body);
+}
+
+function tableRow(titles, cells, options = {}) {
+  const cell = (content, i) => element("td", { class: titles[i].number ? "number" : titles[i].long ? "long" : null, role: "cell", "data-title": titles[i].text ?? titles[i] }, content);
+  return element("tr", { role: "row", ...options }, ...cells.map(cell));
+}
+
+function facts(entries) {
+  return element("dl", { class: "facts" }, ...entries.map(([title, value]) => element("div", {}, element("dt", {}, title), element("dd", {}, value))));
+}
+
+/* A part of the page with a heading, and a link to what its numbers mean where there is such a place in the help. */
+function card(title, { help = null, kind = "" }, ...content) {
+  const link = help && element("a", { class: "help", href: `#/help/${help}`, "aria-label": `Help: ${title}` }, "What is this?");
+  return element("section", { class: `card ${kind}` }, element("div", { class: "row" }, element("h2", {}, title), link), ...content);
+}
+
+/* What went wrong, where, and what to do: of a refused call (a problem document) or of a failed job. */
+function problemCard(error) {
+  const problem = error.problem ?? { detail: error.message };
+  return card(
+    problem.title ?? "Something went wrong",
+    { kind: "problem" },
+    element("p", {}, problem.detail ?? ""),
+    problem.hint ? element("p", {}, element("b", {}, "What to do: "), problem.hint) : null,
+    problem.pointer ? pointerLine(problem.pointer) : null,
   );
 }
 
-/* A table; the row of the number `marked` stands out. */
-function table(titles, rows, marked = -1) {
-  const heads = titles.map((title) => element("th", { class: title.number ? "number" : "" }, title.text ?? title));
-  const body = rows.map((cells, row) =>
-    element("tr", { class: row === marked ? "marked" : null }, ...cells.map((cell, i) => element("td", { class: titles[i].number ? "number" : "" }, cell))),
-  );
-  return element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...body));
-}
-
-/* Best cost over generations, logarithmic: [[generation, cost], ...] */
-function convergence(points) {
-  const usable = points.filter(([, cost]) => cost > 0);
-  const plot = svg("svg", { class: "live", viewBox: "0 0 600 200", role: "img", "aria-label": "best cost over generations" });
-  if (usable.length < 2) return plot;
-  const logs = usable.map(([, cost]) => Math.log10(cost));
-  const low = Math.floor(Math.min(...logs)), high = Math.max(Math.ceil(Math.max(...logs)), low + 1);
-  const first = usable[0][0], span = Math.max(usable.at(-1)[0] - first, 1);
-  const x = (generation) => 44 + (546 * (generation - first)) / span;
-  const y = (log) => 10 + (170 * (high - log)) / (high - low);
-  for (let decade = low; decade <= high; decade += Math.ceil((high - low) / 6)) {
-    plot.append(svg("line", { class: "grid", x1: 44, x2: 590, y1: y(decade), y2: y(decade) }));
-    plot.append(svg("text", { x: 4, y: y(decade) + 4 }, `1e${decade}`));
-  }
-  plot.append(svg("text", { x: 44, y: 197 }, `generation ${first}`), svg("text", { x: 590, y: 197, "text-anchor": "end" }, `${first + span}`));
-  plot.append(svg("polyline", { class: "curve", points: usable.map(([g], i) => `${x(g).toFixed(1)},${y(logs[i]).toFixed(1)}`).join(" ") }));
-  return plot;
+/* Where in the request something stands: a JSON pointer. */
+function pointerLine(pointer) {
+  return element("p", { class: "soft" }, "In the request: ", element("code", {}, pointer));
 }

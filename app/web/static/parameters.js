@@ -1,0 +1,91 @@
+"use strict";
+/* The parameters of an identified model with what the samples say about them. */
+
+const AXES = ["flap", "torsion", "edgewise"];
+const AERO = {
+  lift_factor: "Lift factor",
+  centre_shift_m: "Aerodynamic-centre offset, m",
+  profile_drag: "Profile drag coefficient",
+  lag_s: "Circulation lag, s",
+};
+const GROUPS = {
+  division: "Share of the span",
+  stiffness_nm_rad: "Stiffness, N m/rad",
+  damping_nms_rad: "Damping, N m s/rad",
+  aero: "Aerodynamic corrections",
+};
+
+/* All parameters in groups: [[group, [{name, title, value}, ...]], ...]; names as in result.uncertainty. */
+function parameterGroups(model) {
+  const own = Array.isArray(model.division?.[0]); // each wing has parameters of its own
+  const perWing = (values) => (own ? values : [values]);
+  const mark = (wing) => (own ? [`wing_${wing + 1}.`, `wing ${wing + 1}, `] : ["", ""]);
+  const shares = perWing(model.division).flatMap((parts, wing) => parts.map((value, i) => ({
+    name: `${mark(wing)[0]}division.${i + 1}`, title: `${mark(wing)[1]}link ${i + 1}`, value,
+  })));
+  const joints = (field) => perWing(model[field] ?? []).flatMap((rows, wing) => (rows ?? []).flatMap((row, joint) => [row].flat().map((value, i) => {
+    const axis = AXES[i] === "edgewise" ? "lag" : AXES[i]; // its name in documents
+    return { name: `${mark(wing)[0]}${field}.joint_${joint + 1}.${axis}`, title: `${mark(wing)[1]}joint ${joint + 1}, ${AXES[i]}`, value };
+  })));
+  const aero = Object.entries(model.aero ?? {}).map(([name, value]) => ({ name, title: AERO[name] ?? name.replaceAll("_", " "), value }));
+  const groups = { division: shares, stiffness_nm_rad: joints("stiffness_nm_rad"), damping_nms_rad: joints("damping_nms_rad"), aero };
+  return Object.entries(groups).filter(([, rows]) => rows.length).map(([group, rows]) => [GROUPS[group], rows]);
+}
+
+/* A parameter's name for people: "stiffness_nm_rad.joint_1.lag" is "stiffness, joint 1, edgewise". */
+function parameterTitle(name) {
+  if (AERO[name]) return AERO[name].replace(/, [ms]$/, "").toLowerCase();
+  const words = { stiffness_nm_rad: "stiffness", damping_nms_rad: "damping", lag: "edgewise", division: "share of the span", log_ratio: "share of the span" };
+  return name.split(".").map((part) => words[part] ?? (/^\d+$/.test(part) ? `link ${part}` : part.replaceAll("_", " "))).join(", ");
+}
+
+/* Names of the parameters that the samples do not determine. */
+function undeterminedNames(uncertainty) {
+  const open = Object.entries(uncertainty?.interval_95 ?? {}).filter(([, [low, high]]) => low === null && high === null);
+  return new Set([...(uncertainty?.undetermined ?? []), ...open.map(([name]) => name)]);
+}
+
+/* Why a parameter has no interval or a doubtful one; null where there is nothing to say. */
+function remark(name, result, undetermined) {
+  const searched = result.search?.aero_coefficients;
+  if (AERO[name] && searched && !searched.includes(name)) return "kept fixed, not searched";
+  const said = [
+    undetermined.has(name) ? "not determined: the samples fit about as well with another value" : null,
+    result.uncertainty?.at_bound?.includes(name) ? "at its bound: the best value may lie outside" : null,
+  ];
+  return said.filter(Boolean).join("; ") || null;
+}
+
+/* The row of a parameter, and one below it where there is something to say. */
+function parameterRows({ name, title, value }, result, undetermined) {
+  const [shown, spread] = showMeasured(value, result.uncertainty?.interval_95?.[name]);
+  const why = remark(name, result, undetermined), grey = undetermined.has(name) ? "undetermined" : "";
+  const row = element("tr", { class: grey }, element("th", { scope: "row" }, title), element("td", { class: "number" }, shown), element("td", { class: "number" }, spread));
+  return why ? [row, element("tr", { class: "remark" }, element("td", { colspan: 3 }, why))] : [row];
+}
+
+/* The identified model as a table; result: {model, uncertainty, search}, the last two where they are known. The model
+   is null where a search was stopped before it had found one that flies. */
+function modelCard(result, title = "Identified model") {
+  if (!result.model) return card(title, {}, element("p", {}, "None was found yet that flies the samples."));
+  const undetermined = undeterminedNames(result.uncertainty);
+  const measured = Object.keys(result.uncertainty?.interval_95 ?? {}).length > 0;
+  const heads = [["", null], ["Value", "number"], [measured ? "95 % interval" : "", "number"]];
+  const head = element("thead", {}, element("tr", {}, ...heads.map(([text, kind]) => (text ? element("th", { scope: "col", class: kind }, text) : element("td")))));
+  const bodies = parameterGroups(result.model).map(([group, rows]) => element(
+    "tbody",
+    {},
+    element("tr", {}, element("th", { class: "group", scope: "rowgroup", colspan: 3 }, group)),
+    ...rows.flatMap((row) => parameterRows(row, result, undetermined)),
+  ));
+  return card(
+    title, { help: "parameters" },
+    element("p", { class: "soft" }, `${count(result.model.links_per_wing, "link")} per wing; joints and links are counted from the root.`),
+    namesLine("At a bound", result.uncertainty?.at_bound),
+    element("table", { class: "parameters" }, head, ...bodies),
+  );
+}
+
+function namesLine(title, names) {
+  return names?.length ? element("p", {}, element("b", {}, `${title}: `), names.map(parameterTitle).join("; ")) : null;
+}
