@@ -49,7 +49,7 @@ class Surface:
 
     Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
     +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` say how far the elastic axis and
-    the line of centres of mass lie aft of mid-chord (negative: forward of it), as documents have them; whoever
+    the line of centres of mass lie aft of mid-chord (negative: forward of it), as documents have them; who
     computes in W uses ``elastic_axis_x_m`` and ``mass_axis_x_m``.
     """
 
