@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each flight
 SHOWN_NAMES = 4  # of parameters in a sentence
+UNSEEN_HINT = (
+    "the samples do not determine it, and its value means little: take fewer links, or samples that show more"
+)
 UNLIKE_WINGS = 0.02  # relative difference of stiffness or mass beyond which wings are not alike
 
 
@@ -59,9 +62,16 @@ def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: ModelSet
 
 
 def fit_warnings(
-    run: Identification, best: ParameterBatch, fits: Sequence[SampleFit], at_bound: Mapping[str, str]
+    run: Identification,
+    best: ParameterBatch,
+    fits: Sequence[SampleFit],
+    at_bound: Mapping[str, str],
+    undetermined: Collection[str],
 ) -> tuple[ResultWarning, ...]:
-    """Warnings of the best model (one parameter set) of an identification."""
+    """Warnings of the best model (one parameter set) of an identification.
+
+    at_bound : parameters that ended at a bound, and which. undetermined : those that the samples do not see.
+    """
     aircraft = run.model.aircraft
     found: list[ResultWarning] = []
     lost = [fit for fit in fits if fit.case.sample.role == "train" and fit.ending("identified")]
@@ -69,7 +79,7 @@ def fit_warnings(
         error = not_flyable(run.model, lost, run.settings)
         found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
     found += _of_samples(fits)
-    found += _of_bounds(at_bound)
+    found += _of_bounds(at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
     found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft.surfaces) for fit in fits]))
     if not run.settings.separate_wings:
@@ -96,28 +106,29 @@ def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
         )
 
 
-def _of_bounds(at_bound: Mapping[str, str]) -> Iterable[ResultWarning]:
-    """One warning for each kind of parameter and end of its range."""
-    kinds: dict[tuple[str, str], list[str]] = {}
+def _of_bounds(at_bound: Mapping[str, str], undetermined: Collection[str]) -> Iterable[ResultWarning]:
+    """One warning for each kind of parameter and end of its range, those apart that the samples do not see."""
+    kinds: dict[tuple[str, str, bool], list[str]] = {}
     for name, end in at_bound.items():
         kind = next(part for part in name.split(".") if not part.startswith("wing_"))
-        kinds.setdefault((kind, end), []).append(name)
-    for (kind, end), names in kinds.items():
+        kinds.setdefault((kind, end, name in undetermined), []).append(name)
+    for (kind, end, unseen), names in kinds.items():
         shown = ", ".join(names[:SHOWN_NAMES])
         more = f" and {len(names) - SHOWN_NAMES} more" if len(names) > SHOWN_NAMES else ""
         yield ResultWarning(
             "at_bound",
             f"{shown}{more} ended at the {end} bound of the search",
-            "the best value may lie beyond: "
-            + (
-                "try another number of links"
-                if kind == "division"
-                else "no drag is less than none: something else that the model lacks may be at work"
-                if (kind, end) == ("profile_drag", "lower")
-                else f"widen model.bounds.{kind}, or take fewer links where the samples do not determine it"
-            ),
+            UNSEEN_HINT if unseen else _bound_hint(kind, end),
             f"/model/bounds/{kind}",
         )
+
+
+def _bound_hint(kind: str, end: str) -> str:
+    if kind == "division":
+        return "the best value may lie beyond: try another number of links"
+    if (kind, end) == ("profile_drag", "lower"):
+        return "no drag is less than none: the samples may show something that the model lacks"
+    return f"the best value may lie beyond: widen model.bounds.{kind}"
 
 
 def _of_wings(surfaces: Sequence[Surface]) -> Iterable[ResultWarning]:

@@ -130,7 +130,9 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "flight_duration_s": run.samples[longest].duration_s,
         },
         settings=replace(run.settings, step_s=run.step_s, aero_coefficients=space.free_aero),
-        warnings=fit_warnings(run, best, fits, at_bound),
+        warnings=fit_warnings(
+            run, best, fits, at_bound, certainty.undetermined if certainty is not None else ()
+        ),
         at_bound=tuple(at_bound),
     )
 
