@@ -19,7 +19,7 @@ from cli.exits import CommandError, Exit
 from cli.files import STANDARD_OUTPUT, require_file, save_files, write_json
 from cli.interrupt import first_interrupt
 from cli.request import Document, Request
-from cli.screen import Meter, exit_for, meter, print_job_error, print_json, stderr
+from cli.screen import Meter, exit_for, meter, print_job_error, print_json, print_warnings, stderr
 from cli.service import Service
 
 
@@ -147,6 +147,7 @@ def hand_over(
                 write_json(answer.result, json_out)
                 wrote(json_out)
             show(answer.result)
+        print_warnings(answer.result)
     if plots is not None:
         for path in save_files(answer.files, plots):
             wrote(path)

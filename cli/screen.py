@@ -109,6 +109,15 @@ def print_job_error(error: Document, given_by: str = "") -> None:
         console.print(f"       given by {given_by}", markup=False, soft_wrap=True)
 
 
+def print_warnings(result: Document) -> None:
+    """Print what a result is not good for, with what to do about it."""
+    for warning in result.get("warnings") or ():
+        where = f"{warning['pointer']}: " if warning.get("pointer") else ""
+        hint = f" ({warning['hint']})" if warning.get("hint") else ""
+        line = f"warning {warning.get('code', '')}: {where}{warning.get('message', '')}{hint}"
+        stderr().print(line, style="yellow", markup=False, soft_wrap=True)
+
+
 class Meter:
     """A progress bar fed with a job's progress documents; where there is no terminal, a line now and then."""
 
@@ -186,26 +195,6 @@ def fit_table(result: Document) -> Table:
             "" if ratio is None else f"{ratio:.1e}",
             *("" if rms[angle] is None else f"{1e3 * rms[angle]:.2f}" for angle in ("phi", "theta", "psi")),
         )
-    return table
-
-
-def model_table(result: Document) -> Table:
-    """Show the identified joints, root to tip: stiffness (N m/rad) and damping (N m s/rad)."""
-    model = result["model"]
-    corrections = ", ".join(f"{name} {short(value)}" for name, value in model["aero"].items())
-    table = Table(
-        title=f"Equivalent model, {model['links_per_wing']} links per wing",
-        caption=corrections,
-        box=SIMPLE_HEAD,
-    )
-    table.add_column("joint")
-    for name in ("k flap", "k torsion", "k lag", "damping"):
-        table.add_column(name, justify="right")
-    damping = model["damping_nms_rad"]
-    for joint, stiffness in enumerate(model["stiffness_nm_rad"]):
-        own = damping[joint] if joint < len(damping) else damping[-1] if damping else None
-        shown = " ".join(short(value) for value in own) if isinstance(own, Sequence) else short(own)
-        table.add_row(str(joint + 1), *(short(value) for value in stiffness), shown)
     return table
 
 

@@ -35,7 +35,13 @@ class InvalidInput(MorphError):
     code = "invalid_input"
 
 
-class TrimNotFound(MorphError):
+class NotFlyable(MorphError):
+    """There is no answer that flies: the best that was found diverges, or has no trim."""
+
+    code = "not_flyable"
+
+
+class TrimNotFound(NotFlyable):
     """Newton's iteration found no steady level flight.
 
     Parameters
@@ -56,7 +62,7 @@ class TrimNotFound(MorphError):
         self.iterations = iterations
 
 
-class FlightDiverged(MorphError):
+class FlightDiverged(NotFlyable):
     """The integration left the domain in which the model means anything.
 
     Parameters

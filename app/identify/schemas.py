@@ -15,6 +15,7 @@ from app.schemas.lattice import Lattice, Start, StepS
 from app.schemas.parameters import MAX_LINKS
 from app.schemas.samples import EXAMPLE_SAMPLE, Sample
 from app.schemas.search import WEEK_S, SwarmSearch, WarmStart
+from app.schemas.warnings import Warnings
 
 MAX_SAMPLES = 64
 
@@ -202,14 +203,48 @@ class SearchReport(BaseModel):
     history: list[dict[str, Any]]
 
 
+Interval = Annotated[list[float | None], Field(min_length=2, max_length=2)]
+
+
+class Uncertainty(BaseModel):
+    """How well the samples determine the parameters.
+
+    Names are `division.1`, `stiffness_nm_rad.joint_1.flap`, `lag_s`, ...; where wings are separate, `wing_1.`
+    stands before them.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    method: str | None = Field(
+        default=None, description="`white`: the residuals are taken for independent and of one variance."
+    )
+    standard_error: dict[str, float | None] = Field(description="SI units; null where it is not finite.")
+    interval_95: dict[str, Interval] = Field(
+        default={},
+        description="[low, high] of each parameter that was searched, SI units; null on a side where the "
+        "samples do not bound it within the range of the search. Empty in a partial result.",
+    )
+    undetermined: list[str] = Field(
+        default=[], description="Parameters that the samples leave open by a factor e or more."
+    )
+    at_bound: list[str] = Field(default=[], description="Parameters that ended at a bound of the search.")
+    correlation: list[list[float]] = Field(description="Of the search coordinates.")
+    unidentifiable: list[Any] = Field(
+        description="Combinations of search coordinates that the samples cannot see."
+    )
+
+
 class IdentifyResult(BaseModel):
     """Result of an identification."""
 
     model_config = ConfigDict(extra="allow")
 
-    model: IdentifiedParameters
+    model: IdentifiedParameters | None = Field(
+        description="null in a partial result whose best model never flew the samples to fit."
+    )
     fit: list[SampleFit]
     search: SearchReport
-    uncertainty: dict[str, Any] | None = None
+    uncertainty: Uncertainty | None = None
+    warnings: Warnings = []
     cost: dict[str, Any] | None = None
     partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")

@@ -41,7 +41,7 @@ class JobError(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     code: str = Field(
-        description="Stable, for programs.", examples=["worker_lost", "diverged", "invalid_input"]
+        description="Stable, for programs.", examples=["not_flyable", "worker_lost", "invalid_input"]
     )
     detail: str
     pointer: str = ""

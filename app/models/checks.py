@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.errors import Fault
+from app.models.left_models import has_flown
 from app.schemas.parameters import AXES, KnownModel, Parameters, WholeResult
 
 SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
@@ -24,6 +25,15 @@ def known_model_faults(model: KnownModel, pointer: str = "/model") -> list[Fault
             )
         ]
     if isinstance(model.parameters, WholeResult):
+        if not has_flown({"model": model.parameters.model, "fit": model.parameters.fit}):
+            return [
+                Fault(
+                    "never_flown",
+                    "The result holds no model that flies the samples it was fitted to.",
+                    f"{pointer}/parameters/model",
+                    "Its warnings say why; give the result of an identification that succeeded.",
+                )
+            ]
         return list(_parameters_faults(model.parameters.model, f"{pointer}/parameters/model"))
     if model.parameters is not None:
         return list(_parameters_faults(model.parameters, f"{pointer}/parameters"))

@@ -1,4 +1,7 @@
-"""Which identified model a finished job leaves: that of an identification, the recommended one of a study."""
+"""Which identified model a finished job leaves: that of an identification, the recommended one of a study.
+
+A model that does not fly the samples it was fitted to is none.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,16 @@ def left_model(operation: str, result: Document) -> Document | None:
     None for results that hold none.
     """
     find = LEFT_MODELS.get(operation)
-    return None if find is None else find(result)
+    found = None if find is None else find(result)
+    return found if found is not None and has_flown(found) else None
+
+
+def has_flown(identified: Document) -> bool:
+    """Whether there is a model, and it flies all samples to fit: where it does not, J is null."""
+    fits = identified.get("fit")
+    rows = [row for row in fits if isinstance(row, dict)] if isinstance(fits, list) else []
+    lost = any(row.get("role") == "train" and row.get("J_identified", 0.0) is None for row in rows)
+    return identified.get("model") is not None and not lost
 
 
 def _identified(result: Document) -> Document | None:

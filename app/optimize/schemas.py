@@ -14,6 +14,7 @@ from app.schemas.flight import EXAMPLE_FLIGHT, Flight
 from app.schemas.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from app.schemas.parameters import EXAMPLE_PARAMETERS, KnownModel
 from app.schemas.search import WEEK_S, SwarmSearch
+from app.schemas.warnings import Warnings
 from app.simulate.schemas import MAX_ELEMENTS
 
 LONGEST_MORPH_S = 100.0
@@ -183,7 +184,9 @@ class OptimizeResult(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
-    schedule: FoundSchedule
+    schedule: FoundSchedule | None = Field(
+        description="null in a partial result whose best schedule never flew to its end."
+    )
     limits: KeptLimits
     variation: Variations
     reduction_percent: float | None = Field(
@@ -191,4 +194,5 @@ class OptimizeResult(BaseModel):
         "it, else in the equivalent one."
     )
     search: dict[str, Any]
+    warnings: Warnings = []
     partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")

@@ -120,10 +120,11 @@ class Surface(Strict):
     material: Material
     section: Section | None = None
     elastic_axis_offset_m: Annotated[float, Field(ge=-50.0, le=50.0)] = Field(
-        default=0.0, description="Elastic axis aft of mid-chord."
+        default=0.0, description="Elastic axis aft of mid-chord, m; negative: forward of it."
     )
     mass_axis_offset_m: Annotated[float, Field(ge=-50.0, le=50.0)] = Field(
-        default=0.0, description="Centre of mass aft of mid-chord."
+        default=0.0,
+        description="Line of the sections' centres of mass aft of mid-chord, m; negative: forward of it.",
     )
     profile_drag: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
     hinge: Hinge | None = None

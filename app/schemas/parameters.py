@@ -71,6 +71,7 @@ class WholeResult(Strict):
     search: Unread = None
     cost: Unread = None
     partial: Unread = None
+    warnings: Unread = None
 
 
 def _form(value: Any) -> str:

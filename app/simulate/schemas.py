@@ -15,6 +15,7 @@ from app.schemas.lattice import CHOSEN, FlightStepS, Lattice, Start
 from app.schemas.parameters import KnownModel
 from app.schemas.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
 from app.schemas.search import MAX_SEED
+from app.schemas.warnings import Warnings
 
 MAX_ELEMENTS = 100
 
@@ -173,4 +174,5 @@ class SimulateResult(BaseModel):
     trim: TrimState
     trajectory: SimulatedTrajectory
     summary: FlightSummary
+    warnings: Warnings = []
     cost: dict[str, Any]

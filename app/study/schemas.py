@@ -17,6 +17,7 @@ from app.identify.schemas import (
 )
 from app.jobs.schemas import Validation
 from app.schemas.parameters import MAX_LINKS
+from app.schemas.warnings import Warnings
 
 Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 
@@ -68,7 +69,10 @@ class StudyRow(BaseModel):
     identify_s: float
     flights: int
     fit: list[SampleFit]
-    model: IdentifiedParameters
+    model: IdentifiedParameters | None = Field(
+        description="null where no model of this size flew the samples to fit."
+    )
+    warnings: Warnings = []
 
 
 class Recommendation(BaseModel):
@@ -97,4 +101,7 @@ class StudyResult(BaseModel):
     rows: list[StudyRow]
     recommended: Recommendation
     search: StudyReport
+    warnings: Warnings = Field(
+        default=[], description="Of the recommended model; without any, of the first row."
+    )
     partial: bool = Field(default=False, description="The rows so far of a job that did not run to its end.")

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from cli.commands import options
 from cli.files import require_place
-from cli.screen import fit_table, model_table, reports_errors, stdout
+from cli.model_table import at_bound_line, model_table
+from cli.screen import fit_table, reports_errors, stdout
 
 
 @reports_errors
@@ -56,4 +57,10 @@ def identify(
 def show_model(result: Mapping[str, Any]) -> None:
     """Print what came out, for people."""
     stdout().print(fit_table(result))
+    if result.get("model") is None:
+        stdout().print("No model: nothing that was tried has flown the samples to fit.")
+        return
     stdout().print(model_table(result))
+    line = at_bound_line(result)
+    if line:
+        stdout().print(line, markup=False, soft_wrap=True)

@@ -134,7 +134,7 @@ def rerun_job(
         ),
     ] = None,
     watch: Annotated[bool, typer.Option("--watch", help="Follow the new job to its end.")] = False,
-    url: options.Url = options.DEFAULT_URL,
+    url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:

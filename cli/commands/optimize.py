@@ -145,7 +145,7 @@ def optimize(
     request.put("/verify", verify, "--verify")
     request.put("/flexible/elements", elements, "--elements")
     answer = run(request, url, api_key)
-    if out is not None and answer.result is not None:
+    if out is not None and answer.result is not None and answer.result["schedule"] is not None:
         _write_schedule(answer.result, out)
     hand_over(answer, show_schedule, json_out=json_out, plots=plots)
 
@@ -186,7 +186,10 @@ def show_schedule(result: Mapping[str, Any]) -> None:
     stdout().print(variation_table(result))
     if result.get("pareto"):
         stdout().print(front_table(result["pareto"]))
-    stdout().print(knot_table(result["schedule"]))
+    if result["schedule"] is None:
+        stdout().print("No schedule: nothing that was tried has flown to its end.")
+    else:
+        stdout().print(knot_table(result["schedule"]))
     for note in result.get("notes", ()):
         stdout().print(note, markup=False)
 

@@ -154,7 +154,7 @@ def _boundary(lattice: AircraftLattice) -> Array:
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
     ):
-        x = part.control_points_W[..., 0] - surface.elastic_axis_offset_m
+        x = part.control_points_W[..., 0] - surface.elastic_axis_x_m
         for i in range(part.chordwise):
             for j in range(part.spanwise):
                 out[ring, 2 * (strip0 + j)] = 1.0
@@ -183,7 +183,7 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
         side = downwash[side0 : side0 + side_count].reshape(part.chordwise, part.spanwise + 1, inputs)
         ring, side0 = ring + count, side0 + side_count
 
-        corners = part.ring_corners_W - np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+        corners = part.ring_corners_W - np.array([surface.elastic_axis_x_m, 0.0, 0.0])
         width = np.diff(part.strip_edges_m)
         edge_x = corners[..., 0]
         middle_x = 0.5 * (edge_x[:, 1:] + edge_x[:, :-1])

@@ -49,8 +49,9 @@ class Surface(Shown):
     """A flat lifting surface: straight mid-chord line along its own y, linear taper.
 
     Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
-    +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the x (positive forward) of
-    the elastic axis and of the line of centres of mass, from mid-chord.
+    +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` say how far the elastic axis and
+    the line of centres of mass lie aft of mid-chord (negative: forward of it), as documents have them; who
+    computes in W uses ``elastic_axis_x_m`` and ``mass_axis_x_m``.
     """
 
     name: str
@@ -72,6 +73,16 @@ class Surface(Shown):
     def span_sign(self) -> float:
         """+1 for a right surface (spans +y), -1 for a left one."""
         return 1.0 if self.side == "right" else -1.0
+
+    @property
+    def elastic_axis_x_m(self) -> float:
+        """The x in W (forward positive) of the elastic axis: its offset is counted aft."""
+        return -self.elastic_axis_offset_m
+
+    @property
+    def mass_axis_x_m(self) -> float:
+        """The x in W (forward positive) of the line of centres of mass: its offset is counted aft."""
+        return -self.mass_axis_offset_m
 
     @property
     def rotation_sign(self) -> float:

@@ -50,7 +50,7 @@ def identify(
 
     Raises
     ------
-    InvalidInput : the samples or settings make no sense. TrimNotFound : the result cannot be flown.
+    InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
     run = Identification(
         aircraft,

@@ -160,13 +160,25 @@ class Identification:
             yield self._step(state)
 
     def result(self, checkpoint: bytes) -> IdentifyResult:
-        """The identified model at any step, with its fit, uncertainty and cost."""
+        """The identified model at any step, with its fit, uncertainty and cost.
+
+        Raises
+        ------
+        NotFlyable : the best model does not fly the samples that it was fitted to.
+        """
+        return self.judged(checkpoint).require_flown()
+
+    def judged(self, checkpoint: bytes) -> IdentifyResult:
+        """The same whether its model flies or not; one that does not has no model in its document."""
         say("judging what was found")
         with one_blas_thread():
             return identify_result(self, self._state(checkpoint))
 
     def best_so_far(self, checkpoint: bytes) -> IdentifyResult:
-        """Give the result without uncertainty and timing, fast: someone waits for a cancelled search."""
+        """Give the result without uncertainty and timing, fast: someone waits for a cancelled search.
+
+        Where nothing has flown yet it holds no model, and a warning says so.
+        """
         with one_blas_thread():
             return identify_result(self, self._state(checkpoint), judged=False)
 

@@ -33,6 +33,7 @@ DRAG_RANGE = (0.0, 0.08)
 DRAG_UNIT = 0.01
 BOUND_NAMES = ("stiffness_nm_rad", "damping_nms_rad", "division", *AERO_COEFFICIENTS)
 LARGEST_DECADES = 12.0
+BOUND_TOLERANCE = 1e-3  # of the box's width; half a per cent of a stiffness
 WARM_START = "/search/warm_start"  # where a request says what to begin from
 
 
@@ -152,6 +153,39 @@ class SearchSpace:
             *(f"{wing}damping_nms_rad.{joint}" for wing in wings for joint in joints),
             *AERO_COEFFICIENTS,
         )
+
+    @property
+    def searched(self) -> NDArray[np.bool_]:
+        """(m,) which named parameters are searched; the others are fixed."""
+        joints = self.links > 1
+        own = [joints] * (len(self.parameter_names) - len(AERO_COEFFICIENTS))
+        return np.array([*own, *(name in self.free_aero for name in AERO_COEFFICIENTS)])
+
+    @property
+    def parameter_limits(self) -> Array:
+        """(m, 2) least and greatest value of each named parameter within the box, SI units."""
+        box = self.flatten(self.decode(np.stack([self.lower, self.upper]))).T
+        n, w = self.links, self.wing_sets
+        ratios = [bound[: w * (n - 1)].reshape(w, n - 1) for bound in (self.lower, self.upper)]
+        # the last link's ratio to itself is one
+        low, high = (np.exp(np.concatenate([bound, np.zeros((w, 1))], axis=1)) for bound in ratios)
+        least = low / (low + high.sum(axis=1, keepdims=True) - high)
+        most = high / (high + low.sum(axis=1, keepdims=True) - low)
+        box[: w * n] = np.stack([least.ravel(), most.ravel()], axis=1)
+        return np.asarray(box)
+
+    def at_bound(self, x: Array) -> dict[str, str]:
+        """Named parameters whose search coordinate in x (d,) lies at its bound, and which: "lower", "upper".
+
+        A link's length is searched as its ratio to the last link's, and stands for that ratio here.
+        """
+        near = BOUND_TOLERANCE * (self.upper - self.lower)
+        at = np.select([x <= self.lower + near, x >= self.upper - near], ["lower", "upper"], "")
+        return {
+            name.replace("log_ratio", "division"): str(end)
+            for name, end in zip(self.names, at, strict=True)
+            if end
+        }
 
 
 _FIELDS = {

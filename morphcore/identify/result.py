@@ -9,81 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.frames import wrap_angle
 from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
+from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.polish import differences
+from morphcore.identify.sample_fit import ANGLES, SampleFit
 from morphcore.identify.settings import ModelSettings
 from morphcore.identify.state import SearchState
-from morphcore.identify.uncertainty import Uncertainty, uncertainty
+from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.shown import Shown, Summary
+from morphcore.validity import ResultWarning, documents
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
 
 Array = NDArray[np.float64]
-
-ANGLES = ("phi", "theta", "psi")
-
-
-@dataclass(frozen=True, repr=False)
-class SampleFit(Shown):
-    """Attitudes (k, 3) flown against one sample by the rigid, the guessed and the identified model, rad."""
-
-    case: SampleCase
-    rigid: Array
-    initial: Array
-    identified: Array
-
-    def J(self, model: str) -> float | None:
-        """The sample's part of J for a model, rad^2; None where its flight diverged."""
-        return _number(np.sum((self.errors(model) * self.case.weight) ** 2))
-
-    def errors(self, model: str) -> Array:
-        """(k, 3) wrapped angle differences, rad."""
-        return wrap_angle(getattr(self, model) - self.case.sample.euler)
-
-    def to_document(self) -> dict[str, Any]:
-        """JSON form with the names that the API fixes, and the rigid model's errors beside."""
-
-        def per_angle(values: Array) -> dict[str, float | None]:
-            return {angle: _number(value) for angle, value in zip(ANGLES, values, strict=True)}
-
-        identified, rigid = self.errors("identified"), self.errors("rigid")
-        return {
-            "sample": self.case.sample.name,
-            "role": self.case.sample.role,
-            "J_rigid": self.J("rigid"),
-            "J_initial": self.J("initial"),
-            "J_identified": self.J("identified"),
-            "rms_rad": per_angle(np.sqrt(np.mean(identified**2, axis=0))),
-            "max_abs_rad": per_angle(np.abs(identified).max(axis=0)),
-            "rms_rigid_rad": per_angle(np.sqrt(np.mean(rigid**2, axis=0))),
-            "range_rad": per_angle(np.ptp(self.case.sample.euler, axis=0)),
-        }
-
-    def to_curves(self) -> dict[str, Any]:
-        """Time histories for plots and tables."""
-        sample = self.case.sample
-
-        def angles(values: Array) -> dict[str, list[float | None]]:
-            return {
-                f"{name}_rad": [_number(v) for v in column]
-                for name, column in zip(ANGLES, values.T, strict=True)
-            }
-
-        return {
-            "name": sample.name,
-            "role": sample.role,
-            "time_s": sample.time_s.tolist(),
-            "sweep_left_rad": sample.sweep_left.tolist(),
-            "sweep_right_rad": sample.sweep_right.tolist(),
-            "measured": angles(sample.euler),
-            "rigid": angles(self.rigid),
-            "initial": angles(self.initial),
-            "identified": angles(self.identified),
-        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,6 +32,7 @@ class IdentifyResult(Shown):
     """An identified equivalent model (``parameters``, a batch of one) with its proof.
 
     ``settings`` : as asked for; step and corrections that were left to the search are filled in.
+    ``warnings`` : what the method does not answer for. ``at_bound`` : parameters that ended at a bound.
     """
 
     model: ChainModel
@@ -100,22 +42,38 @@ class IdentifyResult(Shown):
     search: dict[str, Any]
     cost: dict[str, float | None]
     settings: ModelSettings
+    warnings: tuple[ResultWarning, ...] = ()
+    at_bound: tuple[str, ...] = ()
+
+    @property
+    def lost(self) -> tuple[SampleFit, ...]:
+        """The samples to fit that the best model does not fly to their end: with any, it is no answer."""
+        return tuple(fit for fit in self.fits if fit.case.sample.role == "train" and fit.ending("identified"))
+
+    def require_flown(self) -> IdentifyResult:
+        """Itself, if its model flies all samples that it was fitted to; else NotFlyable."""
+        if self.lost:
+            raise not_flyable(self.model, self.lost, self.settings)
+        return self
 
     def to_document(self) -> dict[str, Any]:
-        """JSON form with the names that the API fixes."""
+        """JSON form with the names that the API fixes; the model is None where the best never flew."""
         return {
-            "model": parameters_document(self.parameters)
-            | {
-                "lattice": self.settings.lattice.to_document(),
-                "step_s": self.settings.step_s,
-                "start": self.settings.start,
-            },
+            "model": None if self.lost else self._model_document(),
             "fit": [fit.to_document() for fit in self.fits],
-            "uncertainty": {"standard_error": {}, "correlation": [], "unidentifiable": []}
+            "uncertainty": no_uncertainty(self.at_bound)
             if self.uncertainty is None
             else self.uncertainty.to_document(),
             "search": self.search,
             "cost": self.cost,
+            "warnings": documents(self.warnings),
+        }
+
+    def _model_document(self) -> dict[str, Any]:
+        return parameters_document(self.parameters) | {
+            "lattice": self.settings.lattice.to_document(),
+            "step_s": self.settings.step_s,
+            "start": self.settings.start,
         }
 
     def summary(self) -> Summary:
@@ -150,28 +108,30 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     # a plan knows the lattice and the hinges, not the links: both models fly the same ones
     rigid = _attitudes(rigid_model, physical_guess(rigid_model), run.cases, start)
     both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
+    best = space.decode(state.best)
+    fits = tuple(
+        SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
+    )
+    flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
     certainty = None
-    if judged and space.dimension and np.isfinite(state.best_cost):
+    if judged and space.dimension and flies:
 
         def errors(points: Array) -> Array:
             return residuals(run.model, space.decode(points), run.training, start)
 
         residual, jacobian = differences(state.best[None, :], space.upper, errors)
         certainty = uncertainty(space, state.best, residual[0], jacobian[0])
-    best = space.decode(state.best)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
         return _flight_time(model, batch, run.cases[longest], start) if judged else None
 
     settings = run.search
+    at_bound = space.at_bound(state.best)
     return IdentifyResult(
         model=run.model,
         parameters=best,
-        fits=tuple(
-            SampleFit(case, r[0], pair[0], pair[1])
-            for case, r, pair in zip(run.cases, rigid, both, strict=True)
-        ),
+        fits=fits,
         uncertainty=certainty,
         search={
             "aero_coefficients": list(space.free_aero),
@@ -191,6 +151,10 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "flight_duration_s": run.samples[longest].duration_s,
         },
         settings=replace(run.settings, step_s=run.step_s, aero_coefficients=space.free_aero),
+        warnings=fit_warnings(
+            run, best, fits, at_bound, certainty.undetermined if certainty is not None else ()
+        ),
+        at_bound=tuple(at_bound),
     )
 
 
@@ -207,8 +171,3 @@ def _flight_time(model: ChainModel, batch: ParameterBatch, case: SampleCase, sta
     begin = time.perf_counter()
     _attitudes(model, batch, (case,), start)
     return time.perf_counter() - begin
-
-
-def _number(value: Any) -> float | None:
-    number = float(value)
-    return number if np.isfinite(number) else None

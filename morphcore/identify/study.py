@@ -22,7 +22,7 @@ from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
-from morphcore.identify.study_timing import ROUNDS, FlightTiming, flight_timing, medians
+from morphcore.identify.study_timing import ROUNDS, FlightTiming, Flyable, flight_timing, medians
 from morphcore.models.equivalent import MOST_LINKS, physical_guess
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
@@ -93,8 +93,13 @@ class Study:
             )
 
     def result(self, checkpoint: bytes) -> StudyResult:
-        """The rows at any step; that of the identification that runs comes with its best so far."""
-        return self._result(decode(checkpoint, self.links), judged=True)
+        """The rows at any step; that of the identification that runs comes with its best so far.
+
+        Raises
+        ------
+        NotFlyable : no model of any size flies the samples that it was fitted to.
+        """
+        return self._result(decode(checkpoint, self.links), judged=True).require_flown()
 
     def best_so_far(self, checkpoint: bytes) -> StudyResult:
         """The same without judging the running one's uncertainty: someone waits for a cancelled study."""
@@ -169,7 +174,7 @@ class Study:
 
     def _row(self, state: StudyState, *, judged: bool) -> StudyRow:
         run, checkpoint = self._run(state), state.search or b""
-        return study_row(run, run.result(checkpoint) if judged else run.best_so_far(checkpoint))
+        return study_row(run, run.judged(checkpoint) if judged else run.best_so_far(checkpoint))
 
     @cached_property
     def _weights(self) -> tuple[int, ...]:
@@ -180,10 +185,16 @@ class Study:
         if self._prepared is None:
             first = self.runs[0]
             rigid = first.chain(first.model.aircraft, first.model.flight, 1)
-            models = [(rigid, physical_guess(rigid))]
-            models += [(run.model, row.batch) for run, row in zip(self.runs, rows, strict=True)]
+            models: list[Flyable | None] = [(rigid, physical_guess(rigid))]
+            models += [
+                (run.model, row.batch) if row.flown else None
+                for run, row in zip(self.runs, rows, strict=True)
+            ]
             # the rigid model has no joints that could ask for a shorter step than another model's
-            own_steps = [float(row.model["step_s"]) for row in rows]
+            own_steps = [
+                float(row.model["step_s"]) if row.model else run.step_s
+                for run, row in zip(self.runs, rows, strict=True)
+            ]
             self._prepared = flight_timing(
                 models,
                 [sample for sample in first.samples if sample.role == "train"],
@@ -249,7 +260,7 @@ def study(
 
     Raises
     ------
-    InvalidInput : the samples or settings make no sense.
+    InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
     run = Study(aircraft, flight, samples, links=links, model=model, search=search)
     checkpoint = b""

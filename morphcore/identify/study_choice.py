@@ -44,7 +44,8 @@ def recommend(rows: Sequence[StudyRow]) -> Recommendation:
     """Choose among the finished rows of a study by the rule at the head of this file."""
     role: Role = "held_out" if any(row.has_held_out for row in rows) else "train"
     flown = sorted(
-        (row for row in rows if row.finished and row.J(role) is not None), key=lambda row: row.links_per_wing
+        (row for row in rows if row.finished and row.flown and row.J(role) is not None),
+        key=lambda row: row.links_per_wing,
     )
     if not flown:
         what = "was identified to the end" if not any(row.finished for row in rows) else "flew every flight"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from morphcore.errors import NotFlyable
 from morphcore.identify.study_choice import Recommendation, recommend
 from morphcore.identify.study_row import Document, StudyRow
 from morphcore.identify.study_timing import FLIGHT_S
@@ -50,6 +51,19 @@ class StudyResult(Shown):
             [self.recommended.reason],
         )
 
+    @property
+    def warnings(self) -> list[Document]:
+        """Those of the recommended model; without any, of the first row."""
+        chosen = [row for row in self.rows if row.links_per_wing == self.recommended.links_per_wing]
+        return [warning for row in (chosen or list(self.rows))[:1] for warning in row.warnings]
+
+    def require_flown(self) -> StudyResult:
+        """Itself, if a model of any size flies what it was fitted to; else NotFlyable."""
+        if self.rows and not any(row.flown for row in self.rows):
+            why = next(warning for warning in self.rows[0].warnings if warning["code"] == NotFlyable.code)
+            raise NotFlyable(why["message"], pointer=why["pointer"], hint=why["hint"])
+        return self
+
     def to_document(self) -> dict[str, Any]:
         """JSON form."""
         return {
@@ -58,6 +72,7 @@ class StudyResult(Shown):
             "recommended": self.recommended.to_document(),
             "search": self.search,
             "cost": self.cost,
+            "warnings": self.warnings,
         }
 
 

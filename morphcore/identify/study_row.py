@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from morphcore.identify.result import ANGLES, IdentifyResult
+from morphcore.errors import NotFlyable
+from morphcore.identify.result import IdentifyResult
+from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.shown import Shown
 
@@ -28,8 +30,9 @@ class StudyRow(Shown):
     flights of a role, rad^2; None where there is none, or where one diverged. rms_rad : per angle over the
     flights held out, else over the fitted ones. flight_s : median wall time of one flight, s; None before it
     is measured. identify_s : wall time of the identification, s. flights : flown for it.
-    unseen_directions : number of combinations of parameters that the samples cannot see. fit, model : as in
-    the identification's result. finished : whether the search went to its end.
+    unseen_directions : number of combinations of parameters that the samples cannot see. fit, model,
+    warnings : as in the identification's result; model is None where none flew the samples to fit. finished :
+    whether the search went to its end.
     """
 
     links_per_wing: int
@@ -43,8 +46,9 @@ class StudyRow(Shown):
     flights: int
     unseen_directions: int
     fit: list[Document]
-    model: Document
+    model: Document | None
     finished: bool
+    warnings: list[Document] = field(default_factory=list)
 
     def J(self, role: Role) -> float | None:
         """J over the flights of a role, rad^2."""
@@ -66,8 +70,24 @@ class StudyRow(Shown):
         return max(known) if len(known) == len(ANGLES) else None
 
     @property
+    def flown(self) -> bool:
+        """Whether the model flies all samples that it was fitted to: without that it is none."""
+        return self.model is not None
+
+    @property
     def batch(self) -> ParameterBatch:
-        """The identified parameters, to fly with ``simulate(..., model=row.batch)``."""
+        """The identified parameters, to fly with ``simulate(..., model=row.batch)``.
+
+        Raises
+        ------
+        NotFlyable : no model of this size flew.
+        """
+        if self.model is None:
+            raise NotFlyable(
+                f"no model of {self.links_per_wing} links per wing flew the samples",
+                pointer="/model/links_per_wing",
+                hint="take the row of another number of links",
+            )
         return parameters_from_document(self.model)
 
     def timed(self, flight_s: float | None) -> StudyRow:
@@ -106,6 +126,7 @@ def study_row(run: Identification, found: IdentifyResult) -> StudyRow:
         fit=fit,
         model=document["model"],
         finished=document["search"]["finished"],
+        warnings=document["warnings"],
     )
 
 

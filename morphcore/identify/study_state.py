@@ -33,7 +33,7 @@ class StudyState:
     share: float = 0.0
     best_cost: float = 0.0
     budget_s: float | None = None
-    rounds: tuple[tuple[float, ...], ...] = ()
+    rounds: tuple[tuple[float | None, ...], ...] = ()
     plan_s: float | None = None
     generation: int = 0
     flights: int = 0

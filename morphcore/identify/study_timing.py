@@ -21,6 +21,7 @@ from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop, heed
 
 Clock = Callable[[], float]
+Flyable = tuple[ChainModel, ParameterBatch]
 
 FLIGHT_S = 2.0  # duration of the flight that is timed, as of the paper's morph
 OUTPUT_STEP_S = 0.01
@@ -57,19 +58,19 @@ class FlightTiming:
     """
 
     cases: tuple[SampleCase, ...]
-    models: tuple[tuple[ChainModel, ParameterBatch], ...]
+    models: tuple[Flyable | None, ...]
     start: StartMode
     clock: Clock
     plan_s: float
 
-    def round(self, stop: Stop | None = None) -> tuple[float, ...]:
-        """Fly every model once; give the wall times, s.
+    def round(self, stop: Stop | None = None) -> tuple[float | None, ...]:
+        """Fly every model once; give the wall times, s, None where there is no model.
 
         A single flight is a single block of lanes: it never uses more than one thread.
         """
         return tuple(
-            self._fly(case, model, batch, stop)
-            for case, (model, batch) in zip(self.cases, self.models, strict=True)
+            None if flown is None else self._fly(case, *flown, stop)
+            for case, flown in zip(self.cases, self.models, strict=True)
         )
 
     def _fly(self, case: SampleCase, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
@@ -81,7 +82,7 @@ class FlightTiming:
 
 
 def flight_timing(
-    models: Sequence[tuple[ChainModel, ParameterBatch]],
+    models: Sequence[Flyable | None],
     samples: Sequence[Trajectory],
     *,
     steps_s: Sequence[float],
@@ -90,10 +91,10 @@ def flight_timing(
 ) -> FlightTiming:
     """Plan the flight and fly every model once: nothing is compiled or loaded while time is taken.
 
-    ``steps_s`` : each model's step.
+    models : the first is the rigid one; None stands for a size of which none flies. steps_s : each model's.
     """
     flight = timed_flight(samples)
-    first = models[0][0]
+    first = next(flown for flown in models if flown is not None)[0]
     # a plan knows the lattice and the hinges, not the links: all models of one step fly the same one
     cases = {step_s: sample_cases(first, [flight], step_s)[0] for step_s in dict.fromkeys(steps_s)}
     timing = FlightTiming(tuple(cases[step_s] for step_s in steps_s), tuple(models), start, clock, 0.0)
@@ -103,6 +104,7 @@ def flight_timing(
     return replace(timing, plan_s=clock() - begin)
 
 
-def medians(rounds: Sequence[Sequence[float]]) -> list[float]:
-    """Median over the rounds of each model's wall time, s."""
-    return [statistics.median(times) for times in zip(*rounds, strict=True)]
+def medians(rounds: Sequence[Sequence[float | None]]) -> list[float | None]:
+    """Median over the rounds of each model's wall time, s; None where there is no model."""
+    timed = [[time_s for time_s in times if time_s is not None] for times in zip(*rounds, strict=True)]
+    return [statistics.median(times) if times else None for times in timed]

@@ -1,7 +1,9 @@
 """How well the samples determine the parameters, and the directions that they cannot see.
 
 Bard (1974), section 7-5: with residuals r and Jacobian A at the optimum, cov(x) = s^2 (A^T A)^-1, s^2 = r^T r
-/ (m - d).
+/ (m - d). Intervals are Student's in the coordinate in which a parameter is searched, and so of its own shape
+in its own unit: of factors for what is positive (stiffness, damping, lag), of log-odds for a share of the
+span, even to both sides for the rest.
 """
 
 from __future__ import annotations
@@ -11,16 +13,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
-from morphcore.identify.parameters import SearchSpace
+from morphcore.identify.parameters import CENTRE_UNIT_CHORDS, DRAG_UNIT, LIFT_UNIT, SearchSpace
 from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
+Interval = tuple[float | None, float | None]
 
 # standard deviation along a direction, in search coordinates (factor e for a stiffness), beyond which
 UNSEEN_SPREAD = 1.0
 # the samples say nothing about it
 NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left out of the report
+PROBABILITY = 0.95  # of an interval
+METHOD = "white"  # the residuals are taken for independent and of one variance
 
 
 @dataclass(frozen=True, repr=False)
@@ -30,7 +36,9 @@ class Uncertainty(Shown):
     names : (d,) search coordinates. covariance : (d, d) in search coordinates. singular_values : (d,) of the
     Jacobian.
     directions : (d, d) rows: right singular vectors. parameter_names : (m,). standard_error : (m,) in SI
-    units.
+    units. intervals : of each searched parameter, SI units; None on a side where the samples do not bound it
+    within the range that was searched. undetermined : parameters that may differ by a factor e, or by as much
+    in their own way, or that are bounded on neither side. at_bound : those that ended at a bound.
     """
 
     names: tuple[str, ...]
@@ -40,15 +48,22 @@ class Uncertainty(Shown):
     noise_rad: float
     parameter_names: tuple[str, ...]
     standard_error: Array
+    intervals: dict[str, Interval]
+    undetermined: tuple[str, ...]
+    at_bound: tuple[str, ...]
 
     def to_document(self) -> dict[str, Any]:
         """JSON form with the names that the API fixes."""
         spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         correlation = self.covariance / np.maximum(np.outer(spread, spread), 1e-300)
         return {
+            "method": METHOD,
             "standard_error": {
                 n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)
             },
+            "interval_95": {name: list(interval) for name, interval in self.intervals.items()},
+            "undetermined": list(self.undetermined),
+            "at_bound": list(self.at_bound),
             "coordinates": list(self.names),
             "correlation": np.clip(correlation, -1.0, 1.0).round(6).tolist(),
             "singular_values": self.singular_values.tolist(),
@@ -68,6 +83,18 @@ class Uncertainty(Shown):
         }
 
 
+def no_uncertainty(at_bound: tuple[str, ...]) -> dict[str, Any]:
+    """JSON form where nothing was searched, or nobody has looked at the errors yet."""
+    return {
+        "standard_error": {},
+        "interval_95": {},
+        "undetermined": [],
+        "at_bound": list(at_bound),
+        "correlation": [],
+        "unidentifiable": [],
+    }
+
+
 def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) -> Uncertainty:
     """Uncertainty at search point x (d,) from residuals (m,) and Jacobian (m, d) there."""
     d = x.size
@@ -80,6 +107,16 @@ def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) 
     probe = 1e-6
     named = space.flatten(space.decode(np.concatenate([x[None, :], x + probe * np.eye(d)])))
     slope = (named[1:] - named[0]).T / probe
+    standard_error = np.sqrt(np.maximum(np.einsum("md,de,me->m", slope, covariance, slope), 0.0))
+    at_bound = space.at_bound(x)
+    rates = _own_rates(space, named[0])
+    half = float(stdtrit(freedom, 0.5 + 0.5 * PROBABILITY)) * standard_error * rates
+    intervals = _intervals(space, named[0], half, at_bound)
+    wide = {
+        name
+        for name, spread in zip(space.parameter_names, standard_error * rates, strict=True)
+        if not spread <= UNSEEN_SPREAD
+    }
     return Uncertainty(
         names=space.names,
         covariance=covariance,
@@ -87,8 +124,64 @@ def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) 
         directions=directions,
         noise_rad=noise,
         parameter_names=space.parameter_names,
-        standard_error=np.sqrt(np.maximum(np.einsum("md,de,me->m", slope, covariance, slope), 0.0)),
+        standard_error=standard_error,
+        intervals=intervals,
+        undetermined=tuple(name for name, ends in intervals.items() if ends == (None, None) or name in wide),
+        at_bound=tuple(at_bound),
     )
+
+
+def _shape(name: str) -> str:
+    """In which coordinate a parameter's interval is even: "log", "odds" or "linear"."""
+    if "division" in name:
+        return "odds"
+    return "log" if "stiffness" in name or "damping" in name or name == "lag_s" else "linear"
+
+
+def _own_rates(space: SearchSpace, value: Array) -> Array:
+    """(m,) by how much the coordinate of each parameter changes with its value, per SI unit."""
+    chord = space.model.aircraft.surfaces[0].mean_chord_m
+    units = {
+        "lift_factor": LIFT_UNIT,
+        "centre_shift_m": CENTRE_UNIT_CHORDS * chord,
+        "profile_drag": DRAG_UNIT,
+    }
+    rates = []
+    for name, at, searched in zip(space.parameter_names, value, space.searched, strict=True):
+        if not searched:
+            rates.append(0.0)
+        elif _shape(name) == "odds":
+            rates.append(1.0 / (at * (1.0 - at)))
+        else:
+            rates.append(1.0 / at if _shape(name) == "log" else 1.0 / units[name])
+    return np.array(rates)
+
+
+def _intervals(
+    space: SearchSpace, value: Array, half: Array, at_bound: dict[str, str]
+) -> dict[str, Interval]:
+    """Interval of each searched parameter: its ends where the half widths (m,), in coordinates, put them.
+
+    A side that ends beyond the box, or at whose bound the parameter lies, is not bounded by the samples.
+    """
+    rates, found = _own_rates(space, value), {}
+    for name, at, width, rate, limits, searched in zip(
+        space.parameter_names, value, half, rates, space.parameter_limits, space.searched, strict=True
+    ):
+        if not searched:
+            continue
+        with np.errstate(over="ignore"):
+            if _shape(name) == "log":
+                ends = at * np.exp(-width), at * np.exp(width)
+            elif _shape(name) == "odds":
+                odds = at / (1.0 - at)
+                ends = tuple(1.0 / (1.0 + np.exp(-sign * width) / odds) for sign in (-1.0, 1.0))
+            else:
+                ends = at - width / rate, at + width / rate
+        low = ends[0] >= limits[0] and at_bound.get(name) != "lower"
+        high = ends[1] <= limits[1] and at_bound.get(name) != "upper"
+        found[name] = (float(ends[0]) if low else None, float(ends[1]) if high else None)
+    return found
 
 
 def _finite(value: float) -> float | None:

@@ -117,7 +117,7 @@ def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:
     """
     properties = surface.section_at(distance_m)
     axial, shear = surface.axial_at(distance_m)
-    arm = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
+    arm = surface.mass_axis_x_m - surface.elastic_axis_x_m
     sections = []
     for i in range(distance_m.size):
         stiffness = np.diag(
@@ -159,7 +159,7 @@ def rigid_surface_inertia(surface: Surface) -> Array:
     width = surface.span_m / INERTIA_POINTS
     distance = (np.arange(INERTIA_POINTS) + 0.5) * width
     properties = surface.section_at(distance)
-    arm_x = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
+    arm_x = surface.mass_axis_x_m - surface.elastic_axis_x_m
     total = np.zeros((6, 6))
     for i, y in enumerate(distance):
         total += width * section_inertia(properties, i, np.array([arm_x, surface.span_sign * y, 0.0]))
@@ -185,7 +185,7 @@ def _section_places(
 
 def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Array) -> Riders:
     """Riders of one surface on its sections."""
-    axis = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+    axis = np.array([surface.elastic_axis_x_m, 0.0, 0.0])
     strips = part.spanwise
     corner = np.tile(np.arange(strips + 1), part.chordwise + 1)
     middle = strips + 1 + np.arange(strips)

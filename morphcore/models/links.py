@@ -41,7 +41,7 @@ def link_masses(surface: Surface, edges: Array) -> Array:
         value.reshape(stations.shape) * weight
         for value in (section.mass, section.inertia_x, section.inertia_y, section.inertia_z)
     )
-    x = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
+    x = surface.mass_axis_x_m - surface.elastic_axis_x_m
     y = surface.span_sign * (stations - start)
     return np.stack(
         [

@@ -37,9 +37,11 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
     Raises
     ------
-    InvalidInput : a field is missing, has another shape than ``links_per_wing`` says, or is out of its range.
+    InvalidInput : a field is missing, has another shape than ``links_per_wing`` says, or is out of its range;
+        or the result is of a search whose best model never flew.
     """
     whole = Fields(document, pointer)
+    _require_flown(document, pointer)
     fields = Fields(whole.raw("model"), pointer) if whole.has("model") else whole
     fields.raw("links_per_wing")
     links = fields.whole("links_per_wing", default=1, least=1, most=MOST_LINKS)
@@ -94,6 +96,22 @@ def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
             "lag_s": float(batch.lag[particle]),
         },
     }
+
+
+def _require_flown(document: Document, pointer: str) -> None:
+    """Refuse a result without a model, or with one that did not fly what it was fitted to."""
+    fit = document.get("fit")
+    lost = [
+        row.get("sample")
+        for row in (fit if isinstance(fit, list) else [])
+        if isinstance(row, dict) and row.get("role") == "train" and row.get("J_identified", 0.0) is None
+    ]
+    if lost or ("model" in document and document["model"] is None):
+        raise InvalidInput(
+            "the result holds no model that flies the samples it was fitted to",
+            pointer=f"{pointer}/model",
+            hint="its warnings say why; give the result of an identification that succeeded",
+        )
 
 
 def _array(fields: Fields, name: str) -> Array:

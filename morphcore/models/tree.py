@@ -122,7 +122,7 @@ def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Arra
     stations = start_m + 0.5 * (end_m - start_m) * (points + 1.0)
     lengths = 0.5 * (end_m - start_m) * weights
     section = surface.section_at(stations)
-    from_axis = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
+    from_axis = surface.mass_axis_x_m - surface.elastic_axis_x_m
     about_centres = np.stack([section.inertia_x, section.inertia_y, section.inertia_z], axis=1)
     total: Array = np.zeros((6, 6))
     for i in range(SLICES):
@@ -134,7 +134,7 @@ def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Arra
 def _root(surface: Surface) -> Array:
     """The elastic axis at the undeflected surface's root, (3,) in B, m."""
     x, y, z = surface.position_m
-    return np.array([x + surface.elastic_axis_offset_m, y, z])
+    return np.array([x + surface.elastic_axis_x_m, y, z])
 
 
 def _pivot(surface: Surface) -> Array:

@@ -8,20 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
+from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.soft_joints import chain_obstacle
 from morphcore.optimise.settings import Weights
 from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.plan import CommonPath, time_grid
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.stopping import Interrupted, Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
+from morphcore.validity import AirMotion
 
 Array = NDArray[np.float64]
 
@@ -92,7 +97,8 @@ class MorphFlights:
         self.times_s = times_s
         self.grid = time_grid(times_s, step_s)
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
-        found = trim(self.model, batch, waiting, start=start).require()
+        with naming_obstacles(partial(chain_obstacle, model, batch)):
+            found = trim(self.model, batch, waiting, start=start).require()
         self.constants = lane_constants(self.model, batch, self.grid.step_s)
         self.constants.set_thrust(found.force_B, found.moment_B)
         self.state = trimmed_state(self.model, batch, waiting, found)
@@ -122,6 +128,11 @@ class MorphFlights:
             np.stack([torques for _, torques in flown]),
             np.asarray(lost.any(axis=(1, 2))),
         )
+
+    def motion(self, schedule: Schedule) -> AirMotion:
+        """How the aircraft meets the air in one schedule."""
+        plan = self.path.plan(self.model, schedule, self.grid)
+        return chain_motion(self.model, plan, self.constants, self.state)
 
     def _one(self, schedule: Schedule, stop: Stop | None, *, torque: bool) -> tuple[Array, Array]:
         """Euler angles (k, 3) at the rows, and torques (n,)."""

@@ -32,7 +32,7 @@ class Found:
     """What a search found: its best point (d,), J with weights, variation without (rad^2), peak torque (N m).
 
     Where no schedule keeps the torque limit, cost and variation are infinite and the torque is the least that
-    was seen.
+    was seen; infinite they are too where the best flight ``diverged``.
     """
 
     model: ModelName
@@ -43,6 +43,7 @@ class Found:
     torque: float
     flights: int
     generations: int
+    diverged: bool = False
 
     @property
     def feasible(self) -> bool:

@@ -9,16 +9,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.errors import FlightDiverged, InvalidInput, TrimNotFound
+from morphcore.errors import FlightDiverged, InvalidInput, NotFlyable, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
+from morphcore.geometry.obstacle import Obstacle, naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
+from morphcore.models.soft_joints import chain_obstacle, soft_joint
 from morphcore.optimise.feasible import constant_rate, morph_space, require_schedules, rounded_up
 from morphcore.optimise.flights import SAMPLE_S, MorphFlights, sample_times
 from morphcore.optimise.goals import (
@@ -45,6 +47,7 @@ from morphcore.simulate.trim import StartMode
 from morphcore.steps import Step
 from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.threads import one_blas_thread
+from morphcore.validity import documents
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -138,10 +141,12 @@ class ScheduleOptimisation:
         flight = [constant] * len(self.aircraft.surfaces), busiest_part([constant], self.times_s)
         chains = [self.chain(name) for name in ("rigid", "equivalent")]
         halved = self.parameters.wing_sets == 1
-        return min(
-            choose_step(model, [flight], batch, start=self.start, may_halve=halved, stop=stop).step_s
-            for model, batch in chains
-        )
+        steps_s = []
+        for model, batch in chains:
+            with naming_obstacles(partial(chain_obstacle, model, batch)):
+                found = choose_step(model, [flight], batch, start=self.start, may_halve=halved, stop=stop)
+            steps_s.append(found.step_s)
+        return min(steps_s)
 
     def chain(self, name: ModelName) -> tuple[ChainModel, ParameterBatch]:
         """One of the models that are searched with, and its parameters."""
@@ -218,13 +223,24 @@ class ScheduleOptimisation:
                 yield self._step(state, told)
 
     def result(self, checkpoint: bytes) -> ScheduleResult:
-        """The schedule at any step, flown in the rigid and the equivalent model beside the others."""
+        """The schedule at any step, flown in the rigid and the equivalent model beside the others.
+
+        Raises
+        ------
+        NotFlyable : the equivalent model does not fly the best schedule to its end.
+        """
         say("judging what was found")
         with one_blas_thread():
-            return schedule_result(self, self._state(checkpoint))
+            found = schedule_result(self, self._state(checkpoint))
+        if found.lost:
+            raise self.not_flyable()
+        return found
 
     def best_so_far(self, checkpoint: bytes) -> ScheduleResult:
-        """Give the result without torques: someone waits for a cancelled run."""
+        """Give the result without torques: someone waits for a cancelled run.
+
+        Where the best does not fly it holds no schedule, and a warning says so.
+        """
         with one_blas_thread():
             return schedule_result(self, self._state(checkpoint), judged=False)
 
@@ -315,7 +331,7 @@ class ScheduleOptimisation:
         """After a search: what it found, and what comes next."""
         found = self._found(state, variation=True)
         if not found.feasible and found.model == "equivalent" and found.duration_s == self.durations[-1]:
-            raise self._too_much_torque(found, stop)
+            raise self.not_flyable() if found.diverged else self._too_much_torque(found, stop)
         flown = state.flights + int(found.feasible)
         return self._begun(replace(state, found=(*state.found, found), task=None, search=None, flights=flown))
 
@@ -328,6 +344,7 @@ class ScheduleOptimisation:
         begin, shown, flexible = self._clock(), 0.0, self.flexible
         end_s = float(self.times_s[-1])
         euler, failure = np.zeros((0, 3)), ""
+        warnings: tuple[dict[str, Any], ...] = ()
         try:
             with one_blas_thread():
                 for step in flight_steps(
@@ -344,12 +361,13 @@ class ScheduleOptimisation:
                 ):
                     if step.simulation is not None:
                         euler = step.simulation.trajectory.euler
+                        warnings = tuple(documents(step.simulation.warnings))
                     elif step.fraction >= shown + SHOWN_SHARE:
                         shown = step.fraction
                         yield state, Told("verify", f"flexible model: {name.replace('_', ' ')}", shown)
         except (FlightDiverged, TrimNotFound) as error:
             failure = str(error)
-        done = (*state.verified, Verified(name, euler, self._clock() - begin, failure))
+        done = (*state.verified, Verified(name, euler, self._clock() - begin, failure, warnings))
         over = len(done) == len(waiting)
         yield (
             replace(state, verified=done, phase="done" if over else "verify"),
@@ -376,19 +394,32 @@ class ScheduleOptimisation:
         """What the search that runs has found; its unweighted variation takes a flight."""
         task, search = state.task, state.search
         assert task is not None and search is not None  # noqa: S101, PT018 - asked only while one runs
-        varied = search.best_cost
+        varied, diverged = search.best_cost, False
         if variation and search.feasible:
             run = self._run(task)
-            varied = float(run.flights.fly([run.space.schedule(search.best)], torque=False).variation[0])
+            flown = run.flights.fly([run.space.schedule(search.best)], torque=False)
+            varied, diverged = float(flown.variation[0]), bool(flown.diverged[0])
         return Found(
             model=task.model,
             duration_s=task.duration_s,
             point=search.best,
-            cost=search.best_cost,
-            variation=varied,
+            cost=np.inf if diverged else search.best_cost,
+            variation=np.inf if diverged else varied,
+            diverged=diverged,
             torque=search.best_torque if search.feasible else search.anchor_torque,
             flights=search.flights,
             generations=search.generation,
+        )
+
+    def not_flyable(self) -> NotFlyable:
+        """The error of a search in which no schedule flew to its end."""
+        why = soft_joint(*self.chain("equivalent")) or Obstacle(
+            "/model/parameters",
+            "the model leaves its domain in every morph that was tried: check its stiffness and damping, or "
+            "identify it anew",
+        )
+        return NotFlyable(
+            "the equivalent model flies no morph to its end", pointer=why.pointer, hint=why.hint
         )
 
     def _too_much_torque(self, found: Found, stop: Stop | None) -> InvalidInput:

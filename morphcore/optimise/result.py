@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
+from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import Flown
 from morphcore.optimise.goals import Found
+from morphcore.optimise.schedule_warnings import schedule_warnings
 from morphcore.optimise.settings import Limits, Morph, Weights
 from morphcore.optimise.state import OptimisationState
 from morphcore.shown import Shown, Summary
@@ -26,19 +28,6 @@ Document = dict[str, Any]
 SCHEDULES = ("constant", "rigid_optimum", "optimum")
 MODELS = ("rigid", "equivalent", "flexible")
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-
-
-@dataclass(frozen=True, repr=False)
-class ComparedFlight(Shown):
-    """One schedule flown in one model.
-
-    departure : (k, 3) of phi, theta, psi from the start, rad. variation : its sum of squares, rad^2; None if
-    the flight diverged. torque : largest of any hinge, N m; None where it was not computed.
-    """
-
-    departure: Array
-    variation: float | None
-    torque: float | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,7 +50,7 @@ class ScheduleResult(Shown):
 
     schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
     of each model, of each schedule; None where it was not flown. front : all durations
-    that were looked at, rising. partial : the best so far of a run that did not end.
+    that were looked at, rising. partial : the best so far of a run that did not end. warnings : documents.
     """
 
     morph: Morph
@@ -75,6 +64,12 @@ class ScheduleResult(Shown):
     search: Document
     notes: tuple[str, ...]
     partial: bool
+    warnings: tuple[Document, ...] = ()
+
+    @property
+    def lost(self) -> bool:
+        """Whether the equivalent model does not fly the optimum to its end: then it is no answer."""
+        return self.variation("optimum", "equivalent") is None
 
     @property
     def schedule(self) -> Spline:
@@ -115,7 +110,7 @@ class ScheduleResult(Shown):
         """JSON form with the names that the API fixes, and more beside."""
         reduction, model = self.reduction()
         document: Document = {
-            "schedule": _knots(self.schedule),
+            "schedule": None if self.lost else _knots(self.schedule),
             "limits": vars(self.limits).copy(),
             "reached": {name: self._reached(name) for name in SCHEDULES},
             "variation": {
@@ -133,6 +128,7 @@ class ScheduleResult(Shown):
             "weights": vars(self.weights).copy(),
             "search": self.search,
             "partial": self.partial,
+            "warnings": list(self.warnings),
         }
         if self.morph.goal == "pareto":
             document["pareto"] = [_front_document(point) for point in self.front if not point.beaten]
@@ -215,6 +211,7 @@ def schedule_result(
             if item.failure
         ),
         partial=state.phase != "done",
+        warnings=schedule_warnings(run, state, schedules, flights),
     )
 
 

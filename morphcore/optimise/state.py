@@ -26,12 +26,14 @@ class Verified:
     """One schedule's flight in the flexible model.
 
     euler : (k, 3) rad at the rows of the window; none where the flight failed, as ``failure`` says.
+    warnings : of the flight, as documents.
     """
 
     schedule: str
     euler: Array
     wall_s: float
     failure: str = ""
+    warnings: tuple[dict[str, Any], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,9 @@ def _state(tree: dict[str, Any]) -> OptimisationState:
         task=None if task is None else Task(**task),
         search=None if search is None else _search(search),
         found=tuple(Found(**item) for item in tree.pop("found")),
-        verified=tuple(Verified(**item) for item in tree.pop("verified")),
+        verified=tuple(
+            Verified(**item | {"warnings": tuple(item.get("warnings", ()))}) for item in tree.pop("verified")
+        ),
         history=tuple(tree.pop("history")),
         **tree,
     )

@@ -17,7 +17,7 @@ import numpy as np
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
 from morphcore.geometry.lattice import CORE_LAWS, CoreLaw, LatticeSettings, VortexCore
-from morphcore.identify.result import ANGLES
+from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flight import Simulation, flight_steps

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
-from morphcore.identify.result import ANGLES
+from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.optimise import Limits, Morph, ScheduleOptimisation, ScheduleSearch
 from morphcore.optimise.settings import PAPER_PARTICLES, FlexibleSettings

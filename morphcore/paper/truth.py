@@ -11,7 +11,7 @@ import numpy as np
 
 from morphcore.frames import wrap_angle
 from morphcore.geometry.lattice import LatticeSettings
-from morphcore.identify.result import ANGLES
+from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.scenario import PaperFlight, aircraft, flight, paper_flights
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work

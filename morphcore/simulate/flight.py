@@ -15,8 +15,10 @@ from morphcore.aero.environment import Environment, air_velocity
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
+from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
+from morphcore.models.soft_joints import chain_obstacle
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
@@ -28,6 +30,7 @@ from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
+from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
 from samplefiles.csv_table import write_table
 from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
@@ -47,12 +50,13 @@ class Simulation(Shown):
     of B).
     trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none
     of the flexible model).
-    step_s : the longest time step that was allowed, s.
+    step_s : the longest time step that was allowed, s. warnings : what the method does not answer for.
     """
 
     trajectory: Trajectory
     trim: Trim
     step_s: float
+    warnings: tuple[ResultWarning, ...] = ()
 
     def summary(self) -> Summary:
         """How the flight began, and how far the attitude went."""
@@ -150,23 +154,42 @@ def flight_steps(  # noqa: PLR0913 - as above
     grid = time_grid(times, longest_s)
     each = _per_surface(aircraft, schedules)
     _require_hinge_ranges(aircraft, each, grid.times_s)
-    if step_s is None and flyer.chain is not None:
-        chain, batch = flyer.chain
-        hinged = [own for surface, own in zip(aircraft.surfaces, each, strict=True) if surface.hinge]
-        smooth = None if environment is None else replace(environment, turbulence=None)
-        longest_s = choose_step(
-            chain, [(each, busiest_part(hinged, times))], batch, start=start,
-            air_velocity_N=_air(smooth, flight, None), may_halve=batch.wing_sets == 1, stop=stop,
-        ).step_s  # fmt: skip
-        grid = time_grid(times, longest_s)
-    air = _air(environment, flight, rng)
-    at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
-    for fraction, record in flyer.fly(each, grid, at, start=start, air_velocity_N=air, stop=stop):
-        if record is None:
-            yield FlightStep(fraction)
-        else:
-            flown = recorded_trajectory(aircraft, times, record)
-            yield FlightStep(1.0, Simulation(flown, record.trim, longest_s))
+    smooth = _air(None if environment is None else replace(environment, turbulence=None), flight, None)
+    with naming_obstacles(flyer.obstacle):
+        if step_s is None and flyer.chain is not None:
+            chain, batch = flyer.chain
+            hinged = [own for surface, own in zip(aircraft.surfaces, each, strict=True) if surface.hinge]
+            longest_s = choose_step(
+                chain, [(each, busiest_part(hinged, times))], batch, start=start,
+                air_velocity_N=smooth, may_halve=batch.wing_sets == 1, stop=stop,
+            ).step_s  # fmt: skip
+            grid = time_grid(times, longest_s)
+        air = _air(environment, flight, rng)
+        at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
+        for fraction, record in flyer.fly(each, grid, at, start=start, air_velocity_N=air, stop=stop):
+            if record is None:
+                yield FlightStep(fraction)
+            else:
+                flown = recorded_trajectory(aircraft, times, record)
+                warnings = _warnings(aircraft, flight, times, record, smooth)
+                yield FlightStep(1.0, Simulation(flown, record.trim, longest_s, warnings))
+
+
+def _warnings(
+    aircraft: Aircraft,
+    flight: Flight,
+    times: Array,
+    record: FlightRecord,
+    smooth_air_N: Callable[[Array], Array] | None,
+) -> tuple[ResultWarning, ...]:
+    """What the flight did that its method does not answer for; turbulence is not counted as incidence."""
+    wind_N = np.tile(flight.wind_N, (times.size, 1)) if smooth_air_N is None else smooth_air_N(times)
+    motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
+    return (
+        *air_warnings(flight, [("the flight", "/flight", motion)]),
+        *steep_warning("the flight", "/schedules", record.euler[:, 1]),
+        *overlap_warnings(aircraft, record.angles),
+    )
 
 
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
@@ -208,11 +231,13 @@ class _Fly(Protocol):
 class _Flyer:
     """How a model flies.
 
-    step_s : its default. chain : model and parameters for which a step can be chosen, if they are such.
+    step_s : its default. obstacle : finds what may have kept it from flying. chain : model and parameters
+    for which a step can be chosen, if they are such.
     """
 
     fly: _Fly
     step_s: float
+    obstacle: Callable[[], Obstacle | None]
     chain: tuple[ChainModel, ParameterBatch] | None = None
 
 
@@ -232,7 +257,7 @@ def _flyer(
         return _chain_flyer(chain, physical_guess(chain))
     if model == "flexible":
         beams = flexible_model(aircraft, flight, elements=elements, lattice=lattice)
-        return _Flyer(partial(flexible_flight, beams), FLEXIBLE_STEP_S)
+        return _Flyer(partial(flexible_flight, beams), FLEXIBLE_STEP_S, partial(obstacle, aircraft, flight))
     raise InvalidInput(
         f"model is {model!r}",
         pointer="/model",
@@ -241,7 +266,9 @@ def _flyer(
 
 
 def _chain_flyer(chain: ChainModel, batch: ParameterBatch) -> _Flyer:
-    return _Flyer(partial(chain_flight, chain, batch), STEP_S, (chain, batch))
+    return _Flyer(
+        partial(chain_flight, chain, batch), STEP_S, partial(chain_obstacle, chain, batch), (chain, batch)
+    )
 
 
 def _air(

@@ -103,7 +103,7 @@ class FreshModel:
             share[:, links] = np.maximum(high - low, 0.0)
             share /= share.sum(axis=1, keepdims=True)
             origin_W = np.zeros((model.links, 3))
-            origin_W[:, 0] = surface.elastic_axis_offset_m
+            origin_W[:, 0] = surface.elastic_axis_x_m
             origin_W[links, 1] = surface.span_sign * ends[:-1]
             on_edges = np.zeros((part.chordwise, part.spanwise + 1, 3))
             middle_chord = surface.chord_at(np.abs(part.control_points_W[:, 0, 1]))

@@ -345,7 +345,7 @@ def _halved(model: ChainModel, motions: list[HingeMotion]) -> tuple[ChainModel, 
 def hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
     """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/hinge.py."""
     rows = np.zeros((angle.size, HINGE_ROWS))
-    axis_offset = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+    axis_offset = np.array([surface.elastic_axis_x_m, 0.0, 0.0])
     root = np.array(surface.position_m)
     if surface.hinge is None:
         rows[:, :9] = np.eye(3).ravel()

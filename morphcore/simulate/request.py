@@ -30,6 +30,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
+from morphcore.validity import documents
 from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
@@ -128,6 +129,7 @@ class SimulationResult(Shown):
                 "wall_s": self.wall_s,
                 "real_time_factor": flown.duration_s / self.wall_s if self.wall_s > 0.0 else None,
             },
+            "warnings": documents(self.simulation.warnings),
         }
 
 

@@ -38,7 +38,7 @@ def circulations(lattice, angles, inputs):
         corners.append((part.ring_corners_W @ R_BW.T + r_B).reshape(-1, 3))
         controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
         normals.append(np.tile(R_BW[:, 2], (part.rings, 1)))
-        x = part.control_points_W[..., 0] - surface.elastic_axis_offset_m
+        x = part.control_points_W[..., 0] + surface.elastic_axis_offset_m
         mine = slice(2 * strip0, 2 * (strip0 + part.spanwise))
         normal_velocity.append((inputs[mine][0::2] + inputs[mine][1::2] * x).ravel())
     normals_B = np.concatenate(normals)
@@ -74,7 +74,7 @@ def test_circulation_of_any_motion(build):
         mine = gamma[ring : ring + part.rings].reshape(part.chordwise, part.spanwise)
         ring += part.rings
         out = found[OUTPUTS * strip0 : OUTPUTS * (strip0 + part.spanwise)].reshape(-1, OUTPUTS)
-        corners = part.ring_corners_W[..., 0] - surface.elastic_axis_offset_m
+        corners = part.ring_corners_W[..., 0] + surface.elastic_axis_offset_m
         width = np.diff(part.strip_edges_m)
         middle = 0.5 * (corners[:, 1:] + corners[:, :-1])
         area = -np.diff(middle, axis=0) * width

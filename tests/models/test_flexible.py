@@ -38,7 +38,7 @@ def unbent(model: FlexibleModel) -> NodePoses:
     """Nodes of the unbent wings at zero hinge angles, the fuselage at the origin along N."""
     poses = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
     for surface, root, tip in zip(model.aircraft.surfaces, model.roots, model.tips, strict=True):
-        axis = np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+        axis = np.array([-surface.elastic_axis_offset_m, 0.0, 0.0])  # aft
         poses.x[root : tip + 1] += surface_pose(surface)[1] + axis
     return poses
 

@@ -75,8 +75,8 @@ def test_linear_taper_in_closed_form():
     m, mx, my, *_ = link_masses(surface, cut(surface, [1.0]))[0, 0]
     assert m == pytest.approx(density * span * (a + b) / 2)
     assert my == pytest.approx(density * span**2 * (a + 2 * b) / 6)
-    offset = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
-    assert mx == pytest.approx(m * offset)
+    aft = surface.mass_axis_offset_m - surface.elastic_axis_offset_m
+    assert mx == pytest.approx(-m * aft)
 
 
 @LAWS

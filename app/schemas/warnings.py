@@ -1,0 +1,27 @@
+"""Warnings that every result carries."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+
+class ResultWarning(BaseModel):
+    """Something in a result that its method does not answer for."""
+
+    code: str = Field(
+        description="Stable, for programs: `at_bound`, `large_error`, `large_alpha`, `compressible`, "
+        "`steep_pitch`, `looks_like_degrees`, `surfaces_overlap`, `wings_differ`, `diverged` (a flight that "
+        "the answer does not rest on), `verification_failed`, `not_flyable` (of a partial result: nothing "
+        "has flown yet).",
+        examples=["at_bound"],
+    )
+    message: str = Field(description="What was seen.")
+    hint: str = Field(description="What to do about it.")
+    pointer: str = Field(description="JSON pointer into the request.", examples=["/model/bounds/lag_s"])
+
+
+Warnings = Annotated[
+    list[ResultWarning], Field(description="What the method does not answer for; empty if nothing.")
+]

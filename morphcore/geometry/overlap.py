@@ -1,0 +1,84 @@
+"""Lifting surfaces that lie in each other: a lattice through a lattice has no meaning.
+
+Mid-surfaces are flat trapezia. Two that are nearly parallel overlap where their outlines do and their
+distance is less than their mean thickness; two at an angle where one cuts through the other. Both by
+separating axes (Gottschalk, Lin & Manocha 1996): convex bodies are apart where some axis keeps their shadows
+apart.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.lattice import surface_pose
+from morphcore.geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+PARALLEL = 0.985  # cosine of ten degrees between the normals
+DEPTH_CHORDS = 0.02  # of the smaller mean chord: surfaces that meet at an edge do not overlap
+LARGEST_SHAPES = 9  # hinge angles of a flight that are looked at
+
+
+def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, int, int]]:
+    """Pairs of surfaces that overlap at any of some hinge angles.
+
+    Parameters
+    ----------
+    angles : (k, s) of all surfaces over a flight, rad; fixed surfaces' are not looked at. Up to
+        LARGEST_SHAPES of the rows are used, evenly spread with both ends.
+
+    Returns
+    -------
+    (first, second, row) of each pair, row being the first of ``angles`` at which they were seen to overlap.
+    """
+    rows = np.unique(np.linspace(0, angles.shape[0] - 1, LARGEST_SHAPES).round().astype(np.int64))
+    found: dict[tuple[int, int], int] = {}
+    for row in rows:
+        outlines = [
+            outline_B(surface, float(angle))
+            for surface, angle in zip(aircraft.surfaces, angles[row], strict=True)
+        ]
+        for first, second in itertools.combinations(range(len(outlines)), 2):
+            pair = aircraft.surfaces[first], aircraft.surfaces[second]
+            if (first, second) not in found and _overlap(*pair, outlines[first], outlines[second]):
+                found[first, second] = int(row)
+    return [(first, second, row) for (first, second), row in found.items()]
+
+
+def outline_B(surface: Surface, hinge_rad: float) -> Array:
+    """Corners (4, 3) of an undeformed surface's mid-plane in B, around it from the root's leading edge, m."""
+    tip_y = surface.span_sign * surface.span_m
+    root, tip = 0.5 * surface.root_chord_m, 0.5 * surface.tip_chord_m
+    corners_W = np.array([[root, 0.0, 0.0], [tip, tip_y, 0.0], [-tip, tip_y, 0.0], [-root, 0.0, 0.0]])
+    R_BW, r_B = surface_pose(surface, hinge_rad)
+    return np.asarray(corners_W @ R_BW.T + r_B)
+
+
+def _overlap(first: Surface, second: Surface, one_B: Array, other_B: Array) -> bool:
+    depth = DEPTH_CHORDS * min(first.mean_chord_m, second.mean_chord_m)
+    edges = [np.roll(corners, -1, axis=0) - corners for corners in (one_B, other_B)]
+    normals = [_unit(np.cross(own[0], own[1])) for own in edges]
+    if abs(float(normals[0] @ normals[1])) > PARALLEL:
+        height = (other_B - one_B[0]) @ normals[0]
+        gap = max(height.min(), -height.max(), 0.0)
+        axes = np.cross(normals[0], np.concatenate(edges))
+        if gap >= 0.5 * (first.thickness_m + second.thickness_m):
+            return False
+    else:
+        crossed = np.cross(edges[0][:, None], edges[1][None]).reshape(-1, 3)
+        axes = np.concatenate([normals, crossed])
+    lengths = np.linalg.norm(axes, axis=1)
+    axes = axes[lengths > 1e-9 * lengths.max()]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    one, other = one_B @ axes.T, other_B @ axes.T
+    common = np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
+    return bool(common.min() > depth)
+
+
+def _unit(vector: Array) -> Array:
+    return np.asarray(vector / np.linalg.norm(vector))

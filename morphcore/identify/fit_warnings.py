@@ -1,0 +1,178 @@
+"""What is said about an identified model: that it does not fly, or what its method does not answer for."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from morphcore.errors import NotFlyable
+from morphcore.frames import wrap_angle
+from morphcore.geometry.obstacle import obstacle
+from morphcore.geometry.surface import Surface
+from morphcore.identify.cost import shared_trims
+from morphcore.identify.sample_fit import SampleFit
+from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.simulate.chain_motion import chain_motion
+from morphcore.simulate.trim import trimmed_state
+from morphcore.validity import (
+    AirMotion,
+    ResultWarning,
+    air_warnings,
+    degrees_warning,
+    error_warning,
+    overlap_warnings,
+    steep_warning,
+)
+
+if TYPE_CHECKING:
+    from morphcore.identify.identification import Identification
+    from morphcore.identify.settings import ModelSettings
+
+Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each flight
+SHOWN_NAMES = 4  # of parameters in a sentence
+UNSEEN_HINT = (
+    "the samples do not determine it, and its value means little: take fewer links, or samples that show more"
+)
+UNLIKE_WINGS = 0.02  # relative difference of stiffness or mass beyond which wings are not alike
+
+
+def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: ModelSettings) -> NotFlyable:
+    """The error of a search whose best model does not fly what it was fitted to, with what may be why."""
+    found = obstacle(model.aircraft, model.flight)
+    if found is not None:
+        pointer, hint = found.pointer, found.hint
+    elif all(fit.ending("rigid") for fit in lost):
+        pointer = "/aircraft"
+        hint = (
+            "the rigid aircraft does not fly them either: check masses, positions and hinges of the "
+            "aircraft, and the flight condition"
+        )
+    elif settings.bounds:
+        pointer, hint = "/model/bounds", "the rigid aircraft flies them: widen the bounds of the search"
+    else:
+        pointer = "/search"
+        hint = (
+            "the rigid aircraft flies them: check stiffness and damping of the wings' material, or search "
+            "longer, with more particles or fewer links"
+        )
+    flights = ", ".join(f"{fit.case.sample.name} ({fit.ending('identified')})" for fit in lost)
+    return NotFlyable(f"no model was found that flies the samples: {flights}", pointer=pointer, hint=hint)
+
+
+def fit_warnings(
+    run: Identification,
+    best: ParameterBatch,
+    fits: Sequence[SampleFit],
+    at_bound: Mapping[str, str],
+    undetermined: Collection[str],
+) -> tuple[ResultWarning, ...]:
+    """Warnings of the best model (one parameter set) of an identification.
+
+    at_bound : parameters that ended at a bound, and which. undetermined : those that the samples do not see.
+    """
+    aircraft = run.model.aircraft
+    found: list[ResultWarning] = []
+    lost = [fit for fit in fits if fit.case.sample.role == "train" and fit.ending("identified")]
+    if lost:
+        error = not_flyable(run.model, lost, run.settings)
+        found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
+    found += _of_samples(fits)
+    found += _of_bounds(at_bound, undetermined)
+    found += air_warnings(run.model.flight, _motions(run, best, fits))
+    found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft.surfaces) for fit in fits]))
+    if not run.settings.separate_wings:
+        found += _of_wings(aircraft.surfaces)
+    return tuple(found)
+
+
+def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
+    for number, fit in enumerate(fits):
+        sample = fit.case.sample
+        name, pointer = f"sample {sample.name!r}", f"/samples/{number}"
+        yield from steep_warning(name, pointer, sample.theta)
+        yield from degrees_warning(name, pointer, sample.euler, fit.rigid)
+        if sample.role != "train" and fit.ending("identified"):
+            yield ResultWarning(
+                "diverged",
+                f"the model does not fly {name}, which was held out: the flight {fit.ending('identified')}",
+                "the model is good for flights like those it was fitted to: fit one like this too, or check "
+                "its sweep and conditions",
+                pointer,
+            )
+        yield from error_warning(
+            name, pointer, fit.errors("identified"), wrap_angle(sample.euler - sample.euler[0])
+        )
+
+
+def _of_bounds(at_bound: Mapping[str, str], undetermined: Collection[str]) -> Iterable[ResultWarning]:
+    """One warning for each kind of parameter and end of its range, those apart that the samples do not see."""
+    kinds: dict[tuple[str, str, bool], list[str]] = {}
+    for name, end in at_bound.items():
+        kind = next(part for part in name.split(".") if not part.startswith("wing_"))
+        kinds.setdefault((kind, end, name in undetermined), []).append(name)
+    for (kind, end, unseen), names in kinds.items():
+        shown = ", ".join(names[:SHOWN_NAMES])
+        more = f" and {len(names) - SHOWN_NAMES} more" if len(names) > SHOWN_NAMES else ""
+        yield ResultWarning(
+            "at_bound",
+            f"{shown}{more} ended at the {end} bound of the search",
+            UNSEEN_HINT if unseen else _bound_hint(kind, end),
+            f"/model/bounds/{kind}",
+        )
+
+
+def _bound_hint(kind: str, end: str) -> str:
+    if kind == "division":
+        return "the best value may lie beyond: try another number of links"
+    if (kind, end) == ("profile_drag", "lower"):
+        return "no drag is less than none: the samples may show something that the model lacks"
+    return f"the best value may lie beyond: widen model.bounds.{kind}"
+
+
+def _of_wings(surfaces: Sequence[Surface]) -> Iterable[ResultWarning]:
+    """Flexible surfaces that share their parameters and are not built alike."""
+    flexible = [(number, surface) for number, surface in enumerate(surfaces) if surface.flexible]
+    if not flexible:
+        return
+    first = flexible[0][1]
+    for number, surface in flexible[1:]:
+        if not _alike(first, surface):
+            yield ResultWarning(
+                "wings_differ",
+                f"{surface.name!r} is not built like {first.name!r}, and both share the parameters of one "
+                "model",
+                "set model.separate_wings to identify each by itself",
+                f"/aircraft/surfaces/{number}",
+            )
+
+
+def _alike(one: Surface, other: Surface) -> bool:
+    fractions = np.linspace(0.0, 1.0, 5)
+    sections = [surface.section_at(fractions * surface.span_m) for surface in (one, other)]
+    pairs = [(one.span_m, other.span_m)] + [
+        tuple(getattr(section, name) for section in sections) for name in ("ei_flap", "ei_lag", "gj", "mass")
+    ]
+    return all(np.allclose(a, b, rtol=UNLIKE_WINGS, atol=0.0) for a, b in pairs)
+
+
+def _angles(fit: SampleFit, surfaces: Sequence[Surface]) -> np.ndarray:
+    """Hinge angles (k, s) of all surfaces along a sample."""
+    return np.stack([fit.case.sample.sweep(surface.side) for surface in surfaces], axis=1)
+
+
+def _motions(run: Identification, best: ParameterBatch, fits: Sequence[SampleFit]) -> Motions:
+    """The best model's motion through the air along the samples that it is trimmed for."""
+    motions: Motions = []
+    trims = shared_trims(run.model, best, [fit.case for fit in fits], run.settings.start)
+    for number, (fit, (case, found)) in enumerate(zip(fits, trims, strict=True)):
+        if not found.converged[0]:
+            continue
+        flown, plan = case.plan.flown(run.model), case.plan
+        constants = lane_constants(flown, best, plan.grid.step_s)
+        constants.set_thrust(found.force_B, found.moment_B)
+        state = trimmed_state(flown, best, plan, found, psi=float(case.sample.psi[0]))
+        motion = chain_motion(flown, plan, constants, state)
+        motions.append((f"sample {fit.case.sample.name!r}", f"/samples/{number}", motion))
+    return motions

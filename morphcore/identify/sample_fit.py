@@ -1,0 +1,89 @@
+"""How the rigid, the guessed and the identified model fly along one sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import wrap_angle
+from morphcore.identify.cost import SampleCase
+from morphcore.shown import Shown
+
+Array = NDArray[np.float64]
+
+ANGLES = ("phi", "theta", "psi")
+
+
+@dataclass(frozen=True, repr=False)
+class SampleFit(Shown):
+    """Attitudes (k, 3) flown against one sample by the rigid, the guessed and the identified model, rad."""
+
+    case: SampleCase
+    rigid: Array
+    initial: Array
+    identified: Array
+
+    def J(self, model: str) -> float | None:
+        """The sample's part of J for a model, rad^2; None where its flight diverged."""
+        return _number(np.sum((self.errors(model) * self.case.weight) ** 2))
+
+    def errors(self, model: str) -> Array:
+        """(k, 3) wrapped angle differences, rad."""
+        return wrap_angle(getattr(self, model) - self.case.sample.euler)
+
+    def ending(self, model: str) -> str:
+        """How a model's flight failed, as words; "" where it reached its end."""
+        known = np.all(np.isfinite(getattr(self, model)), axis=1)
+        if known.all():
+            return ""
+        time_s = self.case.sample.time_s
+        return f"diverged at t = {time_s[np.argmin(known)]:.2f} s" if known[0] else "could not be trimmed"
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form with the names that the API fixes, and the rigid model's errors beside."""
+
+        def per_angle(values: Array) -> dict[str, float | None]:
+            return {angle: _number(value) for angle, value in zip(ANGLES, values, strict=True)}
+
+        identified, rigid = self.errors("identified"), self.errors("rigid")
+        return {
+            "sample": self.case.sample.name,
+            "role": self.case.sample.role,
+            "J_rigid": self.J("rigid"),
+            "J_initial": self.J("initial"),
+            "J_identified": self.J("identified"),
+            "rms_rad": per_angle(np.sqrt(np.mean(identified**2, axis=0))),
+            "max_abs_rad": per_angle(np.abs(identified).max(axis=0)),
+            "rms_rigid_rad": per_angle(np.sqrt(np.mean(rigid**2, axis=0))),
+            "range_rad": per_angle(np.ptp(self.case.sample.euler, axis=0)),
+        }
+
+    def to_curves(self) -> dict[str, Any]:
+        """Time histories for plots and tables."""
+        sample = self.case.sample
+
+        def angles(values: Array) -> dict[str, list[float | None]]:
+            return {
+                f"{name}_rad": [_number(v) for v in column]
+                for name, column in zip(ANGLES, values.T, strict=True)
+            }
+
+        return {
+            "name": sample.name,
+            "role": sample.role,
+            "time_s": sample.time_s.tolist(),
+            "sweep_left_rad": sample.sweep_left.tolist(),
+            "sweep_right_rad": sample.sweep_right.tolist(),
+            "measured": angles(sample.euler),
+            "rigid": angles(self.rigid),
+            "initial": angles(self.initial),
+            "identified": angles(self.identified),
+        }
+
+
+def _number(value: Any) -> float | None:
+    number = float(value)
+    return number if np.isfinite(number) else None

@@ -1,0 +1,45 @@
+"""Joints of an equivalent model that are too soft for what they carry, to explain a flight that failed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from morphcore.geometry.obstacle import LARGEST_SLOPE_RAD, Obstacle, load_per_length, too_little_air
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.models.links import link_edges
+
+POINTER = "/model/parameters/stiffness_nm_rad"
+
+
+def chain_obstacle(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
+    """What keeps a chain (one parameter set) from flying: a joint of it, or too little air."""
+    return soft_joint(model, batch) or too_little_air(model.aircraft, model.flight)
+
+
+def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
+    """The joint that its share of the weight would turn too far in flap; None where all carry it.
+
+    The moment at a distance y from the root is q (L - y)^2 / 2 under a load q per length.
+    """
+    load_n_m = load_per_length(model.aircraft, model.flight)
+    wing = 0
+    worst: tuple[float, str, int, float] = (LARGEST_SLOPE_RAD, "", 0, 0.0)
+    for surface in model.aircraft.surfaces:
+        if not surface.flexible:
+            continue
+        own = min(wing, batch.wing_sets - 1)
+        wing += 1
+        joints_m = link_edges(batch.division[:1, own], surface.span_m)[0, 1:-1]
+        moment = 0.5 * load_n_m * (surface.span_m - joints_m) ** 2
+        for joint, stiffness in enumerate(batch.stiffness[0, own, :, 0]):
+            angle = float(moment[joint] / max(stiffness, np.finfo(float).tiny))
+            if angle > worst[0]:
+                worst = (angle, surface.name, joint + 1, float(stiffness))
+    angle, name, joint, stiffness = worst
+    if not joint:
+        return None
+    return Obstacle(
+        POINTER,
+        f"joint {joint} of {name!r}, {stiffness:.3g} N m/rad in flap, is too soft for its share of the "
+        f"weight: it would turn by {angle:.3g} rad; check the parameters, or identify the model anew",
+    )

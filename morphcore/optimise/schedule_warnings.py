@@ -1,0 +1,77 @@
+"""What is said about an optimised morph: flights that failed, and what the method does not answer for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from morphcore.optimise.compared import ComparedFlight
+from morphcore.optimise.state import OptimisationState
+from morphcore.simulate.schedule import Schedule
+from morphcore.validity import ResultWarning, air_warnings, documents, overlap_warnings
+
+if TYPE_CHECKING:
+    from morphcore.optimise.optimisation import ScheduleOptimisation
+
+SHAPES = 9  # between the path's ends, of which overlaps are looked for
+Flights = Mapping[str, Mapping[str, ComparedFlight | None]]
+
+
+def schedule_warnings(
+    run: ScheduleOptimisation,
+    state: OptimisationState,
+    schedules: Mapping[str, Schedule | None],
+    flights: Flights,
+) -> tuple[dict[str, Any], ...]:
+    """Warnings of the compared schedules as documents; those of the flexible model's flights are kept so."""
+    found = _lost(run, flights)
+    optimum = schedules["optimum"]
+    flown = flights["equivalent"]["optimum"]
+    if optimum is not None and flown is not None and flown.variation is not None:
+        motion = run.flights("equivalent").motion(optimum)
+        found += air_warnings(run.flight, [("the optimum in the equivalent model", "/morph", motion)])
+    angles = np.linspace(run.path.low_rad, run.path.high_rad, SHAPES)[:, None]
+    found += overlap_warnings(run.aircraft, np.tile(angles, len(run.aircraft.surfaces)))
+    verified: list[dict[str, Any]] = []
+    for item in state.verified:
+        name = item.schedule.replace("_", " ")
+        if item.failure:
+            found.append(
+                ResultWarning(
+                    "verification_failed",
+                    f"the {name} was not flown in the flexible model: {item.failure}",
+                    "the figures of the rigid and the equivalent model stand without this proof",
+                    "/flexible",
+                )
+            )
+        if item.schedule == "optimum":
+            verified += [
+                {**warning, "message": f"in the flexible model, {warning['message']}"}
+                for warning in item.warnings
+                if warning["code"] in ("large_alpha", "steep_pitch")
+            ]
+    return (*documents(found), *verified)
+
+
+def _lost(run: ScheduleOptimisation, flights: Flights) -> list[ResultWarning]:
+    """Flights that left their model's domain; where it is the optimum's, there is no answer."""
+    found = []
+    for model, compared in flights.items():
+        for name, flight in compared.items():
+            if flight is None or flight.variation is not None:
+                continue
+            if (model, name) == ("equivalent", "optimum"):
+                error = run.not_flyable()
+                found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
+            else:
+                found.append(
+                    ResultWarning(
+                        "diverged",
+                        f"the {name.replace('_', ' ')} diverged in the {model} model: no variation there",
+                        "compare with the other models, or choose a slower morph",
+                        "/morph",
+                    )
+                )
+    return found

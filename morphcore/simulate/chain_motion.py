@@ -1,0 +1,39 @@
+"""How one parameter set of a chain meets the air along a plan: what its warnings are judged by."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
+from morphcore.models.equivalent import ChainModel, LaneConstants
+from morphcore.models.kernels.layout import OMEGA, POSITION, VELOCITY
+from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.plan import FlightPlan
+from morphcore.stopping import Stop
+from morphcore.validity import AirMotion, air_motion
+
+Array = NDArray[np.float64]
+
+
+def chain_motion(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, state: Array, stop: Stop | None = None
+) -> AirMotion:
+    """Motion through the air of the first particle of ``state``, as long as its flight is finite.
+
+    ``model`` is the one that the plan flies (`FlightPlan.flown`), as of `fly_batch`.
+    """
+    chunks = fly_batch(model, plan, constants, state, record_rows=POSITION, stop=stop)
+    rows = np.concatenate([chunk.rows[..., 0] for chunk in chunks])
+    sound = np.all(np.isfinite(rows), axis=1)
+    count = rows.shape[0] if np.all(sound) else max(int(np.argmin(sound)), 1)
+    quaternion, velocity_B = rows[:count, :OMEGA], rows[:count, VELOCITY:POSITION]
+    velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), velocity_B)
+    return air_motion(
+        model.aircraft,
+        plan.grid.times_s[:count],
+        euler_from_quaternion(quaternion),
+        velocity_N,
+        plan.wind_N[:count],
+        plan.angles[:count],
+    )

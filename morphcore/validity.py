@@ -1,0 +1,201 @@
+"""Warnings of results: where a number lies outside of what its method is good for, and what to do about it.
+
+Every result carries them as ``warnings``; whoever shows a result shows them too. A warning says what was seen
+and points to the part of the request that it is about. What has no answer at all is an error, not a warning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.atmosphere import standard_atmosphere
+from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
+from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.overlap import overlapping_surfaces
+
+Array = NDArray[np.float64]
+
+# A thin airfoil's lift has left the straight line by then; a lattice knows no stall.
+LARGEST_ALPHA_RAD = np.radians(15.0)
+LARGEST_MACH = 0.3  # below it air is incompressible to 5 per cent of the lift
+# Five degrees from the vertical roll and yaw turn about nearly the same axis and their errors grow tenfold.
+STEEPEST_PITCH_RAD = np.radians(85.0)
+LARGEST_ERROR = 0.05  # of the motion, rms
+LEAST_ERROR_RAD = 1e-4  # rms; what the integration resolves (simulate/plan.py)
+
+
+@dataclass(frozen=True)
+class ResultWarning:
+    """One warning: a stable code, two sentences, a JSON pointer into the request ("" for the whole)."""
+
+    code: str
+    message: str
+    hint: str
+    pointer: str = ""
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON form."""
+        return {"code": self.code, "message": self.message, "hint": self.hint, "pointer": self.pointer}
+
+
+@dataclass(frozen=True)
+class AirMotion:
+    """How an aircraft meets the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
+
+    The incidence is the angle of attack of the body, or of the surface whose hinge inclines it furthest.
+    """
+
+    time_s: Array
+    incidence: Array
+    airspeed: Array
+
+
+def air_motion(
+    aircraft: Aircraft, time_s: Array, euler: Array, velocity_N: Array, wind_N: Array, angles: Array
+) -> AirMotion:
+    """The motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, s)."""
+    air_N = velocity_N - wind_N
+    R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
+    air_B = np.einsum("kij,ki->kj", R_NB, air_N)
+    alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
+    inclined = [
+        angles[:, number]
+        for number, surface in enumerate(aircraft.surfaces)
+        if surface.hinge is not None and surface.hinge.axis == "y"
+    ]
+    incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
+    furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
+    return AirMotion(time_s, furthest, np.asarray(np.linalg.norm(air_N, axis=1)))
+
+
+def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:
+    """Incidence beyond the straight part of the lift, and air that is compressed without ``mach``.
+
+    Parameters
+    ----------
+    motions : of each flight a name for the sentence, the pointer to it in the request, and its motion.
+    """
+    found = []
+    for name, pointer, motion in motions:
+        worst = int(np.abs(motion.incidence).argmax())
+        if abs(motion.incidence[worst]) > LARGEST_ALPHA_RAD:
+            found.append(
+                ResultWarning(
+                    "large_alpha",
+                    f"the angle of attack reaches {np.degrees(motion.incidence[worst]):.1f} degrees at "
+                    f"t = {motion.time_s[worst]:.2f} s in {name}",
+                    "the vortex lattice knows no stall, which a real wing meets at about "
+                    f"{np.degrees(LARGEST_ALPHA_RAD):.0f} degrees: fly faster, lighter or a gentler morph, "
+                    "or trust the result only up to there",
+                    pointer,
+                )
+            )
+    fastest = max([flight.airspeed_m_s, *(float(motion.airspeed.max()) for _, _, motion in motions)])
+    mach = fastest / standard_atmosphere(flight.altitude_m).speed_of_sound_m_s
+    if flight.mach is None and mach > LARGEST_MACH:
+        lift = 100.0 * (1.0 / np.sqrt(1.0 - mach**2) - 1.0) if mach < 0.9 else None
+        more = "" if lift is None else f", which leaves out about {lift:.0f} per cent of the lift"
+        found.append(
+            ResultWarning(
+                "compressible",
+                f"the flight reaches Mach {mach:.2f} and is computed as incompressible{more}",
+                'set flight.mach to "auto" (up to Mach 0.7), or to 0 if incompressible air is what you mean',
+                "/flight/mach",
+            )
+        )
+    return found
+
+
+def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
+    """Surfaces that lie in each other at any of some hinge angles (k, s), rad."""
+    found = []
+    for first, second, row in overlapping_surfaces(aircraft, angles):
+        names = [aircraft.surfaces[number].name for number in (first, second)]
+        turned = ", ".join(
+            f"{aircraft.surfaces[number].name} at {angles[row, number]:.3g} rad"
+            for number in (first, second)
+            if aircraft.surfaces[number].hinge is not None
+        )
+        found.append(
+            ResultWarning(
+                "surfaces_overlap",
+                f"{names[0]!r} and {names[1]!r} overlap" + (f" ({turned})" if turned else ""),
+                "their vortices lie in each other and the air loads mean nothing there: check position_m, "
+                "span_m and the hinges",
+                f"/aircraft/surfaces/{second}",
+            )
+        )
+    return found
+
+
+def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
+    """A pitch angle near or beyond the vertical, where Euler angles lose their meaning."""
+    steepest = float(np.abs(theta).max())
+    if steepest <= STEEPEST_PITCH_RAD:
+        return []
+    beyond = steepest > 0.5 * np.pi
+    return [
+        ResultWarning(
+            "steep_pitch",
+            f"theta reaches {steepest:.3g} rad in {name}"
+            + (", beyond the vertical" if beyond else ", nearly the vertical"),
+            "no Euler angle theta lies beyond pi/2: check the unit, which may be degrees"
+            if beyond
+            else "roll and yaw cannot be told apart there: do not read or fit them around that time",
+            pointer,
+        )
+    ]
+
+
+def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> list[ResultWarning]:
+    """Angles that a rigid aircraft flies as well once they are taken for degrees, and not as they are.
+
+    measured, rigid : (k, 3) Euler angles of a sample and of the rigid model along its sweep, rad. The rigid
+    model's motion away from the start is of the right size, if not of the right shape.
+    """
+    moved, expected = measured - measured[0], rigid - rigid[0]
+    if not np.all(np.isfinite(expected)):
+        return []
+    motion = float(np.sqrt(np.mean(expected**2)))
+    as_degrees = float(np.sqrt(np.mean((np.radians(moved) - expected) ** 2)))
+    as_radians = float(np.sqrt(np.mean((moved - expected) ** 2)))
+    if as_degrees < 0.5 * motion and as_radians > 10.0 * max(as_degrees, motion):
+        return [
+            ResultWarning(
+                "looks_like_degrees",
+                f"the angles of {name} are about {as_radians / motion:.0f} times what the aircraft would do, "
+                "and fit when they are taken for degrees",
+                "give them in rad, or name the columns phi_deg, theta_deg, psi_deg",
+                pointer,
+            )
+        ]
+    return []
+
+
+def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list[ResultWarning]:
+    """An error (k, 3) above LARGEST_ERROR of a sample's motion (k, 3), both rms over rows and angles."""
+    error, size = (float(np.sqrt(np.mean(values**2))) for values in (errors, motion))
+    if not np.isfinite(error) or error <= max(LARGEST_ERROR * size, LEAST_ERROR_RAD):
+        return []
+    share = (
+        f"{100.0 * error / size:.0f} per cent of its motion" if size > 0.0 else "and it does not move at all"
+    )
+    return [
+        ResultWarning(
+            "large_error",
+            f"the model misses {name} by {1e3 * error:.2g} mrad rms, {share}",
+            "more links, more time or other samples may help; an aircraft, a flight condition or units that "
+            "are not the sample's leave errors as well",
+            pointer,
+        )
+    ]
+
+
+def documents(warnings: Sequence[ResultWarning]) -> list[dict[str, Any]]:
+    """JSON form of a result's warnings."""
+    return [warning.to_document() for warning in warnings]
