@@ -25,7 +25,7 @@ Answer = TypeVar("Answer")
 
 BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
 JOURNAL_LIMIT_BYTES = 4 * 2**20  # SQLite: a longer journal is cut when it is begun anew
-LENDINGS = 8  # tries of a write that must fit
+LENDINGS = 16  # tries of a write that must fit
 BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
 CONNECT_TIMEOUT_S = 5
 POSTGRES_PATIENCE = {

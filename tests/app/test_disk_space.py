@@ -7,7 +7,7 @@ import sqlite3
 import subprocess
 import threading
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -31,8 +31,8 @@ from tests.waiting import until
 JOBS = 20
 FILE_BYTES = 500_000
 WITHIN_S = 60.0
-DISK = "24m"
-BLOCK = 4096
+DISK = "64m"
+BLOCKS = (2**20, 4096)
 
 
 @pytest.fixture
@@ -178,11 +178,10 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def take_every_byte(folder: Path) -> None:
     """Fill the disk to its last block."""
     with (folder / "filler").open("ab", buffering=0) as filler:
-        try:
-            while True:
-                filler.write(bytes(BLOCK))
-        except OSError:
-            return
+        for block in BLOCKS:
+            with suppress(OSError):
+                while filler.write(bytes(block)) == block:
+                    pass
 
 
 def until_full(service: RunningService, folder: Path) -> None:
@@ -205,7 +204,7 @@ def test_on_a_full_disk_everything_can_be_cancelled_and_deleted(small_disk: Path
         over = threading.Event()
 
         def take_on() -> None:
-            while not over.wait(0.005):
+            while not over.wait(0.02):
                 take_every_byte(small_disk)
 
         until_full(service, small_disk)
