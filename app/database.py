@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import URL, Double, Engine, Table, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine import Connection
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import FunctionElement
@@ -25,7 +25,8 @@ Session = Connection
 Answer = TypeVar("Answer")
 
 BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
-JOURNAL_LIMIT_BYTES = 16 * 2**20  # SQLite: a longer journal is cut when it is begun anew
+JOURNAL_LIMIT_BYTES = 4 * 2**20  # SQLite: a longer journal is cut when it is begun anew
+LENDINGS = 16  # tries of a write that must fit
 BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
 CONNECT_TIMEOUT_S = 5
 POSTGRES_PATIENCE = {
@@ -173,20 +174,26 @@ class Database:
         For what people need most when the disk is full: to cancel, to delete, to have a job end. `write` is
         called again when it did not fit.
         """
-        lent = False
-        while True:
-            try:
-                with self.write() as session:
-                    answer = write(session)
-            except DBAPIError as error:
-                full = trouble_of(error) is DatabaseTrouble.FULL
-                if not full or self.reserve is None or not self.reserve.lend():
-                    raise
-                lent = True
-            else:
-                if lent and self.reserve is not None:
-                    self.reserve.take_back()
+        try:
+            with self.write() as session:
+                return write(session)
+        except DBAPIError as error:
+            if trouble_of(error) is not DatabaseTrouble.FULL or self.reserve is None:
+                raise
+            return self._write_with(self.reserve, write, error)
+
+    def _write_with(self, reserve: Reserve, write: Callable[[Session], Answer], why: DBAPIError) -> Answer:
+        """Repeat a write that did not fit; somebody else's may take what is lent before ours is on disk."""
+        for _ in range(LENDINGS):
+            with suppress(OperationalError), self.write() as session:
+                answer = write(session)
+                # at the last moment, while nobody else can write here: the commit finds the room
+                if not reserve.lend():
+                    raise why
+                session.commit()
+                reserve.take_back()
                 return answer
+        raise why
 
     @contextmanager
     def read(self) -> Iterator[Session]:

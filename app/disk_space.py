@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import sqlite3
+from contextlib import closing
 
 from sqlalchemy import text
 
@@ -27,20 +28,14 @@ def give_back(database: Database) -> bool:
         free = int(session.scalar(text("PRAGMA freelist_count")) or 0) - KEPT_PAGES
         if free <= 0 or session.scalar(text("PRAGMA auto_vacuum")) != INCREMENTAL:
             return False
-    with database.write() as session:
-        session.exec_driver_sql(f"PRAGMA incremental_vacuum({min(free, SLICE_PAGES)})").all()
-    if free <= SLICE_PAGES:
-        shorten(database)
-    return free > SLICE_PAGES
-
-
-def shorten(database: Database) -> None:
-    """Bring the journal into the file, which is cut then, as far as nobody reads what is older."""
-    connection = database.engine.raw_connection()
-    try:
-        connection.cursor().execute("PRAGMA wal_checkpoint(PASSIVE)")
-    finally:
-        connection.close()
+    more = free > SLICE_PAGES
+    with closing(database.engine.raw_connection()) as connection:
+        # a script, for this is a step a page, and of a statement without rows the driver makes one step
+        connection.cursor().executescript(f"PRAGMA incremental_vacuum({min(free, SLICE_PAGES)})")
+        if not more:
+            # the journal goes into the file, which is cut then, as far as nobody reads what is older
+            connection.cursor().execute("PRAGMA wal_checkpoint(PASSIVE)")
+    return more
 
 
 def make_shrinkable(database: Database) -> None:
@@ -54,12 +49,10 @@ def make_shrinkable(database: Database) -> None:
     with database.read() as session:
         if session.scalar(text("PRAGMA auto_vacuum")) == INCREMENTAL:
             return
-    connection = database.engine.raw_connection()
-    try:
-        cursor = connection.cursor()
-        cursor.execute(f"PRAGMA auto_vacuum = {INCREMENTAL}")
-        cursor.execute("VACUUM")
-    except sqlite3.OperationalError as error:
-        log.warning("the database file cannot shrink yet: %s", error)
-    finally:
-        connection.close()
+    with closing(database.engine.raw_connection()) as connection:
+        try:
+            cursor = connection.cursor()
+            cursor.execute(f"PRAGMA auto_vacuum = {INCREMENTAL}")
+            cursor.execute("VACUUM")
+        except sqlite3.OperationalError as error:
+            log.warning("the database file cannot shrink yet: %s", error)

@@ -6,10 +6,10 @@ import contextlib
 import os
 from pathlib import Path
 
-RESERVE_BYTES = 4 * 2**20
-SLICE_BYTES = 2**19  # what one such write may need: some dozens of pages in the journal
-STEP_BYTES = 2**15  # in which what was not needed is taken back
-SHARE = 16  # of a small disk's free room only such a part is kept
+RESERVE_BYTES = 8 * 2**20
+SLICE_BYTES = 2**17  # what one such write may need: some twenty pages in the journal
+STEP_BYTES = 2**14  # in which what was not needed is taken back
+SHARE = 8  # of a small disk's free room only such a part is kept
 SUFFIX = "-reserve"
 
 
