@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -85,8 +86,9 @@ def composition(root: Path, tmp_path: Path, postgres_server: GivenPostgres) -> I
     broker = prepare_broker(tmp_path)
     child = supervisor.start(broker.spec)
     assert supervisor.wait_until(child, broker.answers, 10.0)
+    text = (root / "docker-compose.yml").read_text("utf-8")
     yield Composition(
-        services=yaml.safe_load((root / "docker-compose.yml").read_text())["services"],
+        services=yaml.safe_load(re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", text))["services"],
         supervisor=supervisor,
         environment={
             "MORPHID_DATABASE_URL": postgres_server.new_database(),

@@ -72,7 +72,8 @@ def test_compose_settings_are_accepted(root: Path, monkeypatch: pytest.MonkeyPat
     for name in ("api", "worker", "beat"):
         with monkeypatch.context() as patch:
             for key, value in services[name]["environment"].items():
-                patch.setenv(key, re.sub(r"\$\{MORPHID_(\w+)_PASSWORD:\?[^}]*\}", r"chosen-\1", value))
+                value = re.sub(r"\$\{MORPHID_(\w+)_PASSWORD:\?[^}]*\}", r"chosen-\1", value)  # noqa: PLW2901
+                patch.setenv(key, re.sub(r"\$\{[A-Z_]+:-([^}]*)\}", r"\1", value))
             settings = load_settings()
         assert settings.broker_url == "redis://:chosen-BROKER@redis:6379/0"
 
