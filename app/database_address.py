@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,9 +20,21 @@ class UnusableAddress(ValueError):
 
 
 def sqlite_url(file: Path) -> str:
-    """Give the URL of an SQLite file, whatever characters its folders have in their names."""
+    """Give the URL of an SQLite file, whatever characters its folders have in their names.
+
+    Raises
+    ------
+    UnusableAddress
+        SQLite would look for another file: it takes names in UTF-8, and this process has others.
+    """
     from sqlalchemy import URL  # lazy, here and below: settings are read where no database is
 
+    if os.fsencode(file) != str(file).encode("utf-8", "replace"):
+        shown = os.fsencode(file).decode("utf-8", "replace")
+        raise UnusableAddress(
+            f"{shown} is no name that SQLite finds in this locale ({sys.getfilesystemencoding()}). "
+            "Set PYTHONUTF8=1, or choose a folder with a name in ASCII."
+        )
     return URL.create("sqlite", database=str(file)).render_as_string(hide_password=False)
 
 

@@ -161,12 +161,14 @@ class Settings(BaseSettings):
     @model_validator(mode="after")
     def _fill_and_refuse(self) -> Self:
         object.__setattr__(self, "data_dir", _found_from_everywhere(self.data_dir))
-        if not self.database_url:
-            object.__setattr__(self, "database_url", sqlite_url(self.data_dir / "morphid.sqlite3"))
         try:
-            require_usable(self.database_url)
+            if self.database_url:
+                require_usable(self.database_url)
+            else:
+                object.__setattr__(self, "database_url", sqlite_url(self.data_dir / "morphid.sqlite3"))
         except UnusableAddress as error:
-            raise UnsafeSettings(f"MORPHID_DATABASE_URL: {error}") from None
+            name = "MORPHID_DATABASE_URL" if self.database_url else "MORPHID_DATA_DIR"
+            raise UnsafeSettings(f"{name}: {error}") from None
         if self.auth == "off" and not self.allow_open and not is_loopback(self.host):
             raise UnsafeSettings(
                 f"host {self.host} is reachable from other machines and MORPHID_AUTH=off demands no keys. "

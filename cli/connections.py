@@ -39,30 +39,30 @@ def client_for(url: str, *, direct: bool = False, **options: Any) -> httpx.Clien
     """
     import httpx
 
-    if options.get("transport") is None and (direct or _reached_directly(url)):
+    try:
+        parts = urlsplit(url)
+        host = parts.hostname or ""
+        _ = parts.port  # looked at: it may be none
+        httpx.URL(url)
+    except (ValueError, httpx.InvalidURL) as error:
+        raise CommandError(
+            f"{url} is no address of a service: {error}", code=Exit.USAGE, hint=f"write {DEFAULT_URL}"
+        ) from None
+    if options.get("transport") is None and (direct or _reached_directly(host)):
         options["transport"] = httpx.HTTPTransport()  # of its own: the client then asks for no proxies
     try:
         return httpx.Client(base_url=url, **options)
-    except (ImportError, ValueError) as error:  # SOCKS without its package, or a proxy of an unknown kind
+    except (ImportError, ValueError, httpx.InvalidURL) as error:
+        # SOCKS without its package, a proxy of an unknown kind, or no address of one
         raise CommandError(
             f"the proxy that the environment names for {url} cannot be used: {error}",
             code=Exit.ENVIRONMENT,
             hint="pip install 'httpx[socks]' for a SOCKS proxy; correct ALL_PROXY, HTTPS_PROXY, HTTP_PROXY; "
             "or name the service's host in NO_PROXY",
         ) from None
-    except httpx.InvalidURL as error:
-        raise CommandError(
-            f"{url} is no address of a service, or a proxy's is none: {error}",
-            code=Exit.USAGE,
-            hint=f"write {DEFAULT_URL}",
-        ) from None
 
 
-def _reached_directly(url: str) -> bool:
+def _reached_directly(host: str) -> bool:
     from app.loopback import is_loopback
 
-    try:
-        host = urlsplit(url).hostname or ""
-    except ValueError:
-        return False  # which the client says better
     return is_loopback(host) or host in EVERY_ADDRESS or bool(proxy_bypass(host))

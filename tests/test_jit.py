@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from morphcore.jit import WithoutDoor, entry_kernel, kernel
 from tests.kernels import door
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 @kernel
@@ -34,3 +41,28 @@ def test_kernels_without_doors_refuse_python_and_serve_kernels() -> None:
             _doubled(values)
     door(_doubled)(values)
     np.testing.assert_array_equal(values, 8.0)
+
+
+def test_kernels_that_cannot_be_kept_are_compiled_anew(tmp_path: Path) -> None:
+    """A library that nobody can write, used without a home folder, works and says once what would help."""
+    (tmp_path / "__pycache__").touch()  # a file: not even root makes a folder of it
+    (tmp_path / "twice.py").write_text(
+        "from morphcore.jit import entry_kernel\n"
+        "@entry_kernel\ndef twice(x):\n    return 2 * x\n"
+        "@entry_kernel\ndef thrice(x):\n    return 3 * x\n"
+        "print(twice(3) + thrice(1))\n",
+        "utf-8",
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"HOME": "/dev/null/home", "XDG_CACHE_HOME": "/dev/null/cache", "PYTHONPATH": str(ROOT)}
+    environment["MPLCONFIGDIR"] = str(tmp_path / "plots")  # what matplotlib says of its own is its business
+    ended = subprocess.run(
+        [sys.executable, "-B", str(tmp_path / "twice.py")],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.stdout.strip() == "9", ended.stderr
+    (sentence,) = ended.stderr.splitlines()
+    assert "set NUMBA_CACHE_DIR" in sentence

@@ -25,7 +25,8 @@ from uvicorn.server import ServerState
 
 from app.errors import ServiceBusy, ServiceError
 from app.http.problems import MEDIA_TYPE, problem_document
-from app.settings import Settings, settings_or_exit
+from app.observability.logs import configure_logging
+from app.settings import Settings, doubtful_variables, settings_or_exit
 
 MAX_HEADER_BYTES = 32 * 1024  # request line and headers
 END_OF_HEADERS = re.compile(rb"\n\r?\n")
@@ -314,10 +315,18 @@ def guarded_config(app: Any, settings: Settings, **others: Any) -> GuardedConfig
     return GuardedConfig(app, limits, **others)
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Serve until SIGTERM or SIGINT."""
+def _application(settings: Settings) -> Any:
+    """Build the service in a process of its own, which therefore logs in the service's way."""
     from app.main import create_app
 
+    configure_logging(settings.log_format, settings.log_level)
+    for sentence in doubtful_variables():
+        logger.warning(sentence)
+    return create_app(settings)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Serve until SIGTERM or SIGINT."""
     parser = argparse.ArgumentParser(prog="python -m app.http.server", description="Serve the API.")
     parser.add_argument("--host", help="MORPHID_HOST where it is left out")
     parser.add_argument("--port", type=int, help="MORPHID_PORT where it is left out")
@@ -325,7 +334,7 @@ def main(arguments: list[str] | None = None) -> None:
     settings = settings_or_exit(host=chosen.host, port=chosen.port)
     config = guarded_config(
         # the options too decide whether keys are demanded
-        partial(create_app, settings),
+        partial(_application, settings),
         settings,
         factory=True,
         host=settings.host,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from sqlalchemy import create_engine, inspect, text
 from typer.testing import CliRunner
 
@@ -52,3 +53,15 @@ def test_a_database_of_the_future_is_a_sentence(tmp_path: Path) -> None:
     ended = RUNNER.invoke(app, ["db", "upgrade"], env=environment)
     assert ended.exit_code == Exit.ENVIRONMENT
     assert "newer version" in ended.stderr
+
+
+@pytest.mark.parametrize("words", [["db", "upgrade"], ["keys", "ls"], ["ready"], ["serve"], ["audit", "ls"]])
+@pytest.mark.parametrize("url", ["mysql://me@127.0.0.1/x", "postgresql+foo://me@127.0.0.1/x", "nonsense"])
+def test_an_unknown_database_is_a_sentence(words: list[str], url: str, tmp_path: Path) -> None:
+    """Every command that opens one says which there are, before it does anything."""
+    environment = {"MORPHID_DATABASE_URL": url, "MORPHID_DATA_DIR": str(tmp_path / "x")}
+    ended = RUNNER.invoke(app, words, env=environment)
+    assert ended.exit_code == Exit.USAGE
+    assert ended.stderr.startswith("error: MORPHID_DATABASE_URL: ")
+    assert "postgresql:" in ended.stderr
+    assert list(tmp_path.iterdir()) == []

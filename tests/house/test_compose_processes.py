@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+import redis
 import yaml
 
 from app.database import Database
 from app.jobs.records import Job, JobStatus
 from app.jobs.store import create_job, get_job
-from cli.broker import free_port, prepare_broker
+from cli.broker import find_server, free_port, prepare_broker
 from cli.supervisor import ChildSpec, Supervisor
 from tests.servers.postgres import GivenPostgres
 from tests.waiting import until
@@ -83,8 +86,9 @@ def composition(root: Path, tmp_path: Path, postgres_server: GivenPostgres) -> I
     broker = prepare_broker(tmp_path)
     child = supervisor.start(broker.spec)
     assert supervisor.wait_until(child, broker.answers, 10.0)
+    text = (root / "docker-compose.yml").read_text("utf-8")
     yield Composition(
-        services=yaml.safe_load((root / "docker-compose.yml").read_text())["services"],
+        services=yaml.safe_load(re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", text))["services"],
         supervisor=supervisor,
         environment={
             "MORPHID_DATABASE_URL": postgres_server.new_database(),
@@ -94,6 +98,38 @@ def composition(root: Path, tmp_path: Path, postgres_server: GivenPostgres) -> I
         port=free_port(0),
     )
     supervisor.stop()
+
+
+def test_the_composed_redis_asks_for_its_password(composition: Composition, tmp_path: Path) -> None:
+    """Its command, run with this machine's server: no arguments tell the password, and all must have it."""
+    redis_server = tmp_path / "bin" / "redis-server"
+    redis_server.parent.mkdir()
+    redis_server.symlink_to(find_server())
+    port, password = free_port(0), "2f8a6c"
+    words = composition.services["redis"]["command"]
+    words = [
+        word.replace("$$", "$").replace("redis-server -", f"redis-server - --port {port}") for word in words
+    ]
+    environment = {
+        "REDISCLI_AUTH": password,
+        "PATH": os.pathsep.join([str(redis_server.parent), os.environ["PATH"]]),
+        "PWD": str(tmp_path),
+    }
+    words[-1] = f"cd {tmp_path}; {words[-1]}"
+    child = composition.supervisor.start(ChildSpec(name="redis", command=words, environment=environment))
+
+    def answers() -> bool:
+        with suppress(redis.ConnectionError), redis.Redis(port=port, password=password) as client:
+            return bool(client.ping())
+        return False
+
+    until(answers, 20.0, 0.1, seen=lambda: child.last_words(30))
+    with redis.Redis(port=port) as stranger, pytest.raises(redis.AuthenticationError):
+        stranger.ping()
+    assert password.encode() not in Path(f"/proc/{child.pid}/cmdline").read_bytes()
+    with redis.Redis(port=port, password=password) as client:
+        assert str(client.config_get("maxmemory-policy")).count("noeviction") == 1
+        assert str(client.config_get("appendonly")).count("yes") == 1
 
 
 def test_the_composed_service_works(composition: Composition, root: Path) -> None:

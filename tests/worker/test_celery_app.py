@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import pytest
+
 from app.settings import load_settings
+from worker import celery_app
 from worker.celery_app import QUEUE, REAP, RUN_JOB, make_app
 
 
@@ -14,6 +19,20 @@ def test_messages_are_hints() -> None:
     assert conf.worker_disable_prefetch is True
     assert conf.task_ignore_result is True
     assert conf.result_backend is None
+
+
+def test_jobs_at_once_are_what_the_worker_was_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """MORPHID_WORKERS, unless `--concurrency` says otherwise; the cores are shared by what it comes to."""
+    assert make_app(load_settings(workers=3)).conf.worker_concurrency == 3
+    assert make_app(load_settings(reap_every_s=2.5)).conf.beat_schedule["reap"]["schedule"] == 2.5
+    monkeypatch.setattr(celery_app.shutdown, "arm", lambda: None)
+    prepared: list[int] = []
+    monkeypatch.setattr(celery_app.numerics, "prepare_environment", prepared.append)
+    monkeypatch.setattr(celery_app.numerics, "share_cores", lambda jobs: 100 // jobs)
+    monkeypatch.setitem(celery_app.app.conf.changes, "worker_concurrency", 1)
+    celery_app._before_the_pool(sender=SimpleNamespace(concurrency=5))
+    assert prepared == [20]
+    assert celery_app.threads_per_job() == 20
 
 
 def test_the_reaper_runs_often_enough() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from worker import shutdown
+from worker import numerics, shutdown
 from worker.numerics import Kernels, prepare_environment, share_cores
 
 
@@ -47,6 +47,57 @@ def test_an_unwritable_cache_is_replaced(fresh_process: dict[str, str], tmp_path
     fresh_process["NUMBA_CACHE_DIR"] = str(tmp_path / "file" / "under")
     prepare_environment(1)
     assert os.access(fresh_process["NUMBA_CACHE_DIR"], os.W_OK)
+
+
+@pytest.fixture
+def homeless(fresh_process: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """An installation that nobody can write, for a user without a home; gives the temporary folder."""
+    monkeypatch.setattr(numerics, "find_spec", lambda _name: None)
+    fresh_process["HOME"] = "/dev/null/home"  # not even root makes folders there
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(numerics.tempfile, "tempdir", str(tmp_path / "tmp"))
+    return tmp_path / "tmp"
+
+
+def test_without_a_place_for_kernels_one_sentence_names_the_variable(
+    homeless: Path, fresh_process: dict[str, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """They go to a private temporary folder, matplotlib's files too; the next process finds them there."""
+    prepare_environment(1)
+    chosen = Path(fresh_process["NUMBA_CACHE_DIR"])
+    assert chosen.parent == homeless
+    assert chosen.stat().st_mode & 0o077 == 0
+    assert fresh_process["MPLCONFIGDIR"] == str(chosen)
+    (record,) = caplog.records
+    assert "Set NUMBA_CACHE_DIR" in record.getMessage()
+    assert "\n" not in record.getMessage()
+    del fresh_process["NUMBA_CACHE_DIR"]
+    prepare_environment(1)
+    assert fresh_process["NUMBA_CACHE_DIR"] == str(chosen)
+
+
+def test_compiled_code_of_others_is_not_run(homeless: Path, fresh_process: dict[str, str]) -> None:
+    """A folder of that name that others may write, or a link, is left alone."""
+    taken = homeless / f"morphid-kernels-{os.getuid()}"
+    taken.mkdir()
+    taken.chmod(0o777)
+    prepare_environment(1)
+    first = fresh_process.pop("NUMBA_CACHE_DIR")
+    assert first != str(taken)
+    taken.rmdir()
+    taken.symlink_to(first)
+    prepare_environment(1)
+    assert fresh_process["NUMBA_CACHE_DIR"] not in {first, str(taken)}
+
+
+def test_a_home_is_enough(
+    fresh_process: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """With a home folder numba finds its own place, and nothing is said."""
+    monkeypatch.setattr(numerics, "find_spec", lambda _name: None)
+    fresh_process["HOME"] = str(tmp_path)
+    prepare_environment(1)
+    assert {"NUMBA_CACHE_DIR", "MPLCONFIGDIR"}.isdisjoint(fresh_process)
 
 
 def test_kernels_warm_up_once() -> None:
