@@ -35,7 +35,7 @@ ANGLES = ("phi", "theta", "psi")
 
 def sample(name: str, role: str) -> dict[str, Any]:
     """Read a sample flight as it stands in a request (s, rad)."""
-    with (EXAMPLES / f"{name}.csv").open(newline="") as stream:
+    with (EXAMPLES / f"{name}.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     columns = {"time_s": "t", "sweep_left_rad": "sweep_left", "sweep_right_rad": "sweep_right"}
     columns |= {f"{angle}_rad": angle for angle in ANGLES}
@@ -46,9 +46,9 @@ def sample(name: str, role: str) -> dict[str, Any]:
 def request() -> dict[str, Any]:
     """Ask for an equivalent model with three links per wing, fitted to two flights and tested on a third."""
     return {
-        "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text()),
+        "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text("utf-8")),
         # the program that made the examples takes the air for incompressible, at Mach 0.47 as well
-        "flight": json.loads((EXAMPLES / "flight.json").read_text()) | {"mach": 0.0},
+        "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")) | {"mach": 0.0},
         "samples": [sample(name, role) for name, role in SAMPLES.items()],
         "model": {"links_per_wing": 3},
         "search": {"seed": 1},
