@@ -58,6 +58,19 @@ def test_an_address_with_unknown_filters_shows_the_list(service: RunningService,
     assert page.get_by_label("Label").input_value() == "<img src=x>"
 
 
+def test_older_jobs_stay_when_a_new_one_comes(service: RunningService, page: Page) -> None:
+    """The list grows by its older jobs, and a new job comes first without pushing any out."""
+    for number in range(27):
+        posted(service, "simulate", simulate_document(), f"of many {number}")
+    page.goto(service.url)
+    rows(page, 25)
+    page.get_by_role("button", name="Older jobs").click()
+    page.get_by_role("link", name="of many 0", exact=True).wait_for(timeout=10_000)
+    before = page.locator("tbody tr").count()
+    posted(service, "simulate", simulate_document(), "the newest")
+    assert rows(page, before + 1)[0] == "the newest"
+
+
 def test_a_job_is_opened_by_keyboard(service: RunningService, page: Page) -> None:
     """Every job is a link with its label as name, and keeps the focus when the list is read again."""
     job_id = posted(service, "simulate", simulate_document(), "by keyboard")

@@ -77,7 +77,7 @@ async function listView() {
   const body = shown.tBodies[0];
   const content = element("div");
   const more = element("button", { hidden: true }, "Older jobs");
-  let filters = filtersOf(location.hash), cursor = null, asked = 0;
+  let filters = filtersOf(location.hash), cursor = null;
 
   function place(job) {
     const old = rows.get(job.id);
@@ -89,10 +89,10 @@ async function listView() {
   }
 
   function arrange() {
-    const focused = document.activeElement;
-    const inside = body.contains(focused);
-    body.replaceChildren(...[...rows.keys()].sort().reverse().map((id) => rows.get(id).row)); // ids rise with time
-    if (inside) focused.focus({ preventScroll: true });
+    const order = [...rows.keys()].sort().reverse().map((id) => rows.get(id).row); // ids rise with time
+    const focused = body.contains(document.activeElement) ? document.activeElement : null;
+    if (order.length !== body.rows.length || order.some((row, i) => row !== body.rows[i])) body.replaceChildren(...order);
+    focused?.focus({ preventScroll: true });
     const filtered = queryOf(filters) !== "", state = rows.size ? "rows" : `none of ${filtered}`;
     if (content.dataset.state !== state) content.replaceChildren(element("section", { class: "card" }, rows.size ? shown : emptyList(filtered)));
     content.dataset.state = state;
@@ -115,9 +115,9 @@ async function listView() {
   }
 
   async function refresh() {
-    const turn = ++asked;
+    const used = filters;
     const page = await call(`/jobs?limit=25&${queryOf(filters)}`);
-    if (turn !== asked) return; // the filters were changed meanwhile
+    if (used !== filters) return; // the filters were changed meanwhile, or the list was left
     const listed = new Set(page.jobs.map((job) => job.id)), oldest = page.jobs.at(-1)?.id;
     for (const id of rows.keys()) {
       if (!listed.has(id) && (page.next_cursor === null || id >= oldest)) rows.delete(id); // deleted, or of another status by now
@@ -136,14 +136,18 @@ async function listView() {
     refresh().catch((error) => { content.replaceChildren(problemCard(error)); content.dataset.state = "problem"; });
   }
 
-  more.addEventListener("click", async () => {
+  async function older() {
+    const used = filters;
     const page = await call(`/jobs?limit=25&cursor=${encodeURIComponent(cursor)}&${queryOf(filters)}`);
+    if (used !== filters) return;
     page.jobs.forEach(place);
     cursor = page.next_cursor;
     arrange();
-  });
+  }
+
+  more.addEventListener("click", () => older().catch((error) => view.prepend(problemCard(error))));
   view.replaceChildren(element("h1", {}, "Jobs"), filterForm(filters, change), content, more);
   const timer = setInterval(() => refresh().catch(() => {}), LIST_POLL_MS);
-  leave = () => { clearInterval(timer); sources.forEach((source) => source.close()); };
+  leave = () => { filters = null; clearInterval(timer); sources.forEach((source) => source.close()); };
   await refresh();
 }
