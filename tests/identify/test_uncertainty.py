@@ -118,7 +118,7 @@ def test_limits_of_named_parameters_are_those_of_the_box() -> None:
 
 
 def test_a_parameter_at_its_bound_is_open_there() -> None:
-    """It is listed by its name, and its interval has no end on that side; what nothing shows has none at all."""
+    """It is listed by its name, its interval has no end on that side; what nothing shows has none at all."""
     space, noise, jacobian = seen_space()
     x = space.guess.copy()
     bounded = space.names.index("damping_nms_rad.joint_2.flap")
