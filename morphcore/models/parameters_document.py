@@ -104,9 +104,7 @@ def _require_flown(document: Document, pointer: str) -> None:
     lost = [
         row.get("sample")
         for row in (fit if isinstance(fit, list) else [])
-        if isinstance(row, dict)
-        and row.get("role") == "train"
-        and row.get("J_identified", 0.0) is None
+        if isinstance(row, dict) and row.get("role") == "train" and row.get("J_identified", 0.0) is None
     ]
     if lost or ("model" in document and document["model"] is None):
         raise InvalidInput(
