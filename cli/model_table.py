@@ -60,7 +60,7 @@ def model_table(result: Document) -> Table:
             name,
             short(value),
             shown_interval(intervals[name]) if known else "",
-            ", ".join(notes if known or not intervals else ["fixed"]),
+            " ".join(notes if known or not intervals else ["fixed"]),
             style="dim" if name in unseen else None,
         )
     return table

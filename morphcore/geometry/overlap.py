@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 PARALLEL = 0.985  # cosine of ten degrees between the normals
 DEPTH_CHORDS = 0.02  # of the smaller mean chord: surfaces that meet at an edge do not overlap
-LARGEST_SHAPES = 9  # hinge angles of a flight that are looked at
+SHAPES = 9  # of a flight that are looked at
 
 
 def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, int, int]]:
@@ -29,14 +29,15 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
 
     Parameters
     ----------
-    angles : (k, s) of all surfaces over a flight, rad; fixed surfaces' are not looked at. Up to
-        LARGEST_SHAPES of the rows are used, evenly spread with both ends.
+    angles : (k, s) of all surfaces over a flight, rad; fixed surfaces' are not looked at. Of the rows
+        SHAPES are used, evenly spread with both ends, and those where each angle is least and greatest.
 
     Returns
     -------
     (first, second, row) of each pair, row being the first of ``angles`` at which they were seen to overlap.
     """
-    rows = np.unique(np.linspace(0, angles.shape[0] - 1, LARGEST_SHAPES).round().astype(np.int64))
+    spread = np.linspace(0, angles.shape[0] - 1, SHAPES).round().astype(np.int64)
+    rows = np.unique(np.concatenate([spread, angles.argmin(axis=0), angles.argmax(axis=0)]))
     found: dict[tuple[int, int], int] = {}
     for row in rows:
         outlines = [

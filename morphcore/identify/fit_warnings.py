@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each flight
 SHOWN_NAMES = 4  # of parameters in a sentence
+COMPARED = {"rigid": "the rigid model", "initial": "the first guess from beam theory"}
 UNSEEN_HINT = (
     "the samples do not determine it, and its value means little: take fewer links, or samples that show more"
 )
@@ -101,13 +102,21 @@ def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
                 "its sweep and conditions",
                 pointer,
             )
+        for model, title in COMPARED.items():
+            if fit.ending(model):
+                yield ResultWarning(
+                    "diverged",
+                    f"{title} does not fly {name}: the flight {fit.ending(model)}",
+                    "there is nothing to compare the identified model with on this sample",
+                    pointer,
+                )
         yield from error_warning(
             name, pointer, fit.errors("identified"), wrap_angle(sample.euler - sample.euler[0])
         )
 
 
 def _of_bounds(at_bound: Mapping[str, str], undetermined: Collection[str]) -> Iterable[ResultWarning]:
-    """One warning for each kind of parameter and end of its range, those apart that the samples do not see."""
+    """One warning for each kind of parameter and end of its range; those that are not seen, apart."""
     kinds: dict[tuple[str, str, bool], list[str]] = {}
     for name, end in at_bound.items():
         kind = next(part for part in name.split(".") if not part.startswith("wing_"))

@@ -243,7 +243,7 @@ def test_request_document_runs() -> None:
         identification("train_rate_0.8", links=2, search={"method": "pso", "particles": 4, "generations": 1})
     )
     document = run.result(last(run).checkpoint).to_document()
-    assert set(document) == {"model", "fit", "uncertainty", "search", "cost"}
+    assert set(document) == {"model", "fit", "uncertainty", "search", "cost", "warnings"}
     assert document["search"]["method"] == "pso"
 
 

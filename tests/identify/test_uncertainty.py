@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from morphcore.identify.cost import residuals, sample_cases
-from morphcore.identify.parameters import search_space
+from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import differences, first_polish, next_polish
 from morphcore.identify.uncertainty import uncertainty
 from morphcore.models.equivalent import chain_model
@@ -72,3 +73,75 @@ def test_standard_errors_cover_the_truth() -> None:
         covariance = variance * np.linalg.inv(jacobian[0].T @ jacobian[0])
         deviations.append((state.point[0] - truth[chosen]) / np.sqrt(np.diag(covariance)))
     assert 0.4 < np.mean(np.square(deviations)) < 2.0
+
+
+def seen_space(**bounds: tuple[float, float]) -> tuple[SearchSpace, np.ndarray, np.ndarray]:
+    """The unknowns of three links, with residuals and a Jacobian that determines all of them."""
+    space = search_space(chain_model(reference_aircraft(), reference_flight(), 3), bounds=bounds)
+    rng = np.random.default_rng(2)
+    return space, rng.normal(0.0, 1.0, 400), 60.0 * rng.normal(size=(400, space.dimension))
+
+
+def test_intervals_hold_95_per_cent_of_the_estimates() -> None:
+    """Estimates drawn with the covariance lie in each parameter's interval 95 times in a hundred.
+
+    The covariance is that of the search coordinates; intervals are in each parameter's own unit. 20,000 draws
+    leave 0.3 per cent of chance; what the shares' curvature leaves is below 1.
+    """
+    space, noise, jacobian = seen_space()
+    found = uncertainty(space, space.guess, noise, jacobian)
+    draws = np.random.default_rng(3).multivariate_normal(space.guess, found.covariance, 20_000)
+    values = space.flatten(space.decode(draws))
+    assert set(found.intervals) == set(np.array(space.parameter_names)[space.searched])
+    for name, (low, high) in found.intervals.items():
+        assert low is not None, name
+        assert high is not None, name
+        column = values[:, space.parameter_names.index(name)]
+        assert np.mean((column >= low) & (column <= high)) == pytest.approx(0.95, abs=0.012), name
+    assert found.undetermined == ()
+    stiff = found.intervals["stiffness_nm_rad.joint_1.flap"]
+    at = space.flatten(space.decode(space.guess))[0][
+        space.parameter_names.index("stiffness_nm_rad.joint_1.flap")
+    ]
+    assert stiff[0] * stiff[1] == pytest.approx(at**2)  # type: ignore[operator] - of one factor both ways
+
+
+def test_limits_of_named_parameters_are_those_of_the_box() -> None:
+    """The least and the greatest value of each parameter at random points and corners of the box."""
+    space, _, _ = seen_space(division=(0.2, 0.6))
+    rng = np.random.default_rng(5)
+    inside = rng.uniform(space.lower, space.upper, size=(4000, space.dimension))
+    corners = np.where(rng.uniform(size=(4000, space.dimension)) < 0.5, space.lower, space.upper)
+    values = space.flatten(space.decode(np.concatenate([inside, corners])))
+    seen = np.stack([values.min(axis=0), values.max(axis=0)], axis=1)
+    np.testing.assert_allclose(space.parameter_limits, seen, rtol=1e-9, atol=1e-12)
+
+
+def test_a_parameter_at_its_bound_is_open_there() -> None:
+    """It is listed by its name, its interval has no end on that side; what nothing shows has none at all."""
+    space, noise, jacobian = seen_space()
+    x = space.guess.copy()
+    bounded = space.names.index("damping_nms_rad.joint_2.flap")
+    x[bounded] = space.lower[bounded]
+    x[space.names.index("log_ratio.1")] = space.upper[space.names.index("log_ratio.1")]
+    jacobian[:, space.names.index("stiffness_nm_rad.joint_1.lag")] *= 1e-4
+    document = uncertainty(space, x, noise, jacobian).to_document()
+    assert document["at_bound"] == ["division.1", "damping_nms_rad.joint_2.flap"]
+    low, high = document["interval_95"]["damping_nms_rad.joint_2.flap"]
+    assert low is None
+    assert (
+        high > space.flatten(space.decode(x))[0][space.parameter_names.index("damping_nms_rad.joint_2.flap")]
+    )
+    assert document["interval_95"]["division.1"][1] is None
+    assert document["interval_95"]["stiffness_nm_rad.joint_1.lag"] == [None, None]
+    assert document["undetermined"] == ["stiffness_nm_rad.joint_1.lag"]
+
+
+def test_what_is_not_searched_has_no_interval() -> None:
+    """Fixed corrections, and the one share of a rigid wing, are known: an interval would be a guess."""
+    space = search_space(
+        chain_model(reference_aircraft(), reference_flight(), 1), aero_coefficients=["lift_factor"]
+    )
+    rng = np.random.default_rng(1)
+    found = uncertainty(space, space.guess, rng.normal(size=50), rng.normal(size=(50, 1)))
+    assert list(found.intervals) == ["lift_factor"]

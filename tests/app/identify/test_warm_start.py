@@ -70,6 +70,24 @@ def test_begins_from_the_recommended_model_of_a_study(service: RunningService) -
     assert search["warm_start"]["parameters"]["links_per_wing"] == links
 
 
+def never_flown() -> Document:
+    """A result of before: a model beside flights that it did not fly."""
+    return {**RESULT, "fit": [{**RESULT["fit"][0], "J_identified": None}]}
+
+
+@pytest.mark.parametrize(
+    "result", [never_flown(), {**RESULT, "model": None}], ids=["null cost", "null model"]
+)
+def test_nothing_begins_from_a_model_that_never_flew(service: RunningService, result: Document) -> None:
+    """Neither is it kept as a model, nor does a search begin from its job or from its document."""
+    for status in ("succeeded", "cancelled"):
+        job = ended_job(service, status, result)
+        assert job["model_id"] is None
+        assert refusal(service, request({"job_id": job["id"]})) == ("/search/warm_start/job_id", "no_model")
+    pointer, _ = refusal(service, request({"parameters": result}))
+    assert pointer == "/search/warm_start/parameters/model"
+
+
 def refusal(service: RunningService, document: Document) -> tuple[str, str]:
     """Pointer and code of a refused request."""
     first = fault(post(service, "/identify", document))["errors"][0]

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from tests.identification_request import identification
+from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker
+from worker.attempt import Ending
 from worker.operations import find_operation
 
 
@@ -37,3 +39,21 @@ def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any]) -> None:
             assert found[part] == whole[part]
         for name in ("history", "flights", "aero_coefficients"):
             assert found["search"][name] == whole["search"][name]
+
+
+def test_a_model_that_flies_nothing_is_a_failed_job(worker: RealWorker) -> None:
+    """A wing of 2.1 Pa: the job fails as not flyable, names the wing, and leaves no model."""
+    request = identification("train_rate_0.8", links=2, search={"method": "least_squares", "generations": 1})
+    request["model"]["lattice"] = COARSE
+    request["aircraft"]["surfaces"][0]["material"]["youngs_modulus_pa"] = 2.1
+    job_id = worker.add("identify", request)
+    assert worker.run() is Ending.FAILED
+    job = worker.job(job_id)
+    assert job.model_id is None
+    error = job.error or {}
+    assert error["code"] == "not_flyable"
+    assert error["pointer"] == "/aircraft/surfaces/0/material/youngs_modulus_pa"
+    assert "right wing" in error["hint"]
+    left = worker.result(job_id)
+    assert (left["partial"], left["model"]) == (True, None)
+    assert left["warnings"][0]["code"] == "not_flyable"

@@ -1,0 +1,141 @@
+"""Warnings: each where it belongs, none where it does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from morphcore import simulate
+from morphcore.geometry.lattice import LatticeSettings
+from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.flight import ModelChoice
+from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.validity import (
+    AirMotion,
+    air_motion,
+    air_warnings,
+    degrees_warning,
+    error_warning,
+    steep_warning,
+)
+from tests.identify.flights import example
+from tests.models.chains import example_aircraft, example_flight
+
+COARSE = LatticeSettings(chordwise=1, spanwise=4)
+TIMES = np.linspace(0.0, 1.0, 101)
+SLOW = replace(example_flight(), airspeed_m_s=90.0)
+
+
+def codes(warnings: object) -> list[str]:
+    """The codes of warnings, in order."""
+    return [warning.code for warning in warnings]  # type: ignore[attr-defined]
+
+
+def motion(alpha_rad: float, speed_m_s: float) -> AirMotion:
+    """A flight of one row."""
+    return AirMotion(np.zeros(1), np.array([alpha_rad]), np.array([speed_m_s]))
+
+
+@pytest.mark.parametrize(("degrees", "warned"), [(14.9, False), (15.1, True), (-15.1, True)])
+def test_incidence_beyond_fifteen_degrees(degrees: float, warned: bool) -> None:  # noqa: FBT001
+    """Either way."""
+    found = air_warnings(SLOW, [("the flight", "/flight", motion(np.radians(degrees), 90.0))])
+    assert codes(found) == ["large_alpha"] * warned
+
+
+@pytest.mark.parametrize(("mach", "warned"), [(0.29, False), (0.31, True)])
+def test_mach_beyond_three_tenths(mach: float, warned: bool) -> None:  # noqa: FBT001
+    """Of 340.294 m/s at sea level (ISO 2533); in the flight as at its start; not where mach is given."""
+    speed = mach * 340.294
+    assert codes(air_warnings(SLOW, [("", "", motion(0.0, speed))])) == ["compressible"] * warned
+    fast = replace(SLOW, airspeed_m_s=speed)
+    assert codes(air_warnings(fast, [])) == ["compressible"] * warned
+    assert air_warnings(replace(fast, mach=mach), []) == []
+    assert air_warnings(replace(fast, mach=0.0), []) == []
+
+
+def test_incidence_by_hand() -> None:
+    """A level aircraft that sinks at 10 m/s in a wind from ahead, yawed by a right angle: atan(10 / 60)."""
+    found = air_motion(
+        example_aircraft(),
+        np.zeros(1),
+        np.array([[0.0, 0.1, np.pi / 2]]),
+        np.array([[0.0, 50.0, 10.0]]),
+        np.array([[0.0, -10.0, 0.0]]),
+        np.zeros((1, 2)),
+    )
+    assert found.incidence[0] == pytest.approx(0.1 + np.arctan(10.0 / 60.0))
+    assert found.airspeed[0] == pytest.approx(np.hypot(60.0, 10.0))
+
+
+def test_a_hinge_of_incidence_counts() -> None:
+    """A wing turned nose up by its hinge meets the air at the body's angle and its own."""
+    aircraft = example_aircraft()
+    turning = tuple(replace(s, hinge=replace(s.hinge, axis="y")) for s in aircraft.surfaces)  # type: ignore[type-var]
+    found = air_motion(
+        replace(aircraft, surfaces=turning), np.zeros(1), np.array([[0.0, 0.05, 0.0]]),
+        np.array([[50.0, 0.0, 0.0]]), np.zeros((1, 3)), np.array([[0.0, 0.3]]),
+    )  # fmt: skip
+    assert found.incidence[0] == pytest.approx(0.35)
+
+
+def test_steep_pitch() -> None:
+    """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be told apart."""
+    assert steep_warning("x", "", np.array([0.0, 1.4])) == []
+    assert "nearly" in steep_warning("x", "", np.array([0.0, -1.55]))[0].message
+    assert "degrees" in steep_warning("x", "", np.array([0.0, 4.0]))[0].hint
+
+
+def test_degrees_are_recognised_by_the_rigid_flight() -> None:
+    """An example flight in degrees is; in radians, or any other large flight, it is not."""
+    sample = example("rate_0.8")
+    rigid = 0.85 * sample.euler + 0.01 * np.sin(sample.time_s)[:, None]
+    assert degrees_warning("x", "", sample.euler, rigid) == []
+    assert codes(degrees_warning("x", "", np.degrees(sample.euler), rigid)) == ["looks_like_degrees"]
+    assert degrees_warning("x", "", 5.0 * sample.euler, rigid) == []
+    assert degrees_warning("x", "", np.degrees(sample.euler), np.full_like(rigid, np.nan)) == []
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.049, False), (0.051, True)])
+def test_errors_beyond_five_per_cent(share: float, warned: bool) -> None:  # noqa: FBT001
+    """Of the rms of the motion; what the integration does not resolve is no error."""
+    departure = np.stack([0.0 * TIMES, TIMES, 0.0 * TIMES], axis=1)
+    assert codes(error_warning("x", "", share * departure[::-1], departure)) == ["large_error"] * warned
+    assert error_warning("x", "", share * 1e-4 * departure, 1e-4 * departure) == []
+
+
+def models() -> dict[str, ModelChoice]:
+    """All three models of the example."""
+    guess = physical_guess(chain_model(example_aircraft(), example_flight(), 2, COARSE))
+    return {"rigid": "rigid", "equivalent": guess, "flexible": "flexible"}
+
+
+@pytest.mark.parametrize("kind", ["rigid", "equivalent", "flexible"])
+def test_flights_of_all_models_warn(kind: str) -> None:
+    """Slow and heavy, trimmed beyond 15 degrees: every model says so, from its trim on; fast it is quiet."""
+    options = {"model": models()[kind], "duration_s": 0.1, "lattice": COARSE, "step_s": 2e-3}
+    still = [Hold(), Hold()]
+    slow = replace(example_flight(), airspeed_m_s=75.0)
+    found = simulate(example_aircraft(), slow, still, **options)  # type: ignore[arg-type]
+    assert np.degrees(found.trim.alpha[0]) > 15.0
+    assert codes(found.warnings) == ["large_alpha"]
+    quiet = replace(example_flight(), mach=0.0)
+    assert simulate(example_aircraft(), quiet, still, **options).warnings == ()  # type: ignore[arg-type]
+    fast = simulate(example_aircraft(), example_flight(), still, **options)  # type: ignore[arg-type]
+    assert codes(fast.warnings) == ["compressible"]
+
+
+def test_a_sweep_into_the_tail_warns() -> None:
+    """The angles that are flown decide, not those at the start."""
+    aircraft = example_aircraft()
+    tail = replace(
+        aircraft.surfaces[0], name="tail", position_m=(-1.9, 1.0, 0.0), hinge=None, span_m=1.0, flexible=False
+    )
+    whole = replace(aircraft, surfaces=(*aircraft.surfaces, tail))
+    quiet = replace(example_flight(), mach=0.0)
+    for final, expected in ((0.02, []), (1.0, ["surfaces_overlap"])):
+        sweep = ConstantRate(0.0, final, 0.4)
+        found = simulate(whole, quiet, [sweep] * 3, duration_s=0.4, lattice=COARSE)
+        assert codes(found.warnings) == expected
