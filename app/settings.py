@@ -10,6 +10,8 @@ from urllib.parse import unquote, urlsplit
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from app.broker import canonical
+
 LOOPBACK_NAMES = frozenset({"localhost", "ip6-localhost"})
 # what examples, images and tutorials come with, and what is tried first
 DEFAULT_PASSWORDS = frozenset(
@@ -43,7 +45,8 @@ class Settings(BaseSettings):
         description="SQLAlchemy URL; empty means SQLite in `data_dir`. Postgres for several hosts.",
     )
     broker_url: str = Field(
-        default="redis://127.0.0.1:6399/0", description="Redis or Valkey for wake-up messages."
+        default="redis://127.0.0.1:6399/0",
+        description="Redis or Valkey for wake-up messages: `redis://`, `rediss://` (TLS) or `unix://`.",
     )
     host: str = Field(default="127.0.0.1", description="Address the API listens on.")
     port: int = Field(default=8000, ge=0, le=65535)
@@ -149,6 +152,7 @@ class Settings(BaseSettings):
                 f"host {self.host} is reachable from other machines and MORPHID_WEBHOOK_ALLOW_PRIVATE would "
                 "let them send into this network. Leave it out: it is for development on one machine."
             )
+        object.__setattr__(self, "broker_url", canonical(self.broker_url))
         broker_host = urlsplit(self.broker_url).hostname or ""
         if self.uses_sqlite and broker_host and not is_loopback(broker_host):
             raise UnsafeSettings(

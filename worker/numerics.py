@@ -7,8 +7,10 @@ would break its forks.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
+import stat
 import sys
 import tempfile
 import threading
@@ -71,13 +73,20 @@ def _ensure_cache() -> None:
     except OSError:
         pass
     fallback = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
-    fallback.mkdir(mode=0o700, exist_ok=True)
-    if fallback.stat().st_uid != os.getuid():
+    with contextlib.suppress(FileExistsError):
+        fallback.mkdir(mode=0o700)
+    if not _is_ours_alone(fallback):
         fallback = Path(
             tempfile.mkdtemp(prefix="morphid-kernels-")
         )  # compiled code of others is not ours to run
     log.warning("NUMBA_CACHE_DIR %s cannot be written; kernels are kept in %s", chosen, fallback)
     os.environ["NUMBA_CACHE_DIR"] = str(fallback)
+
+
+def _is_ours_alone(folder: Path) -> bool:
+    """Whether a name in everybody's folder is a folder of this user's where nobody else may write."""
+    found = folder.lstat()  # a link may lead anywhere
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
 
 
 class Kernels:
