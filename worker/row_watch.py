@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from celery import bootsteps
@@ -91,8 +92,9 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
             self._asked_at = None
             log.warning("a look at the rows failed: %s", error)
 
+        # the pool gives the slot back with the answer
         worker.semaphore.acquire(
-            worker.pool.apply_async, work_waits, callback=answered, error_callback=failed
+            partial(worker.pool.apply_async, work_waits, callback=answered, error_callback=failed)
         )
 
 

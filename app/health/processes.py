@@ -44,7 +44,7 @@ def is_gone(identity: str | None) -> bool | None:
 
 def _here() -> tuple[str, str]:
     boot = (PROC / "sys/kernel/random/boot_id").read_text().strip()
-    return boot, os.readlink(PROC / "self/ns/pid")
+    return boot, str((PROC / "self/ns/pid").readlink())
 
 
 def _stat(pid: int) -> list[str]:
