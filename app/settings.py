@@ -132,7 +132,7 @@ class Settings(BaseSettings):
         default="", description="Address of an OpenTelemetry collector (OTLP over HTTP); empty: no traces."
     )
     worker_seen_every_s: float = Field(
-        default=5.0, gt=0.0, le=60.0, description="How often a worker shows that it consumes messages."
+        default=5.0, gt=0.0, le=60.0, description="How often a worker shows that it takes jobs."
     )
 
     @model_validator(mode="after")

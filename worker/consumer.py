@@ -19,7 +19,7 @@ from kombu.exceptions import OperationalError
 log = logging.getLogger(__name__)
 
 RETRY_EVERY_S = 1.0
-# what Celery's workers tell one another through the broker: nobody listens, and a hung broker would hold us up
+# what Celery's workers tell one another: nobody listens, and a hung broker would hold up the sender
 SILENT = {"without_gossip": True, "without_heartbeat": True, "without_mingle": True}
 
 

@@ -56,7 +56,7 @@ def note_seen(session: Session, sign: Sign) -> None:
 
 
 def note_stopped(session: Session, name: str) -> None:
-    """Write that a worker takes no more messages because it was asked to end."""
+    """Write that a worker takes no more jobs because it was asked to end."""
     session.execute(update(workers).where(workers.c.name == name).values(stopped_at=database_time(), busy=0))
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
+import select
+import socket
+import socketserver
 import ssl
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 from cli.broker import LOOPBACK
+
+POLL_S = 0.1
 
 
 @contextmanager
@@ -24,36 +28,34 @@ def tls_front(port: int, context: ssl.SSLContext) -> Iterator[int]:
     ------
     The port that speaks TLS.
     """
-    loop = asyncio.new_event_loop()
+    over = threading.Event()
 
-    async def pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with suppress(OSError):
-            while piece := await reader.read(65_536):
-                writer.write(piece)
-                await writer.drain()
-        writer.close()
+    class HandOn(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            try:
+                with (
+                    context.wrap_socket(self.request, server_side=True) as front,
+                    socket.create_connection((LOOPBACK, port), timeout=5.0) as behind,
+                ):
+                    pump(front, behind)
+            except OSError:
+                return  # who does not trust the certificate hangs up
 
-    async def hand_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        behind_reader, behind_writer = await asyncio.open_connection(LOOPBACK, port)
-        await asyncio.gather(pipe(reader, behind_writer), pipe(behind_reader, writer))
+    def pump(front: ssl.SSLSocket, behind: socket.socket) -> None:
+        while not over.is_set():
+            waiting = [front] if front.pending() else select.select([front, behind], [], [], POLL_S)[0]
+            for source in waiting:
+                piece = source.recv(65_536)
+                if not piece:
+                    return
+                (behind if source is front else front).sendall(piece)
 
-    async def listen() -> asyncio.Server:
-        return await asyncio.start_server(hand_on, LOOPBACK, 0, ssl=context)
-
-    async def end(server: asyncio.Server) -> None:
-        server.close()
-        left = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in left:
-            task.cancel()
-        await asyncio.gather(*left, return_exceptions=True)
-
-    server = loop.run_until_complete(listen())
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
-    thread.start()
-    try:
-        yield server.sockets[0].getsockname()[1]
-    finally:
-        asyncio.run_coroutine_threadsafe(end(server), loop).result(10.0)
-        loop.call_soon_threadsafe(loop.stop)
-        thread.join()
-        loop.close()
+    with socketserver.ThreadingTCPServer((LOOPBACK, 0), HandOn) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(POLL_S,))
+        thread.start()
+        try:
+            yield server.server_address[1]
+        finally:
+            over.set()
+            server.shutdown()
+            thread.join()
