@@ -34,7 +34,7 @@ from worker.transport import dropped
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 2  # with a busy or absent database: the loop has messages to take
-UNABLE_AFTER_S = 10.0  # free children that have not looked at the rows for so long will take no job either
+UNABLE_AFTER_S = 15.0  # free children that have not looked at the rows for so long will take no job either
 IDLE_STATES = frozenset("TtZXx")  # stopped, traced, zombie, dead (proc(5))
 
 

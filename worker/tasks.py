@@ -6,8 +6,9 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import repeat
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -85,15 +86,21 @@ def _unless_away() -> Iterator[None]:
         log.warning("the job store is %s; the reaper will come back to it", trouble.value)
 
 
-def publish(job_id: str) -> None:
+def publish(job_id: str) -> bool:
     """Send the wake-up hint for a queued job; without a broker the workers' own looks replace it."""
-    queue.publish(job_id, enter_process().settings.broker_url)
+    return queue.publish(job_id, enter_process().settings.broker_url)
+
+
+def publish_all(job_ids: Iterable[str]) -> None:
+    """Send several hints, up to the first that the broker does not take."""
+    for job_id in job_ids:
+        if not publish(job_id):
+            break
 
 
 def publish_chunks(job_id: str, count: int) -> None:
     """Send a hint for each chunk of a job that was handed out; a broker that is away loses none of them."""
-    for _ in range(count):
-        publish(job_id)
+    publish_all(repeat(job_id, count))
 
 
 @app.task(name=RUN_JOB)
@@ -143,5 +150,4 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
         count(connection, REAP_ROUNDS)
     process.reaped_at = time.monotonic()
     log_ends(report)
-    for job_id in report.publish:
-        publish(job_id)
+    publish_all(report.publish)

@@ -15,7 +15,7 @@ class Liveness(BaseModel):
 
 
 class WorkerState(BaseModel):
-    """The workers, by their signs of life: each comes from the loop that hands jobs to a worker's children."""
+    """The workers, by their signs of life: each comes from the loop that hands jobs to their children."""
 
     status: Literal["ok", "none", "stalled", "unknown"] = Field(
         description="`stalled`: there are workers, and none of them takes jobs; `unknown`: no database."
@@ -30,7 +30,8 @@ class Readiness(BaseModel):
     """Whether the service can do its work, part by part."""
 
     status: Literal["ready", "degraded", "not_ready"] = Field(
-        description="`degraded`: jobs are taken and kept; without workers none starts, without a broker seconds late."
+        description="`degraded`: jobs are taken and kept; without workers none starts, without a broker "
+        "each starts a second late."
     )
     database: str = Field(examples=["ok"], description="`ok`, `not migrated` or `unreachable (...)`.")
     broker: str = Field(
