@@ -16,12 +16,13 @@ from urllib.parse import unquote, urlsplit
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from app.broker import canonical
 from app.database_address import UnusableAddress, require_usable, sqlite_url
 from app.loopback import is_loopback
 
 PREFIX = "MORPHID_"
-# variables that others read: the command line (where the service is), the examples, a worker's children
-NO_SETTINGS = frozenset({"url", "api_key", "search", "stop_file"})
+# variables that others read: the command line (where the service is), the examples
+NO_SETTINGS = frozenset({"url", "api_key", "search"})
 CLOSE = 0.75  # likeness of a name to a setting's that calls for a question
 # what examples, images and tutorials come with, and what is tried first
 DEFAULT_PASSWORDS = frozenset(
@@ -49,7 +50,8 @@ class Settings(BaseSettings):
         description="SQLAlchemy URL; empty means SQLite in `data_dir`. Postgres for several hosts.",
     )
     broker_url: str = Field(
-        default="redis://127.0.0.1:6399/0", description="Redis or Valkey for wake-up messages."
+        default="redis://127.0.0.1:6399/0",
+        description="Redis or Valkey for wake-up messages: `redis://`, `rediss://` (TLS) or `unix://`.",
     )
     host: str = Field(default="127.0.0.1", description="Address the API listens on.")
     port: int = Field(default=8000, ge=0, le=65535)
@@ -155,7 +157,7 @@ class Settings(BaseSettings):
         default="", description="Address of an OpenTelemetry collector (OTLP over HTTP); empty: no traces."
     )
     worker_seen_every_s: float = Field(
-        default=5.0, gt=0.0, le=60.0, description="How often a worker shows that it consumes messages."
+        default=5.0, gt=0.0, le=60.0, description="How often a worker shows that it takes jobs."
     )
 
     @model_validator(mode="after")
@@ -181,6 +183,7 @@ class Settings(BaseSettings):
                 f"host {self.host} is reachable from other machines and MORPHID_WEBHOOK_ALLOW_PRIVATE would "
                 "let them send into this network. Leave it out: it is for development on one machine."
             )
+        object.__setattr__(self, "broker_url", canonical(self.broker_url))
         broker_host = urlsplit(self.broker_url).hostname or ""
         if self.uses_sqlite and broker_host and not is_loopback(broker_host):
             raise UnsafeSettings(

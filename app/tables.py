@@ -318,8 +318,9 @@ workers = Table(
     Column("slots", Integer, nullable=False),  # jobs it can run at once
     Column("busy", Integer, nullable=False),
     Column("started_at", Double, nullable=False),
-    Column("seen_at", Double, nullable=False),  # when it last took part in consuming messages
+    Column("seen_at", Double, nullable=False),  # when it last showed that it takes jobs
     Column("stopped_at", Double),  # it ended as it should
+    Column("process", String(128)),  # as `app.health.processes` names it
     Index("ix_workers_seen_at", "seen_at"),
 )
 

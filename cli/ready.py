@@ -21,7 +21,7 @@ def wait_until_ready(data_dir: Path | None, *, worker_here: bool, within_s: floa
 
     Parameters
     ----------
-    worker_here : look only for a worker of this machine (or container) that takes messages.
+    worker_here : look only for a worker of this machine (or container) that takes jobs.
 
     Returns
     -------

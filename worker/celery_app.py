@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from typing import Any
 
@@ -18,18 +19,19 @@ from celery.signals import (
     worker_shutdown,
     worker_shutting_down,
 )
+from kombu.exceptions import OperationalError
 
+from app.jobs.transport import celery_broker
 from app.observability.logs import configure_logging
 from app.observability.tracing import stop_tracing
 from app.settings import Settings, doubtful_variables, settings_or_exit
 from worker import numerics, shutdown
+from worker.hints import QUEUE, REAP
 from worker.presence import Presence
+from worker.row_watch import RowWatch
 
 log = logging.getLogger(__name__)
 
-QUEUE = "morphid"
-RUN_JOB = "morphid.run_job"
-REAP = "morphid.reap"
 REAP_EXPIRES_S = (
     24 * 3600.0
 )  # by the worker's clock, which may be hours off: short lives would never reach it
@@ -37,19 +39,22 @@ REAP_EXPIRES_S = (
 
 def make_app(settings: Settings) -> Celery:
     """Configure Celery for work that our own tables keep track of."""
-    celery = Celery("morphid", broker=settings.broker_url, include=["worker.tasks"])
+    celery = Celery("morphid", include=["worker.tasks"])
     celery.conf.update(
+        celery_broker(settings.broker_url, "worker.transport:Transport"),
         task_default_queue=QUEUE,
         task_acks_late=False,  # redelivery by visibility timeout would run an hour-long job twice
-        task_ignore_result=True,  # results belong in our tables
         worker_prefetch_multiplier=1,
         worker_disable_prefetch=True,  # a busy worker must not sit on a hint that an idle one could take
         worker_concurrency=settings.workers,
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
+        worker_consumer="worker.consumer:PatientConsumer",
+        worker_pool_start_method="fork",  # children inherit the pipe of `worker.shutdown`
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
+        broker_channel_error_retry=True,  # a broker that is full or out of order is one that is away
         task_serializer="json",
         accept_content=["json"],
         beat_schedule={
@@ -60,7 +65,7 @@ def make_app(settings: Settings) -> Celery:
             }
         },
     )
-    celery.steps["consumer"].add(Presence)
+    celery.steps["worker"].update((RowWatch, Presence))
     return celery
 
 
@@ -102,8 +107,9 @@ def _at_the_end_of_each_child(**_: Any) -> None:
 
 @worker_ready.connect
 def _look_at_the_table(**_: Any) -> None:
-    # hints sent while no worker was there may be lost: publish every queued row again
-    app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=REAP_EXPIRES_S)
+    # leases lost while no worker was there need not wait for the beat
+    with contextlib.suppress(OperationalError):  # the beat will repeat it
+        app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=REAP_EXPIRES_S)
 
 
 @worker_shutting_down.connect

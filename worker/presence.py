@@ -1,9 +1,9 @@
-"""A worker's signs of life: rows written from the very loop that takes messages from the broker.
+"""A worker's signs of life: rows written from the very loop that hands jobs to its children.
 
-A process that is there but does not consume (stopped, hung, cut off from the broker) writes none, and one
-without living children writes that it has no slots: whoever reads the table sees it. Each sign is a
-transaction on a connection of its own, closed at once: the parent process forks, and a child must not inherit
-a connection.
+A process that is there but begins no jobs (stopped, hung) writes none, and one whose children are gone or do
+not answer writes that it has no slots: whoever reads the table sees it. Without a broker the rows are looked
+at all the same (`worker.row_watch`), so the broker is no part of these signs. Each sign is a transaction on a
+connection of its own, closed at once: the parent process forks, and a child must not inherit a connection.
 """
 
 from __future__ import annotations
@@ -23,14 +23,19 @@ from sqlalchemy.pool import NullPool
 
 from app.database import Session
 from app.database_address import normal_url
-from app.health.broker import BROKER_GOOD, broker_state
 from app.health.presence import Sign, note_seen, note_started, note_stopped
+from app.health.processes import process_identity
+from app.observability.counters import count
+from app.observability.job_counts import MESSAGES_DROPPED
 from app.settings import load_settings
 from app.version import VERSION
+from worker.row_watch import RowWatch
+from worker.transport import dropped
 
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 2  # with a busy or absent database: the loop has messages to take
+UNABLE_AFTER_S = 15.0  # free children that have not looked at the rows for so long will take no job either
 IDLE_STATES = frozenset("TtZXx")  # stopped, traced, zombie, dead (proc(5))
 
 
@@ -64,54 +69,64 @@ def can_work(pid: int, *, proc: Path = Path("/proc")) -> bool:
 
 
 class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
-    """Part of Celery's consumer: begins with it, ends with it, beats in its event loop.
+    """Part of Celery's worker: beats in its event loop, and says goodbye when it ends.
 
     Parameters
     ----------
-    consumer : Celery's.
+    worker : Celery's.
     """
 
-    requires = ("celery.worker.consumer.tasks:Tasks",)  # begins once messages are taken
+    requires = ("celery.worker.components:Pool", RowWatch)  # a sign says that the rows are looked at
 
-    def __init__(self, consumer: Any, **options: Any) -> None:
-        super().__init__(consumer, **options)
+    def __init__(self, worker: Any, **options: Any) -> None:
+        super().__init__(worker, **options)
         settings = load_settings()
         self._every_s = settings.worker_seen_every_s
-        self._broker_url = settings.broker_url
         self._engine = brief_engine(settings.database_url)
         self._name = worker_name()
         self._timers: list[Any] = []
         self._known = False
         self._told = True
 
-    def start(self, consumer: Any) -> None:
+    def start(self, worker: Any) -> None:
         """Beat from now on: once at once, but in the loop, so that it proves that the loop runs."""
-        self.stop(consumer)
-        beat = (consumer,)
+        beat = (worker,)
         self._timers = [
-            consumer.timer.call_after(0.01, self._beat, beat),
-            consumer.timer.call_repeatedly(self._every_s, self._beat, beat),
+            worker.timer.call_after(0.01, self._beat, beat),
+            worker.timer.call_repeatedly(self._every_s, self._beat, beat),
         ]
 
-    def stop(self, _consumer: Any) -> None:
-        """Beat no more: the connection is lost, or the worker ends."""
+    def stop(self, _worker: Any) -> None:
+        """Beat no more: the worker ends."""
         for timer in self._timers:
             timer.cancel()
         self._timers = []
-        if self._known and asked_to_end():
+        if self._known:
             self._known = False
             self._write(lambda session: note_stopped(session, self._name))
 
-    shutdown = stop
+    terminate = stop
 
-    def _beat(self, consumer: Any) -> None:
-        if broker_state(self._broker_url) not in BROKER_GOOD:
-            return  # the loop runs, but nothing comes in
-        children = [child.pid for child in _children(consumer)]
-        sign = Sign(self._name, VERSION, slots=sum(map(can_work, children)), busy=len(state.active_requests))
+    def _beat(self, worker: Any) -> None:
+        able = worker.row_watch.unanswered_s < UNABLE_AFTER_S
+        slots = sum(can_work(child.pid) for child in _children(worker)) if able else 0
+        sign = Sign(
+            self._name,
+            VERSION,
+            slots=slots,
+            busy=len(state.active_requests),
+            process=process_identity(os.getpid()),
+        )
         note = note_seen if self._known else note_started
-        if self._write(lambda session: note(session, sign)):
+        number = dropped.number
+
+        def write(session: Session) -> None:
+            note(session, sign)
+            count(session, MESSAGES_DROPPED, by=number)
+
+        if self._write(write):
             self._known = True
+            dropped.number -= number
 
     def _write(self, write: Callable[[Session], None]) -> bool:
         try:
@@ -126,12 +141,6 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         return True
 
 
-def asked_to_end() -> bool:
-    """Whether Celery was told to stop."""
-    # 0, an exit code, says yes
-    return any(flag is not None and flag is not False for flag in (state.should_stop, state.should_terminate))
-
-
-def _children(consumer: Any) -> list[Any]:
-    pool = getattr(consumer.pool, "_pool", None)
+def _children(worker: Any) -> list[Any]:
+    pool = getattr(worker.pool, "_pool", None)
     return list(getattr(pool, "_pool", None) or [])

@@ -11,13 +11,11 @@ from typing import Final
 
 # imported before Celery looks for its tasks: what is loaded already is not looked for in the working folder
 from worker import tasks  # noqa: F401
-from worker.celery_app import QUEUE, app
+from worker.celery_app import app
+from worker.hints import QUEUE
 
 COMMANDS: Final = {
-    "worker": (
-        *("worker", "--queues", QUEUE, "--prefetch-multiplier", "1"),
-        *("--without-gossip", "--without-mingle"),  # workers meet in the job table, not through the broker
-    ),
+    "worker": ("worker", "--queues", QUEUE, "--prefetch-multiplier", "1"),
     # the schedule stays in memory: nothing on disk that a kill could spoil
     "beat": ("beat", "--scheduler", "celery.beat:Scheduler", "--pidfile", ""),
 }

@@ -1,41 +1,38 @@
 """Let the pool's children know that the worker is asked to end.
 
 Celery tells only the parent process about SIGTERM; its children go on until their task ends, maybe in an
-hour. A file whose name they inherit works for forked and for spawned children, and takes no lock in a
-signal handler.
+hour. They inherit the reading end of a pipe, and one byte in it, which nobody takes out, is the message to
+all of them. A pipe has no name that others could use, and writing to it takes no lock in a signal handler.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
-from pathlib import Path
+import select
 
-VARIABLE = "MORPHID_STOP_FILE"
+_ends: list[int] = []  # reading, writing; empty: not armed
 
 
-def arm() -> Path:
-    """Choose the file, in the parent, before it starts its pool."""
-    path = Path(tempfile.gettempdir()) / f"morphid-stop-{os.getuid()}-{os.getpid()}"
-    path.unlink(missing_ok=True)
-    os.environ[VARIABLE] = str(path)
-    return path
+def arm() -> None:
+    """Make the pipe, in the parent, before it forks its pool."""
+    disarm()
+    _ends.extend(os.pipe())
 
 
 def announce() -> None:
     """Tell the children (called in a signal handler)."""
-    with contextlib.suppress(OSError, KeyError):
-        Path(os.environ[VARIABLE]).touch()
+    with contextlib.suppress(OSError):
+        for writing in _ends[1:]:
+            os.write(writing, b"!")
 
 
 def disarm() -> None:
-    """Remove the file once the pool has ended."""
-    with contextlib.suppress(OSError, KeyError):
-        Path(os.environ[VARIABLE]).unlink(missing_ok=True)
+    """Close the pipe once the pool has ended."""
+    while _ends:
+        os.close(_ends.pop())
 
 
 def announced() -> bool:
     """Whether the worker is asked to end (called in a child)."""
-    name = os.environ.get(VARIABLE)
-    return name is not None and Path(name).exists()
+    return any(select.select(_ends[:1], (), (), 0.0)[0]) if _ends else False

@@ -6,14 +6,15 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import repeat
 
-from kombu.exceptions import OperationalError
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.database_errors import trouble_of
+from app.jobs import queue
 from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
 from app.jobs.turns import next_unit
@@ -23,7 +24,8 @@ from app.observability.tracing import forget_tracing, start_tracing
 from app.settings import load_settings
 from worker import numerics, shutdown
 from worker.attempt import Ending
-from worker.celery_app import QUEUE, REAP, RUN_JOB, app, threads_per_job
+from worker.celery_app import app, threads_per_job
+from worker.hints import REAP, RUN_JOB
 from worker.runner import CHUNK_LEASE_S, Runner
 
 log = logging.getLogger(__name__)
@@ -84,18 +86,21 @@ def _unless_away() -> Iterator[None]:
         log.warning("the job store is %s; the reaper will come back to it", trouble.value)
 
 
-def publish(job_id: str) -> None:
-    """Send the wake-up hint for a queued job."""
-    app.send_task(RUN_JOB, args=[job_id], queue=QUEUE)
+def publish(job_id: str) -> bool:
+    """Send the wake-up hint for a queued job; without a broker the workers' own looks replace it."""
+    return queue.publish(job_id, enter_process().settings.broker_url)
+
+
+def publish_all(job_ids: Iterable[str]) -> None:
+    """Send several hints, up to the first that the broker does not take."""
+    for job_id in job_ids:
+        if not publish(job_id):
+            break
 
 
 def publish_chunks(job_id: str, count: int) -> None:
     """Send a hint for each chunk of a job that was handed out; a broker that is away loses none of them."""
-    try:
-        for _ in range(count):
-            publish(job_id)
-    except OperationalError as error:
-        log.warning("job %s: chunks not announced (%s); the reaper will repeat it", job_id, error)
+    publish_all(repeat(job_id, count))
 
 
 @app.task(name=RUN_JOB)
@@ -114,16 +119,21 @@ def run_job(job_id: str) -> None:
 
 def pass_on() -> None:
     """Wake somebody for the next queued job unless a message is on its way: a lost one costs nothing."""
-    with enter_process().database.read() as connection:
+    process = enter_process()
+    with process.database.read() as connection:
         unit = next_unit(connection)
-    if unit is not None and messages_waiting() == 0:
+    if unit is not None and queue.messages_waiting(process.settings.broker_url) == 0:
         publish(unit.job_id)
 
 
-def messages_waiting() -> int:
-    """Wake-up messages that no worker has taken yet."""
-    with app.connection_for_read() as connection:
-        return int(connection.default_channel.queue_declare(queue=QUEUE).message_count)
+def work_waits() -> bool:
+    """Look whether a job or a part of one waits; a worker that ends, or a store that is away, has none."""
+    if shutdown.announced():
+        return False
+    unit = None
+    with _unless_away(), enter_process().database.read() as connection:
+        unit = next_unit(connection)
+    return unit is not None
 
 
 @app.task(name=REAP)
@@ -140,5 +150,4 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
         count(connection, REAP_ROUNDS)
     process.reaped_at = time.monotonic()
     log_ends(report)
-    for job_id in report.publish:
-        publish(job_id)
+    publish_all(report.publish)

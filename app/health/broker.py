@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from ssl import SSLCertVerificationError
 from typing import Any
-from urllib.parse import urlsplit
+
+from app.broker import canonical, is_redis
 
 BROKER_TIMEOUT_S = 0.5
-REDIS_SCHEMES = frozenset({"redis", "rediss", "unix"})
 NOT_CHECKED = "not checked (no Redis)"
 UNREACHABLE = "unreachable"
+NOT_TRUSTED = "shows a certificate that is not trusted"
 BROKER_GOOD = frozenset({"ok", NOT_CHECKED})
 
 
@@ -21,7 +23,7 @@ def broker_client(url: str) -> Any:
     from redis.retry import Retry
 
     return Redis.from_url(
-        url,
+        canonical(url),
         socket_connect_timeout=BROKER_TIMEOUT_S,
         socket_timeout=BROKER_TIMEOUT_S,
         retry=Retry(NoBackoff(), 0),
@@ -31,7 +33,7 @@ def broker_client(url: str) -> Any:
 
 def broker_state(url: str) -> str:
     """Ask the broker for a sign of life: ``ok``, or what is wrong."""
-    if urlsplit(url).scheme not in REDIS_SCHEMES:
+    if not is_redis(url):
         return NOT_CHECKED
     from redis import exceptions
 
@@ -39,8 +41,8 @@ def broker_state(url: str) -> str:
         broker_client(url).ping()
     except exceptions.AuthenticationError:
         return "refuses our password"
-    except (exceptions.ConnectionError, exceptions.TimeoutError, OSError):
-        return UNREACHABLE
+    except (exceptions.ConnectionError, exceptions.TimeoutError, OSError) as error:
+        return NOT_TRUSTED if isinstance(error.__context__, SSLCertVerificationError) else UNREACHABLE
     except exceptions.RedisError as error:
         return f"answers {str(error)[:80]!r}"  # loading, out of memory: worth reading
     return "ok"

@@ -25,6 +25,11 @@ TOLD = {  # counters by the name of their rows
     job_counts.FLIGHTS: ("morphid_flights", "Flights that ended jobs have flown.", ("operation",)),
     job_counts.LEASES_LOST: ("morphid_leases_lost", "Leases that ran out: workers died or stalled.", ()),
     job_counts.CHUNK_LEASES_LOST: ("morphid_chunk_leases_lost", "Leases on chunks that ran out.", ()),
+    job_counts.MESSAGES_DROPPED: (
+        "morphid_messages_dropped",
+        "Malformed wake-up messages that workers have dropped.",
+        (),
+    ),
     job_counts.REAP_ROUNDS: ("morphid_reap_rounds", "Rounds of the reaper: one that stays away is bad.", ()),
     job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that were asked to end.", ()),
 }

@@ -26,12 +26,15 @@ class Sign:
         Its living pool children: jobs it can run at once.
     busy : int
         Of these, those that have a task.
+    process : str or None
+        The parent process as `app.health.processes` names it.
     """
 
     name: str
     version: str
     slots: int
     busy: int
+    process: str | None = None
 
 
 def note_started(session: Session, sign: Sign) -> None:
@@ -53,7 +56,7 @@ def note_seen(session: Session, sign: Sign) -> None:
 
 
 def note_stopped(session: Session, name: str) -> None:
-    """Write that a worker takes no more messages because it was asked to end."""
+    """Write that a worker takes no more jobs because it was asked to end."""
     session.execute(update(workers).where(workers.c.name == name).values(stopped_at=database_time(), busy=0))
 
 
@@ -64,6 +67,7 @@ def _insert(session: Session, sign: Sign) -> None:
             version=sign.version,
             slots=sign.slots,
             busy=sign.busy,
+            process=sign.process,
             started_at=database_time(),
             seen_at=database_time(),
         )

@@ -12,8 +12,8 @@ from app.observability.counters import Counted
 class WorkerCounts:
     """Workers that are there; those that ended as they should are not counted."""
 
-    alive: int  # they took part in consuming messages a moment ago
-    stalled: int  # they have not for a while, and did not say that they end
+    alive: int  # they looked for jobs a moment ago
+    stalled: int  # they have not for a while, and have not ended
     slots: int  # jobs that the living can run at once
     busy: int  # of these slots
 

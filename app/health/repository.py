@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from sqlalchemy import and_, case, func, select, true
+from sqlalchemy import func, select, true
 
 from app.database import Session, database_time
 from app.health.presence import REMEMBERED_S
+from app.health.processes import is_gone
 from app.health.records import Snapshot, WorkerCounts
 from app.jobs.records import HELD, JobStatus
 from app.observability.counters import read_counters
 from app.tables import STATUSES, job_chunks, jobs, webhook_deliveries, workers
 
 SILENT_BEATS = 3  # a worker that missed so many of its signs of life is stalled
+GONE_S = 60.0  # one that is silent for longer, and whose process cannot be seen from here, is not there
 
 
 def snapshot(session: Session, beat_s: float) -> Snapshot:
@@ -33,23 +35,34 @@ def snapshot(session: Session, beat_s: float) -> Snapshot:
 
 
 def count_workers(session: Session, beat_s: float, *, host: str | None = None) -> WorkerCounts:
-    """Count workers, of one host or of all; the time since their last sign of life is the database's."""
-    age = database_time() - workers.c.seen_at
-    here = workers.c.stopped_at.is_(None)
-    alive = and_(here, age <= SILENT_BEATS * beat_s, workers.c.slots > 0)
-    stalled = and_(here, ~and_(age <= SILENT_BEATS * beat_s, workers.c.slots > 0))
-    row = session.execute(
+    """Count workers, of one host or of all; the time since their last sign of life is the database's.
+
+    A worker whose process has ended is not counted: at once where its process can be looked for, else when
+    it has been silent for `GONE_S`. One that is there and silent is stalled.
+    """
+    rows = session.execute(
         select(
-            func.coalesce(func.sum(case((alive, 1), else_=0)), 0).label("alive"),
-            func.coalesce(func.sum(case((stalled, 1), else_=0)), 0).label("stalled"),
-            func.coalesce(func.sum(case((alive, workers.c.slots), else_=0)), 0).label("slots"),
-            func.coalesce(func.sum(case((alive, workers.c.busy), else_=0)), 0).label("busy"),
+            (database_time() - workers.c.seen_at).label("silent_s"),
+            workers.c.slots,
+            workers.c.busy,
+            workers.c.process,
         ).where(
+            workers.c.stopped_at.is_(None),
             workers.c.seen_at > database_time() - REMEMBERED_S,
             true() if host is None else workers.c.name.startswith(f"{host}:", autoescape=True),
         )
-    ).one()
-    return WorkerCounts(int(row.alive), int(row.stalled), int(row.slots), int(row.busy))
+    )
+    silent_s = SILENT_BEATS * beat_s
+    alive, stalled = [], 0
+    for row in rows:
+        gone = is_gone(row.process)
+        if gone is None:
+            gone = row.silent_s > max(GONE_S, silent_s)
+        if not gone and row.silent_s <= silent_s and row.slots > 0:
+            alive.append(row)
+        elif not gone:
+            stalled += 1
+    return WorkerCounts(len(alive), stalled, sum(row.slots for row in alive), sum(row.busy for row in alive))
 
 
 def _jobs(session: Session) -> dict[str, int]:

@@ -15,13 +15,13 @@ class Liveness(BaseModel):
 
 
 class WorkerState(BaseModel):
-    """The workers, by their signs of life: each comes from the loop that takes messages from the broker."""
+    """The workers, by their signs of life: each comes from the loop that hands jobs to their children."""
 
     status: Literal["ok", "none", "stalled", "unknown"] = Field(
-        description="`stalled`: there are workers, and none of them takes messages; `unknown`: no database."
+        description="`stalled`: there are workers, and none of them takes jobs; `unknown`: no database."
     )
-    alive: int = Field(description="Workers that take messages.")
-    stalled: int = Field(description="Workers that have ceased to, without saying goodbye.")
+    alive: int = Field(description="Workers that take jobs.")
+    stalled: int = Field(description="Workers that have ceased to, and have not ended.")
     slots: int = Field(description="Jobs that can run at once.")
     busy: int = Field(description="Slots in use.")
 
@@ -30,11 +30,12 @@ class Readiness(BaseModel):
     """Whether the service can do its work, part by part."""
 
     status: Literal["ready", "degraded", "not_ready"] = Field(
-        description="`degraded`: jobs are taken and kept, but none starts before broker and workers are ok."
+        description="`degraded`: jobs are taken and kept; without workers none starts, without a broker "
+        "each starts a second late."
     )
     database: str = Field(examples=["ok"], description="`ok`, `not migrated` or `unreachable (...)`.")
     broker: str = Field(
         examples=["ok"],
-        description="Answer to a PING with our password. Without a broker jobs wait until it is back.",
+        description="Answer to a PING with our password. Without a broker workers find jobs by looking.",
     )
     workers: WorkerState

@@ -12,9 +12,6 @@ from app.settings import load_settings
 
 TASK_NAME = "morphid.run_job"
 QUEUE_NAME = "morphid"
-CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
-SOCKET_TIMEOUT_S = 2.0
-
 WARM_UP_AFTER_S = 1.0  # the start of the process comes first
 
 logger = logging.getLogger(__name__)
@@ -25,17 +22,10 @@ def _client(broker_url: str) -> Any:
     """A Celery client that fails fast; it opens no connection before the first message."""
     from celery import Celery
 
-    client = Celery("morphid", broker=broker_url, set_as_current=False)
-    client.conf.update(
-        task_ignore_result=True,
-        broker_connection_timeout=CONNECT_TIMEOUT_S,
-        broker_connection_retry=False,
-        broker_transport_options={
-            "socket_connect_timeout": CONNECT_TIMEOUT_S,
-            "socket_timeout": SOCKET_TIMEOUT_S,
-            "max_retries": 0,
-        },
-    )
+    from app.jobs.transport import celery_broker
+
+    client = Celery("morphid", set_as_current=False)
+    client.conf.update(celery_broker(broker_url), broker_connection_retry=False)
     return client
 
 
@@ -54,6 +44,16 @@ def publish(job_id: str, broker_url: str | None = None) -> bool:
         logger.warning("wake-up message for %s not sent (%s); the reaper will repeat it", job_id, error)
         return False
     return True
+
+
+def messages_waiting(broker_url: str) -> int | None:
+    """Count the wake-up messages that no worker has taken yet; None when the broker cannot be asked."""
+    try:
+        with _client(broker_url).connection_for_write() as connection:
+            return int(connection.default_channel.queue_declare(queue=QUEUE_NAME).message_count)
+    except Exception as error:  # noqa: BLE001 - as in `publish`
+        logger.warning("the broker does not say how many messages wait (%s)", error)
+        return None
 
 
 class Publisher:

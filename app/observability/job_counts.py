@@ -23,6 +23,7 @@ CHUNK_LEASES_LOST = "chunk_leases_lost"  # the reaper of chunks counts these its
 FINISHED = "jobs_finished"
 FLIGHTS = "flights"
 LEASES_LOST = "leases_lost"
+MESSAGES_DROPPED = "messages_dropped"  # the workers count these themselves
 REAP_ROUNDS = "reap_rounds"  # the reaper counts these itself
 RELEASED = "jobs_released"
 RUN_TIME = "job_run"  # each of these two with BUCKET and MILLISECONDS

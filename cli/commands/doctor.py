@@ -61,7 +61,7 @@ def doctor(
 @reports_errors
 def ready(
     worker: Annotated[
-        bool, typer.Option("--worker", help="Only: does this machine's worker take messages?")
+        bool, typer.Option("--worker", help="Only: does this machine's worker take jobs?")
     ] = False,
     wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
     data_dir: options.DataDir = None,

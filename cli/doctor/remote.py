@@ -96,7 +96,7 @@ def _readiness(told: dict[str, Any]) -> Iterator[Finding]:
         state = told[part]
         yield ok(part, state) if state in {"ok", "not checked (no Redis)"} else fail(part, state, remedy)
     workers = told["workers"]
-    message = "{status}: {alive} take messages, {stalled} no longer do, {busy} of {slots} slots busy".format(
+    message = "{status}: {alive} take jobs, {stalled} no longer do, {busy} of {slots} slots busy".format(
         **workers
     )
     if workers["stalled"]:

@@ -148,7 +148,7 @@ def broker(url: str) -> Iterator[Finding]:
     if not int(told.get("aof_enabled", 0)):
         yield warn(
             "broker journal",
-            "messages do not survive its restart: jobs then wait for the reaper to repeat them",
+            "messages do not survive its restart: jobs then begin a second later",
             "appendonly yes",
         )
     else:
@@ -197,7 +197,7 @@ def work(settings: Any) -> Iterator[Finding]:
     if workers.stalled:
         yield fail(
             "workers",
-            f"{workers.stalled} no longer take messages, {workers.alive} do",
+            f"{workers.stalled} no longer take jobs, {workers.alive} do",
             "restart them; their logs say what they wait for",
         )
     elif not workers.alive:
@@ -213,7 +213,7 @@ def work(settings: Any) -> Iterator[Finding]:
         yield fail(
             "jobs",
             f"the oldest has waited {seen.oldest_queued_s:.0f} s though {free} slots are free",
-            "is the broker the workers' own (MORPHID_BROKER_URL), and does a beat run?",
+            "do the workers use this database (MORPHID_DATABASE_URL)? Their logs say what keeps them",
         )
     else:
         yield ok("jobs", f"{seen.jobs['queued']} queued, {seen.jobs['running']} running")

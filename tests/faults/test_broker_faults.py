@@ -41,7 +41,7 @@ def test_a_broker_that_forgets(rig: Rig) -> None:
 
 
 def test_a_minute_without_a_broker(rig: Rig) -> None:
-    """For 60 s without a broker every POST is accepted, fast; the running job goes on; then all jobs run."""
+    """For 60 s without a broker every POST is accepted, fast; the running job goes on, and others begin."""
     rig.start_worker(slots=2)
     rig.start_api()
     usual = Client(rig)
@@ -58,18 +58,17 @@ def test_a_minute_without_a_broker(rig: Rig) -> None:
         rig.tend()
         time.sleep(1.0)
     assert rig.job(running).finished, "a job that runs needs no broker"
+    rig.settle()
+    settled_s = time.monotonic() - gone_at - AWAY_S
     rig.bring_back("broker")
-    back_at = time.monotonic()
-    waiting = len(rig.ledger.open(rig.database))
-    rig.until(lambda: len(rig.ledger.open(rig.database)) < waiting, 60.0)
-    first_s = time.monotonic() - back_at
+    usual.post()
     rig.settle()
     took_s, usual_s = client.took_s(202), usual.took_s(202)
     print(
         f"broker away {AWAY_S:g} s: {len(took_s)} POSTs, p50 {1e3 * percentile(took_s, 0.5):.0f} ms, "
         f"p95 {1e3 * percentile(took_s, 0.95):.0f} ms, most {1e3 * took_s[-1]:.0f} ms (with it: p50 "
         f"{1e3 * percentile(usual_s, 0.5):.0f} ms, p95 {1e3 * percentile(usual_s, 0.95):.0f} ms); "
-        f"first job ended {first_s:.1f} s after its return, all {time.monotonic() - back_at:.1f} s"
+        f"all jobs had ended {settled_s:.1f} s after the last POST, without a broker"
     )
     assert len(client.answers) == len(took_s), "every POST was accepted at once"
     assert took_s[-1] < SLOWEST_POST_S

@@ -86,10 +86,9 @@ if "MORPHID_TEST_PAGES" in os.environ:
 if "MORPHID_TEST_DELIVERIES" in os.environ:
     publish_once = tasks.publish
 
-    def publish(job_id: str) -> None:
+    def publish(job_id: str) -> bool:
         """Send a message several times."""
-        for _ in range(int(os.environ["MORPHID_TEST_DELIVERIES"])):
-            publish_once(job_id)
+        return all(publish_once(job_id) for _ in range(int(os.environ["MORPHID_TEST_DELIVERIES"])))
 
     tasks.publish = publish
 

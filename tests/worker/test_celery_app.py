@@ -8,7 +8,8 @@ import pytest
 
 from app.settings import load_settings
 from worker import celery_app
-from worker.celery_app import QUEUE, REAP, RUN_JOB, make_app
+from worker.celery_app import make_app
+from worker.hints import QUEUE, REAP, RUN_JOB
 
 
 def test_messages_are_hints() -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from worker import numerics, shutdown
+from worker import numerics
 from worker.numerics import Kernels, prepare_environment, share_cores
 
 
@@ -152,13 +154,33 @@ def test_the_parent_process_loads_no_compiler(root: Path) -> None:
     assert subprocess.run([sys.executable, "-c", program], cwd=root, check=False).returncode == 0
 
 
-def test_children_learn_of_the_shutdown(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The parent's announcement reaches whoever inherits its environment, and is forgotten afterwards."""
-    monkeypatch.delenv(shutdown.VARIABLE, raising=False)
-    assert not shutdown.announced()
-    shutdown.arm()
-    assert not shutdown.announced()
-    shutdown.announce()
-    assert shutdown.announced()
-    shutdown.disarm()
-    assert not shutdown.announced()
+def strangers_folder(path: Path) -> None:
+    """A folder that others may write to."""
+    path.mkdir(mode=0o777)
+    path.chmod(0o777)
+
+
+def link_into_our_home(path: Path) -> None:
+    """A link of another user's to a folder of ours."""
+    home = path.parent / "home"
+    home.mkdir(mode=0o700)
+    path.symlink_to(home)
+
+
+@pytest.mark.parametrize("trap", [strangers_folder, link_into_our_home, Path.touch])
+def test_a_prepared_name_is_not_used_for_kernels(
+    fresh_process: dict[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    trap: Callable[[Path], None],
+) -> None:
+    """Compiled code goes to no place that somebody else has prepared under the name that we would take."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    prepared = tmp_path / f"morphid-kernels-{os.getuid()}"
+    trap(prepared)
+    fresh_process["NUMBA_CACHE_DIR"] = "/proc/no/such/place"
+    prepare_environment(1)
+    chosen = Path(fresh_process["NUMBA_CACHE_DIR"])
+    assert chosen.parent == tmp_path
+    assert chosen != prepared
+    assert chosen.lstat().st_mode & 0o777 == 0o700

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from app.health import metrics
 from app.health import service as health
 from app.health.broker import broker_state
 from app.health.presence import Sign, note_started, note_stopped
+from app.health.processes import process_identity
 from app.jobs import store
 from app.jobs.reaper import reap
 from app.settings import Settings
@@ -24,6 +27,7 @@ from cli.broker import prepare_broker
 from cli.supervisor import Supervisor
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService, running_service
+from tests.waiting import until
 
 Samples = dict[tuple[str, tuple[tuple[str, str], ...]], float]
 
@@ -163,6 +167,63 @@ def test_workers_that_fall_silent_are_stalled(equipped: tuple[RunningService, Su
     assert parts(service) == ("degraded", "ok", "none")
     counts = scraped(service)
     assert counts["morphid_workers", (("status", "alive"),)] == 0
+
+
+def started_worker(service: RunningService, process: str | None) -> None:
+    """Sign for a worker of some process."""
+    with service.database.write() as session:
+        note_started(session, Sign("host:2", "1", slots=1, busy=0, process=process))
+
+
+def age_sign(service: RunningService, by_s: float) -> None:
+    """Let time pass since the last sign of every worker."""
+    with service.database.write() as session:
+        session.execute(update(workers).values(seen_at=workers.c.seen_at - by_s))
+
+
+def test_a_worker_whose_process_has_ended_is_gone(equipped: tuple[RunningService, Supervisor]) -> None:
+    """Killed, it leaves the list at once, not after its silence has been noticed; also as a zombie."""
+    service, _ = equipped
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    identity = process_identity(process.pid)
+    assert identity is not None
+    started_worker(service, identity)
+    assert parts(service) == ("ready", "ok", "ok")
+    process.kill()
+    until(lambda: parts(service) == ("degraded", "ok", "none"))  # nobody has waited for it yet
+    process.wait()
+    assert process.stdin is not None
+    process.stdin.close()
+    assert parts(service) == ("degraded", "ok", "none")
+
+
+def test_another_process_of_the_same_number_is_another(
+    equipped: tuple[RunningService, Supervisor],
+) -> None:
+    """Numbers are given out again: a process that has ours and began at another moment is not the worker."""
+    service, _ = equipped
+    identity = process_identity(os.getpid())
+    assert identity is not None
+    started_worker(service, identity)
+    assert parts(service) == ("ready", "ok", "ok")
+    started_worker(service, f"{identity.rpartition('/')[0]}/1")
+    assert parts(service) == ("degraded", "ok", "none")
+
+
+@pytest.mark.parametrize("elsewhere", ["another-boot/pid:[1]/7/9", None])
+def test_a_silent_worker_elsewhere_is_gone_within_a_minute(
+    equipped: tuple[RunningService, Supervisor], elsewhere: str | None
+) -> None:
+    """Whose process cannot be looked for is stalled when silent, and gone after 60 s; ours stay stalled."""
+    service, _ = equipped
+    started_worker(service, elsewhere)
+    age_sign(service, 55.0)
+    assert parts(service) == ("degraded", "ok", "stalled")
+    age_sign(service, 6.0)
+    assert parts(service) == ("degraded", "ok", "none")
+    started_worker(service, process_identity(os.getpid()))
+    age_sign(service, 600.0)
+    assert parts(service) == ("degraded", "ok", "stalled"), "it is there, and hangs"
 
 
 def test_the_broker_is_asked_with_its_password(equipped: tuple[RunningService, Supervisor]) -> None:

@@ -1,0 +1,115 @@
+"""The broker's address: every spelling in use becomes the one that all of our clients read alike.
+
+Celery's own reader and redis-py's differ: in Celery a bare ``rediss://`` checks no certificate, and neither
+knows the other's words for the same option. So we write an address once in redis-py's spelling, with
+defaults put in, and both the health check and Celery's transport (`app.jobs.transport`) hand it to redis-py.
+"""
+
+from __future__ import annotations
+
+from urllib.parse import parse_qsl, quote, urlencode, urlsplit
+
+SCHEMES = {
+    "redis": "redis",
+    "rediss": "rediss",
+    "valkey": "redis",
+    "valkeys": "rediss",
+    "unix": "unix",
+    "redis+socket": "unix",  # Celery's
+}
+CERTIFICATE_CHECKS = {
+    "required": "required",
+    "cert_required": "required",
+    "optional": "optional",
+    "cert_optional": "optional",
+    "none": "none",
+    "cert_none": "none",
+}
+TLS_OPTIONS = frozenset(
+    {
+        "ssl_ca_certs",
+        "ssl_ca_path",
+        "ssl_cert_reqs",
+        "ssl_certfile",
+        "ssl_check_hostname",
+        "ssl_ciphers",
+        "ssl_keyfile",
+        "ssl_min_version",
+        "ssl_password",
+    }
+)
+OPTIONS = frozenset({"client_name", "db", "password", "protocol", "socket_keepalive", "username"})
+HOST_OPTIONS = frozenset({"socket_keepalive"})  # a socket file knows no such thing
+
+
+def is_redis(url: str) -> bool:
+    """Whether an address names a Redis or Valkey server."""
+    return url.partition("://")[0].lower() in SCHEMES
+
+
+def canonical(url: str) -> str:
+    """Write an address in the spelling of redis-py, with the check of certificates spelled out.
+
+    An address of another kind of broker is returned as it is.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the operator, without the password.
+
+    Examples
+    --------
+    >>> canonical("rediss://queue.example")
+    'rediss://queue.example?ssl_cert_reqs=required'
+    >>> canonical("redis+socket:///run/valkey.sock?virtual_host=2")
+    'unix:///run/valkey.sock?db=2'
+    """
+    if not is_redis(url):
+        return url
+    parts = urlsplit(url)
+    scheme = SCHEMES[parts.scheme]
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    if "virtual_host" in options:
+        options["db"] = options.pop("virtual_host").strip("/")
+    _refuse_unknown(scheme, options)
+    path = parts.path
+    if scheme == "unix":
+        if parts.hostname or not path.strip("/"):
+            raise ValueError(
+                "MORPHID_BROKER_URL: a socket file is named by its full path: unix:///run/valkey.sock"
+            )
+    else:
+        number = options.get("db", path.strip("/"))
+        if number and not number.isdecimal():
+            raise ValueError(
+                "MORPHID_BROKER_URL: what follows the broker's host is no number of a database; "
+                "a slash in the password is written %2F"
+            )
+    if scheme == "rediss":
+        options["ssl_cert_reqs"] = _certificate_check(options.get("ssl_cert_reqs", "required"))
+    # Celery takes what stands behind a semicolon for another address
+    place, path = (quote(text, safe="%/:@[]!$&'()*+,=~") for text in (parts.netloc, path))
+    return f"{scheme}://{place}{path}" + (f"?{urlencode(options)}" if options else "")
+
+
+def _refuse_unknown(scheme: str, options: dict[str, str]) -> None:
+    for name in sorted(options):
+        if name in TLS_OPTIONS:
+            if scheme != "rediss":
+                raise ValueError(f"MORPHID_BROKER_URL: {name} is for TLS, which is spelled rediss://")
+        elif name not in OPTIONS or (scheme == "unix" and name in HOST_OPTIONS):
+            known = (OPTIONS - HOST_OPTIONS if scheme == "unix" else OPTIONS) | (
+                TLS_OPTIONS if scheme == "rediss" else frozenset()
+            )
+            raise ValueError(
+                f"MORPHID_BROKER_URL: no option {name[:40]!r}; there are {', '.join(sorted(known))}"
+            )
+
+
+def _certificate_check(value: str) -> str:
+    try:
+        return CERTIFICATE_CHECKS[value.lower()]
+    except KeyError:
+        raise ValueError(
+            f"MORPHID_BROKER_URL: ssl_cert_reqs is required, optional or none, not {value[:40]!r}"
+        ) from None

@@ -1,0 +1,69 @@
+"""How Celery reaches the broker: kombu's Redis transport with the address read by redis-py, as everywhere.
+
+`celery_broker` is the one place that says so to Celery, for the API, the workers and the beat.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kombu.transport import redis
+from redis import Connection, UnixDomainSocketConnection
+from redis.connection import parse_url
+
+from app.broker import canonical, is_redis
+
+CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
+SOCKET_TIMEOUT_S = 2.0
+
+
+def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> dict[str, Any]:
+    """Return Celery's settings of a broker.
+
+    Parameters
+    ----------
+    url
+        The broker's address, in any spelling that `app.broker` knows.
+    transport
+        Import path of the transport, for Redis and Valkey.
+    """
+    settings: dict[str, Any] = {
+        "broker_url": url,
+        "broker_connection_timeout": CONNECT_TIMEOUT_S,
+        "broker_transport_options": {
+            "socket_connect_timeout": CONNECT_TIMEOUT_S,
+            "socket_timeout": SOCKET_TIMEOUT_S,
+            "max_retries": 0,
+        },
+        "task_ignore_result": True,  # results belong in our tables
+        "task_publish_retry": False,  # a lost message is repeated, and nobody waits for a broker
+    }
+    if is_redis(url):
+        settings |= {"broker_url": canonical(url), "broker_transport": transport}
+        # a hint that was taken is gone: jobs are rows, and what is not kept cannot come back to do harm
+        settings["broker_transport_options"]["ack_emulation"] = False
+    return settings
+
+
+class Channel(redis.Channel):
+    """A channel to the server that redis-py reads out of the address."""
+
+    def _connparams(self, asynchronous: bool = False) -> dict[str, Any]:  # noqa: FBT001, FBT002 - kombu's
+        told: dict[str, Any] = dict(parse_url(self.connection.client.hostname))  # type: ignore[no-untyped-call]
+        self.connection_class = told.pop("connection_class", Connection)
+        parameters: dict[str, Any] = super()._connparams(asynchronous)  # type: ignore[no-untyped-call]
+        parameters |= told
+        if issubclass(self.connection_class, UnixDomainSocketConnection):
+            for name in ("socket_keepalive", "socket_keepalive_options"):
+                parameters.pop(name, None)
+        return parameters
+
+    def _queue_bind(self, *_binding: Any) -> None:
+        """Write no table of bindings: each message names its queue, and a full server refuses writes."""
+
+
+class Transport(redis.Transport):
+    """Kombu's Redis transport, told the whole address."""
+
+    Channel = Channel
+    can_parse_url = True

@@ -1,0 +1,113 @@
+"""A worker looks at the rows by itself: hints make jobs begin at once, looking makes them begin at all.
+
+Every second, when a slot is free, a pool child is asked whether work waits; if so, the worker wakes itself as
+a message would have done. So messages that are lost, dropped or never sent cost a second.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from celery import bootsteps
+from celery.utils.functional import noop
+from celery.worker import state
+from kombu.message import Message
+
+from worker.hints import RUN_JOB, Hint
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S = 1.0
+ANSWER_WITHIN_S = 5.0  # then another child is asked; a look takes a millisecond
+NOBODY_IN_PARTICULAR = "a look at the rows"
+
+
+def work_waits() -> bool:
+    """Look at the rows (called in a pool child)."""
+    from worker import tasks
+
+    return tasks.work_waits()
+
+
+class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
+    """Part of Celery's worker: looks in its event loop, as long as the pool is there.
+
+    Parameters
+    ----------
+    worker : Celery's.
+    clock : seconds that only rise.
+    """
+
+    requires = ("celery.worker.components:Pool",)
+
+    def __init__(self, worker: Any, clock: Callable[[], float] = time.monotonic, **options: Any) -> None:
+        super().__init__(worker, **options)
+        worker.row_watch = self
+        self._clock = clock
+        self._timer: Any = None
+        self._asked_at: float | None = None
+        self._unanswered_since: float | None = None
+
+    def include_if(self, worker: Any) -> bool:
+        """Whether there is an event loop; with a broker other than Redis there may be none."""
+        return bool(worker.use_eventloop)
+
+    def start(self, worker: Any) -> None:
+        """Look from now on."""
+        self._timer = worker.timer.call_repeatedly(LOOK_EVERY_S, self._look, (worker,))
+
+    def stop(self, _worker: Any) -> None:
+        """Look no more."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    terminate = stop
+
+    @property
+    def unanswered_s(self) -> float:
+        """How long free children have not answered, s."""
+        return 0.0 if self._unanswered_since is None else self._clock() - self._unanswered_since
+
+    def _look(self, worker: Any) -> None:
+        if len(state.reserved_requests) >= worker.pool.num_processes:
+            self._unanswered_since = None  # all are at work
+            return
+        now = self._clock()
+        if self._asked_at is not None and now - self._asked_at < ANSWER_WITHIN_S:
+            return
+        self._asked_at = now
+        if self._unanswered_since is None:
+            self._unanswered_since = now
+
+        def answered(waits: object) -> None:
+            self._asked_at = self._unanswered_since = None
+            if waits:
+                wake(worker.consumer)
+
+        def failed(error: object) -> None:
+            self._asked_at = None
+            log.warning("a look at the rows failed: %s", error)
+
+        # the pool gives the slot back with the answer
+        worker.semaphore.acquire(
+            partial(worker.pool.apply_async, work_waits, callback=answered, error_callback=failed)
+        )
+
+
+def wake(consumer: Any) -> None:
+    """Have the pool run the next job, as a message from the broker does."""
+    if RUN_JOB not in consumer.strategies:
+        consumer.update_strategies()  # no broker was there yet
+    hint = Hint(RUN_JOB, [NOBODY_IN_PARTICULAR])
+    message = Message(  # type: ignore[no-untyped-call]
+        body=hint.body(),
+        headers=hint.headers(),
+        properties={"correlation_id": hint.id},
+        content_type="application/json",
+        content_encoding="utf-8",
+    )
+    consumer.strategies[RUN_JOB](message, None, noop, noop, [])
