@@ -130,14 +130,14 @@ def claim(
 def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatch | None:
     hooks = _locked(session, seen.owner, seen.destination)
     now = float(session.scalar(select(clock())) or 0.0)
-    if any(now < hook.sending_until or now < hook.paused_until for hook in hooks.values()):
-        return None
+    free = [hook.id for hook in hooks.values() if max(hook.sending_until, hook.paused_until) <= now]
     row = session.execute(
         update(webhook_deliveries)
         .where(
             webhook_deliveries.c.id == seen.id,
             webhook_deliveries.c.fence == seen.fence,
             webhook_deliveries.c.status == WAITING,
+            webhook_deliveries.c.webhook_id.in_(free),
         )
         .values(
             fence=seen.fence + 1,
@@ -186,13 +186,16 @@ def settle(
     """
     hooks = _locked(session, dispatch.owner, dispatch.destination)
     hook = hooks.get(dispatch.webhook_id)
-    if hook is None:  # deleted, and its deliveries with it
-        _set_hooks(session, hooks, sending_until=0.0)
-        return None
+    held = select(webhook_deliveries.c.id).where(*_held(dispatch))
+    if hook is not None and session.scalar(held) is None:
+        return None  # the destination, too, is another sender's now
+    _set_hooks(session, hooks, sending_until=0.0)
+    if hook is None:
+        return None  # deleted, and its deliveries with it
     if answer.delivered:
         if not _write(session, dispatch, answer, DELIVERED, None, clock):
             return None
-        _set_hooks(session, hooks, sending_until=0.0, paused_until=0.0)
+        _set_hooks(session, hooks, paused_until=0.0)
         verified = {} if dispatch.challenge is None else {"verified_at": clock()}
         _set_hooks(session, [hook.id], failures=0, **verified)
         return DELIVERED
@@ -201,7 +204,7 @@ def settle(
     if not _write(session, dispatch, answer, status, next_at, clock):
         return None
     pause_s = None if answer.gone else next_delay_s(hook.failures + 1, answer.retry_after_s, rng)
-    _set_hooks(session, hooks, sending_until=0.0, paused_until=clock() + (pause_s or 0.0))
+    _set_hooks(session, hooks, paused_until=clock() + (pause_s or 0.0))
     _count_failure(session, hooks, hook, answer, clock)
     return status
 

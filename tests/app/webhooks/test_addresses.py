@@ -195,3 +195,37 @@ def test_a_name_server_that_hangs_holds_nobody_up() -> None:
     with pytest.raises(TimeoutError):
         asyncio.run(impatient())
     hold.set()
+
+
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("https://hooks.example.com/a", True),
+        ("https://HOOKS.example.com:8443/a", True),
+        ("https://other.example.com:9000/", True),
+        ("https://[2606:4700::1]/", True),
+        ("https://other.example.com/", False),
+        ("https://other.example.com:9001/", False),
+        ("https://hooks.example.com.evil.example/", False),
+        ("https://8.8.8.8/", False),
+    ],
+)
+def test_only_named_hosts_are_looked_up(url: str, named: bool) -> None:  # noqa: FBT001
+    """Where hosts are named no other is looked up, neither at creation nor at a try."""
+    asked: list[str] = []
+
+    def resolve(host: str, _port: int) -> list[str]:
+        asked.append(host)
+        return ["8.8.8.8"]
+
+    names = frozenset({"hooks.example.com", "other.example.com:9000", "[2606:4700::1]"})
+    policy = AddressPolicy(resolve=resolve, dial_only=names)
+    if named:
+        policy.check_now(url)
+        asyncio.run(policy.target(url))
+        return
+    with pytest.raises(AddressRefused, match="chosen hosts"):
+        policy.check_now(url)
+    with pytest.raises(AddressRefused, match="chosen hosts"):
+        asyncio.run(policy.target(url))
+    assert asked == []

@@ -17,7 +17,7 @@ from app.database import Database
 from app.webhooks import deliveries as sql
 from app.webhooks.addresses import destination_of
 from app.webhooks.deliveries import LEASE_S
-from app.webhooks.outbox import new_delivery
+from app.webhooks.outbox import new_delivery, note_challenge
 from app.webhooks.repository import reopen_webhook
 from app.webhooks.retries import DELAYS_S, JITTER, MAX_TRIES
 from tests.app.webhooks.hooks import (
@@ -253,6 +253,37 @@ def test_a_receiver_that_does_not_answer_the_challenge(database: Database, there
     with database.write() as session:
         shown = reopen_webhook(session, OWNER, hook_id)
     assert (shown.failures, shown.verified_at, shown.disabled_at) == (0, None, None)
+
+
+def test_reopening_waits_for_nothing(database: Database, there: Receiver) -> None:
+    """A new challenge is sent at once, amid a pause after others' failures and after a try it crossed."""
+    clock = HandClock()
+    clock.turn(60.0)
+    there.answers_challenges = False
+    hook_id = challenged_hook(database, there.url("/new"))
+
+    def reopen() -> None:
+        with database.write() as session:
+            reopen_webhook(session, OWNER, hook_id)
+            note_challenge(session, hook_id)
+
+    def crossed(handler: BaseHTTPRequestHandler, _number: int) -> None:
+        reopen()
+        there.answers_challenges = True
+        status(handler, 500)
+
+    there.answer = crossed
+    assert send_due(database, clock=clock) == 2
+    assert hook_row(database, hook_id).verified_at is not None
+    there.answer = by_path({"/bad": 500, "/new": 204})  # type: ignore[assignment]
+    new_hook(database, there.url("/bad"))
+    many_ends(database, 1)
+    assert send_due(database, clock=clock) == 2  # an end is written for the older webhook first
+    with database.write() as session:
+        sql.disable(session, hook_id, "a test")
+    reopen()
+    assert send_due(database, clock=clock) == 1
+    assert len(there.challenges) == 2
 
 
 @on_sqlite

@@ -213,6 +213,7 @@ def test_a_slow_receiver_does_not_hold_up_other_owners(database: Database, there
         ended_job(database, owner="quick")
         running = sender(database, most_at_once=6, most_per_owner=3)
         running.start()
+        stuck.wait_for(1)
         there.wait_for(1)
         assert len(stuck.received) == 1
         hold.set()
