@@ -24,7 +24,6 @@ from sqlalchemy.pool import NullPool
 from app.database import Session
 from app.database_address import normal_url
 from app.health.presence import Sign, note_seen, note_started, note_stopped
-from app.health.processes import process_identity
 from app.observability.counters import count
 from app.observability.job_counts import MESSAGES_DROPPED
 from app.settings import load_settings
@@ -115,7 +114,6 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
             VERSION,
             slots=slots,
             busy=len(state.active_requests),
-            process=process_identity(os.getpid()),
         )
         note = note_seen if self._known else note_started
         number = dropped.number

@@ -14,7 +14,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.database_errors import trouble_of
-from app.jobs import queue
+from app.jobs.queue import messages_waiting
+from app.jobs.queue import publish as send_hint
 from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
 from app.jobs.turns import next_unit
@@ -88,7 +89,7 @@ def _unless_away() -> Iterator[None]:
 
 def publish(job_id: str) -> bool:
     """Send the wake-up hint for a queued job; without a broker the workers' own looks replace it."""
-    return queue.publish(job_id, enter_process().settings.broker_url)
+    return send_hint(job_id, enter_process().settings.broker_url)
 
 
 def publish_all(job_ids: Iterable[str]) -> None:
@@ -122,7 +123,7 @@ def pass_on() -> None:
     process = enter_process()
     with process.database.read() as connection:
         unit = next_unit(connection)
-    if unit is not None and queue.messages_waiting(process.settings.broker_url) == 0:
+    if unit is not None and messages_waiting(process.settings.broker_url) == 0:
         publish(unit.job_id)
 
 

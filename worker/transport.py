@@ -7,7 +7,8 @@ from typing import Any
 
 from redis import Redis
 
-from app.jobs import transport
+from app.jobs.transport import Channel as PlainChannel
+from app.jobs.transport import Transport as PlainTransport
 from worker.hints import read_hint
 
 log = logging.getLogger(__name__)
@@ -46,14 +47,14 @@ class HintClient(Redis):
         return None if hint is None else (queue, hint.packed())
 
 
-class Channel(transport.Channel):
+class Channel(PlainChannel):
     """A channel that takes wake-up messages."""
 
     def _get_client(self) -> type[Redis]:
         return HintClient
 
 
-class Transport(transport.Transport):
+class Transport(PlainTransport):
     """The worker's transport."""
 
     Channel = Channel

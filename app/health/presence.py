@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sqlalchemy import delete, insert, update
 
 from app.database import Session, database_time
+from app.health.processes import own_identity
 from app.tables import workers
 
 REMEMBERED_S = 86_400.0  # a worker that is silent for longer is gone: its row is old news
@@ -27,14 +28,14 @@ class Sign:
     busy : int
         Of these, those that have a task.
     process : str or None
-        The parent process as `app.health.processes` names it.
+        Who signs, as `app.health.processes` names it: the process that makes the sign.
     """
 
     name: str
     version: str
     slots: int
     busy: int
-    process: str | None = None
+    process: str | None = field(default_factory=own_identity)
 
 
 def note_started(session: Session, sign: Sign) -> None:

@@ -22,6 +22,11 @@ def process_identity(pid: int) -> str | None:
         return None
 
 
+def own_identity() -> str | None:
+    """Name this process for good; None where the system does not say."""
+    return process_identity(os.getpid())
+
+
 def is_gone(identity: str | None) -> bool | None:
     """Whether a process has ended; None when it cannot be told from here."""
     try:

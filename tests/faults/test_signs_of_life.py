@@ -24,14 +24,14 @@ def test_a_worker_that_no_longer_consumes_is_not_ready(rig: Rig) -> None:
     worker = rig.start_worker(environment=seen)
 
     def told() -> tuple[str, str]:
-        state = httpx.get(f"{rig.url}/readyz").json()
+        state = httpx.get(f"{rig.url}/readyz", timeout=30.0).json()
         return state["status"], state["workers"]["status"]
 
     def until(*state: str) -> None:
         rig.until(lambda: told() == state, WITHIN_S)
 
     def strict() -> int:
-        return httpx.get(f"{rig.url}/readyz", params={"strict": True}).status_code
+        return httpx.get(f"{rig.url}/readyz", params={"strict": True}, timeout=30.0).status_code
 
     until("ready", "ok")
     assert strict() == 200
@@ -40,7 +40,9 @@ def test_a_worker_that_no_longer_consumes_is_not_ready(rig: Rig) -> None:
         os.kill(pid, signal.SIGSTOP)
         until("degraded", "stalled")
         assert strict() == 503
-        assert httpx.get(f"{rig.url}/readyz").status_code == 200, "jobs are still taken and kept"
+        assert httpx.get(f"{rig.url}/readyz", timeout=30.0).status_code == 200, (
+            "jobs are still taken and kept"
+        )
         os.kill(pid, signal.SIGCONT)
         until("ready", "ok")
     rig.take_away("broker")
@@ -64,7 +66,7 @@ def test_a_hung_broker_is_not_ok(rig: Rig) -> None:
     rig.start_worker(environment=seen)
 
     def told() -> tuple[str, str]:
-        state = httpx.get(f"{rig.url}/readyz").json()
+        state = httpx.get(f"{rig.url}/readyz", timeout=30.0).json()
         return state["broker"], state["workers"]["status"]
 
     def until(condition: Callable[[], bool]) -> None:

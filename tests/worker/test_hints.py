@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 from datetime import UTC, datetime
 from typing import Any
 
@@ -31,6 +32,24 @@ def test_a_malformed_message_is_refused(name: str) -> None:
     """Nothing of it gets through, and nothing but a ValueError comes of it."""
     with pytest.raises(ValueError):  # noqa: PT011 - whose words differ: JSON's, base64's, pydantic's
         read_hint(MALFORMED[name])
+
+
+def test_a_spoilt_message_is_read_or_refused() -> None:
+    """Bytes changed, taken out and doubled at random: a hint or a ValueError comes of it, nothing else."""
+    rng = random.Random(11)
+    good = Hint(RUN_JOB, ["job_1"]).packed()
+    refused = 0
+    for _ in range(3000):
+        spoilt = bytearray(good)
+        for _ in range(rng.randint(1, 4)):
+            place = rng.randrange(len(spoilt))
+            piece = rng.choice([b"", bytes([rng.randrange(256)]), spoilt[place : place + 40] * 2])
+            spoilt[place : place + rng.randint(0, 3)] = piece
+        try:
+            read_hint(bytes(spoilt))
+        except ValueError:
+            refused += 1
+    assert refused > 1000
 
 
 @pytest.mark.parametrize("name", HARMFUL)
