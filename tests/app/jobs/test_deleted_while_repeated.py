@@ -18,6 +18,7 @@ from tests.app.calls import post
 from tests.app.jobs.test_store import OWNER, claimed, new_job
 from tests.app.request_documents import SIMULATE_RESULT, simulate_document
 from tests.app.running_service import RunningService
+from tests.waiting import until
 
 
 def ended_job(database: Database) -> str:
@@ -128,12 +129,14 @@ def test_a_job_deleted_while_its_post_waits(any_service: RunningService) -> None
         )
     )
     waiting.start()
-    job_id = None
-    while job_id is None:
+
+    def posted() -> str | None:
+        mine = idempotency_keys.c.key == "waits"
         with any_service.database.read() as session:
-            job_id = session.scalar(
-                select(idempotency_keys.c.job_id).where(idempotency_keys.c.key == "waits")
-            )
+            return session.scalar(select(idempotency_keys.c.job_id).where(mine))
+
+    job_id = until(posted)
+    assert job_id is not None
     with any_service.database.write() as session:
         store.request_cancel(session, "local", job_id)
         repository.delete_job(session, "local", job_id)
