@@ -185,13 +185,17 @@ class Database:
     def _write_with(self, reserve: Reserve, write: Callable[[Session], Answer], why: DBAPIError) -> Answer:
         """Repeat a write that did not fit; somebody else's may take what is lent before ours is on disk."""
         for _ in range(LENDINGS):
-            with suppress(OperationalError), self.write() as session:
-                answer = write(session)
-                # at the last moment, while nobody else can write here: the commit finds the room
-                if not reserve.lend():
-                    raise why
-                session.commit()
+            try:
+                with self.write() as session:
+                    answer = write(session)
+                    # at the last moment, while nobody else can write here: the commit finds the room
+                    if not reserve.lend():
+                        raise why
                 reserve.take_back()
+            except OperationalError as error:
+                if error is why:
+                    raise
+            else:
                 return answer
         raise why
 

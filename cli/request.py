@@ -115,9 +115,12 @@ def _put(document: Any, tokens: Sequence[str], value: Any) -> None:
     place = document
     for token in parents:
         place = place[_index(token)] if isinstance(place, list) else place.setdefault(token, {})
-    if not isinstance(place, dict | list):
+    if isinstance(place, list):
+        place[_index(last)] = value
+    elif isinstance(place, dict):
+        place[last] = value
+    else:
         raise TypeError(last)
-    place[_index(last) if isinstance(place, list) else last] = value
 
 
 def _index(token: str) -> int:

@@ -79,7 +79,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 text=True,
                 start_new_session=True,
-                umask=PRIVATE_UMASK,  # what it writes by itself, such as the broker's journal, is nobody else's
+                umask=PRIVATE_UMASK,  # what it writes by itself, such as the broker's journal
                 preexec_fn=_die_with_parent if sys.platform == "linux" else None,  # noqa: PLW1509 - no threads here
             )
         if self.spec.stdin_text is not None and self._process.stdin is not None:

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
 
 from app import disk_space
-from app.database import Database, upgrade
+from app.database import Database, Session, upgrade
 from app.jobs import store
 from app.jobs.repository import delete_job
 from app.reserve import SLICE_BYTES, Reserve
@@ -159,6 +160,23 @@ def test_a_reserve_is_really_there_and_lends_slice_by_slice(tmp_path: Path) -> N
     reserve.take_back()
     assert reserve.path.stat().st_size == 3 * SLICE_BYTES
     assert [reserve.lend() for _ in range(4)] == [True, True, True, False]
+
+
+def test_without_a_reserve_the_first_error_is_told(url: str) -> None:
+    """A write that does not fit where nothing is lent leaves no trace."""
+    upgrade(url)
+    database = Database(url)
+
+    def never_fits(session: Session) -> None:
+        session.execute(text("INSERT INTO owners (owner) VALUES ('a')"))
+        session.execute(text("PRAGMA max_page_count = 1"))
+        session.execute(text("INSERT INTO counters VALUES ('x', zeroblob(1000000))"))
+
+    with pytest.raises(OperationalError, match="full"):
+        database.write_even_if_full(never_fits)
+    with database.read() as session:
+        assert session.scalar(text("SELECT count(*) FROM owners")) == 0
+    database.dispose()
 
 
 @pytest.fixture
