@@ -35,8 +35,9 @@ def _remade(kind: type[BaseException], args: tuple[Any, ...], data: dict[str, An
 
 
 def as_sentence(text: str) -> str:
-    """A fault's detail or hint with a capital and a full stop."""
-    return f"{text[:1].upper()}{text[1:]}."
+    """A fault's detail or hint with a full stop and a capital, unless it begins with a field's name."""
+    begin = text[:1] if "_" in text.partition(" ")[0] else text[:1].upper()
+    return f"{begin}{text[1:]}."
 
 
 @dataclass(eq=False)

@@ -73,7 +73,7 @@ TimeSeries = Annotated[
     AfterValidator(from_first_row),
 ]
 AngleSeries = Annotated[
-    list[Annotated[float, Field(ge=-1e3, le=1e3)]],
+    list[Annotated[float, Field(ge=-1e6, le=1e6)]],  # what is no angle, samplefiles says with a hint
     FailFast(),
     Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
 ]

@@ -54,6 +54,7 @@ REQUIREMENTS = (
     Requirement("step_error/worst_rad", 1e-4),
     Requirement("start_up/job/wall_s", 0.5),
     Requirement("start_up/job/computing_s", 0.5),
+    Requirement("start_up/import/ratio", 1.5),
     Requirement("compilation/computing_s", 60.0),
 )
 BY_PATH = {requirement.path: requirement for requirement in REQUIREMENTS}

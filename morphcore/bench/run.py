@@ -18,7 +18,7 @@ from morphcore.bench.requirements import judged
 from morphcore.bench.search import search_benchmark
 from morphcore.bench.setting import FULL, LINKS, QUICK, RATE_SAMPLES, Bench, Clock, Effort, Figures, bench_of
 from morphcore.bench.single_flights import flexible_flight, single_flights
-from morphcore.bench.start_up import cold_compilation, first_generation
+from morphcore.bench.start_up import cold_compilation, first_generation, import_times
 from morphcore.bench.work_precision import quick_work_precision
 from morphcore.errors import InvalidInput
 from morphcore.simulate.plan import STEP_S
@@ -56,7 +56,7 @@ SECTIONS: Mapping[str, Section] = {
     "step_error": lambda bench: {"step_error": step_error(bench)},
     "lattice": lambda bench: {"lattice": lattice_cost(bench)},
     "memory": lambda bench: {"memory": swarm_memory(bench.folder, bench.effort.particles)},
-    "start_up": lambda bench: {"start_up": first_generation(bench.folder)},
+    "start_up": lambda bench: {"start_up": {**first_generation(bench.folder), "import": import_times()}},
     "compilation": lambda _: {"compilation": cold_compilation()},
 }
 SLOW_SECTIONS = frozenset({"flexible", "work_precision", "compilation"})  # left out of a quick run

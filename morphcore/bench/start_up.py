@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -18,6 +21,25 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.warming import warm_up, warm_up_further
 
 COMPILING = "numba:compile"
+
+
+IMPORTED_FIRST = "numpy, scipy.optimize, numba"  # what the library computes with
+IMPORTS = 5  # of each, in turn
+
+
+def import_times() -> Figures:
+    """Computing time of importing the library, and of importing what it computes with, s; and their ratio.
+
+    Medians of fresh processes, in turn: what else the machine does slows both.
+    """
+    taken: dict[str, list[float]] = {IMPORTED_FIRST: [], "morphcore": []}
+    for _ in range(IMPORTS):
+        for names, times in taken.items():
+            program = f"import time; t = time.process_time(); import {names}; print(time.process_time() - t)"
+            done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+            times.append(float(done.stdout))
+    packages_s, library_s = (statistics.median(times) for times in taken.values())
+    return {"packages_s": packages_s, "library_s": library_s, "ratio": library_s / packages_s}
 
 
 def first_generation(samples_dir: str | Path) -> Figures:

@@ -171,6 +171,12 @@ def _start_up(figures: Figures) -> Iterator[Line]:
         value = f"{stages[stage]['wall_s']:.2f} s ({stages[stage]['computing_s']:.2f} s computing)"
         must = _must(figures, "start_up/job/computing_s", unit=" s") if stage == "job" else ""
         yield Line(what, value, must)
+    imported = stages["import"]
+    yield Line(
+        "importing the library, beside numpy, scipy.optimize and numba",
+        f"{imported['library_s']:.2f} s, {imported['ratio']:.2f} times",
+        _must(figures, "start_up/import/ratio"),
+    )
 
 
 def _compilation(figures: Figures) -> Iterator[Line]:

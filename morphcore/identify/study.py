@@ -301,7 +301,7 @@ def _listed(given: Any) -> tuple[int, ...]:
 def _different_links(links: Sequence[Any]) -> tuple[int, ...]:
     """Numbers of links, all different, whole and in range."""
     pointer = "/model/links_per_wing"
-    if not links:
+    if not len(links):  # an array of numpy has no truth of its own
         raise InvalidInput("no number of links is given", pointer=pointer, hint=f"give {list(LINKS)}")
     found: list[int] = []
     for index, given in enumerate(links):

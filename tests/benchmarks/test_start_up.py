@@ -10,11 +10,12 @@ from numba.core import event
 
 from morphcore.bench.fresh_process import in_fresh_process
 from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
-from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, request_of
+from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, import_times, request_of
 from morphcore.identify import identification_from_document
 from morphcore.jit import compiled, kernel
 
 ALLOWED_S = 0.5
+ALLOWED_RATIO = 1.5
 
 
 def test_a_request_of_the_benchmark_is_one_that_the_library_takes() -> None:
@@ -51,6 +52,14 @@ def test_a_process_that_fails_says_why() -> None:
     """The end of its error is in the exception."""
     with pytest.raises(RuntimeError, match="no_such_function"):
         in_fresh_process("morphcore.bench.start_up:no_such_function")
+
+
+@pytest.mark.slow
+def test_importing_the_library_takes_little_more_than_what_it_computes_with() -> None:
+    """Under one and a half times numpy, scipy.optimize and numba, in medians of fresh processes."""
+    found = import_times()
+    print(found)
+    assert found["ratio"] < ALLOWED_RATIO
 
 
 @pytest.mark.slow
