@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from morphcore.geometry.obstacle import LARGEST_SLOPE_RAD, Obstacle, load_per_length, too_little_air
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges
 
+NO_STIFFNESS = 1e-9  # of the moment: a joint that would turn a hundred million times carries nothing
 POINTER = "/model/parameters/stiffness_nm_rad"
 
 
@@ -32,7 +31,8 @@ def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
         joints_m = link_edges(batch.division[:1, own], surface.span_m)[0, 1:-1]
         moment = 0.5 * load_n_m * (surface.span_m - joints_m) ** 2
         for joint, stiffness in enumerate(batch.stiffness[0, own, :, 0]):
-            angle = float(moment[joint] / max(stiffness, np.finfo(float).tiny))
+            carries = stiffness > NO_STIFFNESS * moment[joint]
+            angle = float(moment[joint] / stiffness) if carries else float("inf")
             if angle > worst[0]:
                 worst = (angle, surface.name, joint + 1, float(stiffness))
     angle, name, joint, stiffness = worst

@@ -74,7 +74,7 @@ def test_the_document_has_the_names_of_the_api() -> None:
     result = run.result()
     document = result.to_document()
     assert json.loads(json.dumps(document, allow_nan=False)) == document
-    assert set(document) == {"model", "trim", "trajectory", "summary", "cost"}
+    assert set(document) == {"model", "trim", "trajectory", "summary", "cost", "warnings"}
     columns = document["trajectory"]
     for name in ("p_rad_s", "q_rad_s", "r_rad_s", "vx_m_s", "z_m", "tip_left_z_m", "tip_right_z_m"):
         assert len(columns[name]) == len(columns["time_s"]) == 51
