@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from kombu.transport import redis
@@ -15,10 +16,12 @@ from app.broker import canonical, is_redis
 
 CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
 SOCKET_TIMEOUT_S = 2.0
+# Celery prefers these to what it is told; whoever has them set means another application
+CELERY_VARIABLES = ("BROKER_URL", "BROKER_READ_URL", "BROKER_WRITE_URL", "RESULT_BACKEND", "LOADER")
 
 
 def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> dict[str, Any]:
-    """Return Celery's settings of a broker.
+    """Return Celery's settings of a broker; variables of Celery's own (`CELERY_BROKER_URL`) no longer count.
 
     Parameters
     ----------
@@ -27,6 +30,8 @@ def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> 
     transport
         Import path of the transport, for Redis and Valkey.
     """
+    for name in CELERY_VARIABLES:
+        os.environ.pop(f"CELERY_{name}", None)
     settings: dict[str, Any] = {
         "broker_url": url,
         "broker_connection_timeout": CONNECT_TIMEOUT_S,

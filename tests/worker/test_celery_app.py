@@ -22,6 +22,16 @@ def test_messages_are_hints() -> None:
     assert conf.result_backend is None
 
 
+def test_variables_of_another_application_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell set up for another Celery application sends our workers to no other broker."""
+    for name in ("BROKER_URL", "BROKER_READ_URL", "BROKER_WRITE_URL"):
+        monkeypatch.setenv(f"CELERY_{name}", "redis://127.0.0.1:1/9")
+    monkeypatch.setenv("CELERY_RESULT_BACKEND", "redis://127.0.0.1:1/9")
+    conf = make_app(load_settings(broker_url="redis://127.0.0.1:6399/0")).conf
+    assert {conf.broker_url, conf.broker_read_url, conf.broker_write_url} == {"redis://127.0.0.1:6399/0"}
+    assert conf.result_backend is None
+
+
 def test_jobs_at_once_are_what_the_worker_was_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """MORPHID_WORKERS, unless `--concurrency` says otherwise; the cores are shared by what it comes to."""
     assert make_app(load_settings(workers=3)).conf.worker_concurrency == 3
