@@ -101,7 +101,9 @@ def make_engine(url: str) -> Engine:
         connection.isolation_level = None
         cursor = connection.cursor()
         cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
-        cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")  # holds for a new file: before anything is in it
+        if file is not None and file.stat().st_size == 0:
+            # so that free pages can be given back; it must be said before anything is in the file
+            cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")
         cursor.execute("PRAGMA journal_mode = WAL")
         cursor.execute(f"PRAGMA journal_size_limit = {JOURNAL_LIMIT_BYTES}")
         cursor.execute("PRAGMA synchronous = FULL")  # an accepted job survives a power cut, not only a crash

@@ -219,14 +219,14 @@ def test_a_database_that_restarts_is_waited_for(
     pauses: list[float] = []
     begin = Attempt._persist
 
-    def flaky(self: Attempt, write: Callable[..., bool]) -> None:
+    def flaky(self: Attempt, write: Callable[..., bool], **how: bool) -> None:
         def refuse_twice(connection: Any) -> bool:
             if len(pauses) < 2:
                 raise OperationalError("UPDATE", {}, Exception("the database is starting up"))
             return write(connection)
 
         self._sleep = pauses.append
-        begin(self, refuse_twice)
+        begin(self, refuse_twice, **how)
 
     monkeypatch.setattr(Attempt, "_persist", flaky)
     assert make_runner().run_next() == (Ending.SUCCEEDED, job_id)

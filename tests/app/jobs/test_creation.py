@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from sqlalchemy import func, select
 
@@ -13,7 +15,7 @@ from app.jobs.creation import Origin, Terms
 from app.jobs.reaper import reap
 from app.keys import quota
 from app.keys.records import Quota
-from app.tables import idempotency_keys, job_results, jobs, owners
+from app.tables import idempotency_keys, job_events, job_results, jobs, owners
 from tests.app.jobs.test_store import OWNER, REQUEST, RESULT, claimed, new_job
 from tests.app.key_holders import make_key
 
@@ -47,14 +49,15 @@ def test_owners_are_known_from_their_first_job(database: Database) -> None:
 
 
 def test_bytes_of_a_job_are_those_of_its_parts(database: Database) -> None:
-    """Request, then result and files too."""
+    """Request, then result and files too, and at the end the history."""
     job = new_job(database)
     claim = claimed(database, job.id)
     with database.write() as session:
         store.finish_job(session, claim, "succeeded", result=RESULT, artifacts={"a.csv": b"12345"})
         stored = session.scalar(select(func.length(job_results.c.document)))
+        history = sum(len(json.dumps(payload)) for payload in session.scalars(select(job_events.c.payload)))
         size = session.scalar(select(jobs.c.size_bytes))
-    assert size == len(packed(REQUEST)) + stored + 5
+    assert size == len(packed(REQUEST)) + stored + 5 + history
 
 
 def test_every_end_settles_the_quota(database: Database) -> None:
