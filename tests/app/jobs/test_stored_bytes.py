@@ -201,7 +201,7 @@ def test_the_migration_does_the_same_for_what_is_there(database_url: str) -> Non
         under_way = working_in(session, key_id)
     expected = used(database, key_id)
     database.dispose()
-    downgrade(database_url, "0002")
+    downgrade(database_url, "0003")
     database = Database(database_url)
     with database.write() as session:
         session.execute(insert(job_checkpoints).values(job_id=ended, data=STATE, fence=1, at=0.0))
