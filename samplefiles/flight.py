@@ -56,7 +56,7 @@ def flight_faults(
 
     Yields
     ------
-    FileFault : with the row (from 0), and the name out of `FLIGHT` as the title.
+    FileFault : with the row (from 0), and the name out of `FLIGHT` as the title; none where it is about all.
     """
     called = called or {name: name for name in FLIGHT}
     times = columns["t"]
@@ -65,7 +65,6 @@ def flight_faults(
             "too_short" if len(times) < FEWEST_ROWS else "too_many_rows",
             f"the flight has {len(times)} rows",
             f"give {FEWEST_ROWS} to {MOST_ROWS} rows; 10 ms between them are enough",
-            title="t",
         )
         return
     for name in ANGLES:

@@ -124,7 +124,9 @@ def _sentence(item: Mapping[str, Any], pointer: str) -> str:
     if str(item["type"]).startswith(("greater", "less")):
         names = [part for part in pointer.split("/") if not part.isdecimal()]
         row = f" at row {item['loc'][-1]}" if isinstance(item["loc"][-1], int) else ""
-        return f"{names[-1]} is {item['input']:g}{row}"
+        value = item["input"]
+        number = f"{value:g}" if isinstance(value, float) else str(value)[:SHOWN_CHARACTERS]
+        return f"{names[-1]} is {number}{row}"
     return str(item["msg"]).removeprefix("Value error, ")
 
 

@@ -14,19 +14,20 @@ def columns_faults(columns: TrajectoryColumns, pointer: str) -> list[Fault]:
     """What is wrong with a flight that stands in a JSON document."""
     named = {name: getattr(columns, field) for name, field in INLINE.items()}
     return [
-        _fault(fault, f"{pointer}/{INLINE[fault.title]}{_row(fault)}")
+        _fault(fault, f"{pointer}/{INLINE[fault.title or 't']}{_row(fault)}")
         for fault in flight_faults(named, INLINE)
     ]
 
 
 def file_faults(columns: Mapping[str, Sequence[float]], pointer: str) -> list[Fault]:
     """What is wrong with a flight that came in a file, whose columns are called as in `FLIGHT`."""
-    return [
-        _fault(fault, f"{pointer}/{INLINE[fault.title]}{_row(fault)}")
-        if fault.title == "t"
-        else _fault(fault, f"{pointer}{_row(fault)}/{INLINE[fault.title]}")
-        for fault in flight_faults(columns)
-    ]
+    return [_fault(fault, f"{pointer}{_place(fault)}") for fault in flight_faults(columns)]
+
+
+def _place(fault: FileFault) -> str:
+    """Where in a file: a time by its column, an angle by its row."""
+    column = f"/{INLINE[fault.title]}" if fault.title else ""
+    return f"{column}{_row(fault)}" if fault.title == "t" else f"{_row(fault)}{column}"
 
 
 def _row(fault: FileFault) -> str:

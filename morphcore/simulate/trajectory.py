@@ -102,7 +102,9 @@ def require_flight(trajectory: Trajectory, pointer: str) -> None:
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in FLIGHT if name != "t"}}
     for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, INLINE):
         row = "" if fault.row is None else f"/{fault.row}"
-        raise InvalidInput(fault.detail, pointer=f"{pointer}/{INLINE[fault.title]}{row}", hint=fault.hint)
+        raise InvalidInput(
+            fault.detail, pointer=f"{pointer}/{INLINE[fault.title or 't']}{row}", hint=fault.hint
+        )
 
 
 def _counted(time_s: Array) -> Array:

@@ -26,10 +26,9 @@ URL = ("--url", "http://played", "--json", "-")
 FLIGHTS = [f"train_rate_{rate}" for rate in ("0.2", "0.5", "0.8")]
 
 
-def samples_of(operation: str, play: Play, *words: str) -> list[tuple[str, str]]:
+def samples_of(played: PlayedService, *words: str) -> list[tuple[str, str]]:
     """Names and roles that a service is asked with."""
-    played = play(PlayedService(operation, {**RESULT, "rows": []}))
-    ended = RUNNER.invoke(app, command(operation, *words, *URL))
+    ended = RUNNER.invoke(app, command(played.operation, *words, *URL))
     assert ended.exit_code == 0, ended.output
     return [(item["name"], item["role"]) for item in played.body["samples"]]
 
@@ -38,19 +37,19 @@ def samples_of(operation: str, play: Play, *words: str) -> list[tuple[str, str]]
 def test_an_option_takes_several_files(operation: str, play: Play) -> None:
     """One option with three files is three options with one; the same of those that are held out."""
     files = [sample(name) for name in FLIGHTS]
-    once = samples_of(operation, play, "--sample", *files[:2], "--held-out", files[2], "--seed", "1")
-    each = samples_of(operation, play, "--sample", files[0], "--held-out", files[2], f"--sample={files[1]}")
+    played = play(PlayedService(operation, RESULT))
+    once = samples_of(played, "--sample", *files[:2], "--held-out", files[2], "--seed", "1")
+    each = samples_of(played, "--sample", files[0], "--held-out", files[2], f"--sample={files[1]}")
     assert once == each == [(FLIGHTS[0], "train"), (FLIGHTS[1], "train"), (FLIGHTS[2], "held_out")]
-    turned = samples_of(operation, play, "--held-out", *files[1:], "--sample", files[0])
+    turned = samples_of(played, "--held-out", *files[1:], "--sample", files[0])
     assert [role for _, role in turned] == ["train", "held_out", "held_out"]
 
 
 def test_a_quoted_pattern_is_what_matches_it(play: Play) -> None:
     """A pattern that the shell left alone gives its files by name."""
-    found = samples_of(
-        "identify", play, "--sample", sample("train_rate_0.[25]"), "--held-out", sample("*asym*")
-    )
-    assert [name for name, _ in found] == [*FLIGHTS[:2], "train_asymmetric"]
+    played = play(PlayedService("identify", RESULT))
+    words = ("--sample", sample("train_rate_0.[25]"), "--held-out", sample("*asym*"))
+    assert [name for name, _ in samples_of(played, *words)] == [*FLIGHTS[:2], "train_asymmetric"]
 
 
 def test_a_pattern_that_matches_nothing_is_refused(tmp_path: Path) -> None:
