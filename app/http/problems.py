@@ -187,13 +187,16 @@ class HttpProblem(ServiceError):
 
 
 def allowed_methods(document: Mapping[str, Any], path: str) -> str:
-    """Return the value of the Allow header of `path`: every method that the OpenAPI document gives it."""
+    """Return the value of the Allow header of `path`: every method that the OpenAPI document gives it.
+
+    Pages and files are in no document, and are there to be read. Where there is GET there is HEAD.
+    """
     methods: set[str] = set()
     for template, operations in document["paths"].items():
         if compile_path(template)[0].match(path):
             methods.update(name.upper() for name in operations)
-    if "GET" in methods:
-        methods.add("HEAD")
+    if not methods or "GET" in methods:
+        methods |= {"GET", "HEAD"}
     return ", ".join(sorted(methods))
 
 
@@ -219,7 +222,7 @@ def install_problem_handlers(app: FastAPI, known_fields: Callable[[], Sequence[s
         headers = dict(error.headers or {})
         if error.status_code == http.HTTPStatus.METHOD_NOT_ALLOWED:
             # the router names the methods of the first route only
-            headers["allow"] = allowed_methods(app.openapi(), request.url.path) or headers.get("Allow", "GET")
+            headers["allow"] = allowed_methods(app.openapi(), request.url.path)
             headers.pop("Allow", None)
         return problem_response(HttpProblem(error), request, headers)
 

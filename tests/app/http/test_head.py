@@ -71,12 +71,6 @@ def test_where_there_is_no_get_there_is_no_head(service: RunningService, path: s
     assert "HEAD" not in head.headers["allow"]
 
 
-def test_allow_names_head(service: RunningService) -> None:
-    """A refused method is told of HEAD where there is one."""
-    answer = service.client.put("/jobs/job_0")
-    assert (answer.status_code, answer.headers["allow"]) == (405, "DELETE, GET, HEAD")
-
-
 def test_head_has_the_answers_of_conditions_and_faults(service: RunningService, known: Document) -> None:
     """What a parameter or a header does to GET it does to HEAD."""
     file = service.client.get("/static/app.js").headers

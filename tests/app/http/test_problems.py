@@ -43,7 +43,13 @@ def test_every_refusal_is_a_problem(
 
 @pytest.mark.parametrize(
     ("path", "allow"),
-    [("/jobs", "GET"), ("/jobs/job_x", "DELETE, GET"), ("/identify", "POST"), ("/docs", "GET")],
+    [
+        ("/jobs", "GET, HEAD"),
+        ("/jobs/job_x", "DELETE, GET, HEAD"),
+        ("/identify", "POST"),
+        ("/docs", "GET, HEAD"),
+        ("/static/app.js", "GET, HEAD"),
+    ],
 )
 def test_allow_header_names_every_method(service: RunningService, path: str, allow: str) -> None:
     """405 tells all methods that the path has."""

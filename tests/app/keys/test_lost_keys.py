@@ -15,13 +15,15 @@ from sqlalchemy import update
 
 from app.database import database_time
 from app.keys.service import NewKey, revoke_key
+from app.observability.request_metrics import IN_FLIGHT
 from app.tables import api_keys
 from tests.app.key_holders import bearer, holder, make_key
 from tests.app.request_documents import simulate_document
 from tests.app.running_service import RunningService
+from tests.waiting import until
 
 ENDS_WITHIN_S = 3.0
-BEGUN_S = 0.5  # until the request waits
+BEGUN_S = 0.5  # from the beginning of a request until it waits
 WAIT = {"Prefer": "wait=30"}
 
 Ended = tuple[float, int | None]  # when, and the status; None: a stream that ended well
@@ -103,8 +105,10 @@ def test_whoever_waits_is_ended_with_the_key(
         ends[name] = REQUESTS[name][0](keyed_service, made, job)
 
     threads = [threading.Thread(target=ask, args=(name,)) for name in REQUESTS]
+    before = IN_FLIGHT._value.get()  # the server is in this process
     for thread in threads:
         thread.start()
+    until(lambda: IN_FLIGHT._value.get() >= before + len(REQUESTS))
     time.sleep(BEGUN_S)
     assert not ends
     end(keyed_service, made)
