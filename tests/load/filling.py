@@ -6,10 +6,9 @@ from typing import Any
 
 from sqlalchemy import insert, select
 
-from app.database import Database, database_time
+from app.database import Database, database_time, insert_new
 from app.documents import sealed
 from app.identifiers import new_identifier
-from app.jobs.creation import insert_new
 from app.tables import job_events, job_requests, jobs, owners
 
 BATCH = 1000
