@@ -12,6 +12,7 @@ from tests.app.request_documents import RESULT, STUDY_RESULT, Document, identify
 from tests.app.running_service import RunningService
 
 LINKS = RESULT["model"]["links_per_wing"]
+WHOLE = {**RESULT["model"], "separate_wings": False}  # with its defaults, as a request gets them
 
 
 def request(warm_start: Document, **model: Any) -> Document:
@@ -48,7 +49,7 @@ def test_begins_from_a_job(any_service: RunningService, status: str) -> None:
     """The worker reads the model itself, that of a whole or of a partial result, not a reference."""
     job = ended_job(any_service, status, RESULT)
     search = posted(any_service, request({"job_id": job["id"]}))
-    assert search["warm_start"] == {"parameters": RESULT["model"]}
+    assert search["warm_start"] == {"parameters": WHOLE}
     any_service.client.delete(f"/jobs/{job['id']}").raise_for_status()
 
 
@@ -56,9 +57,9 @@ def test_begins_from_a_model_or_its_parameters(any_service: RunningService) -> N
     """An identified model, one given outright, or a whole result: the worker reads the same."""
     job = ended_job(any_service, "succeeded", RESULT)
     by_id = posted(any_service, request({"model_id": job["model_id"]}))
-    assert by_id["warm_start"] == {"parameters": RESULT["model"]}
+    assert by_id["warm_start"] == {"parameters": WHOLE}
     outright = posted(any_service, request({"parameters": {"model": RESULT["model"]}}))
-    assert outright["warm_start"]["parameters"]["division"] == RESULT["model"]["division"]
+    assert outright["warm_start"] == {"parameters": WHOLE}
     assert "warm_start" not in posted(any_service, {**request({}), "search": {"seed": 2}})
 
 
