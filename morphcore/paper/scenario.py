@@ -81,6 +81,7 @@ FLIGHT: Document = {
     "air_density_kg_m3": 1.225,
     "gravity_m_s2": 9.81,
     "altitude_m": 0.0,
+    "mach": 0.0,  # incompressible, as the paper computes
 }
 
 

@@ -69,7 +69,7 @@ def test_the_example_flight() -> None:
     """The reference flight: 150 m/s at sea level is 13.8 kPa of dynamic pressure."""
     flight = load_flight(EXAMPLES / "flight.json")
     assert flight.dynamic_pressure_pa == pytest.approx(0.5 * 1.225 * 150.0**2)
-    assert flight.mach is None
+    assert flight.mach == 0.0
     assert flight.start is not None
     assert flight.start.alpha_rad == pytest.approx(0.0623, abs=1e-4)
     np.testing.assert_array_equal(flight.wind_N, 0.0)
