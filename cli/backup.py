@@ -102,8 +102,8 @@ def restore(url: str, source: Path) -> Backup:
             copy.backup(new)
         _to_disk(growing)
         if target.exists():
+            close_to_others(target)  # before it is opened: its journals get its mode
             _fold_journal(target)
-            close_to_others(target)
             target.replace(target.with_name(target.name + ".before-restore"))
         for suffix in ("-wal", "-shm"):  # of the former file: with the new one they would spoil it
             target.with_name(target.name + suffix).unlink(missing_ok=True)

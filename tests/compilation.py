@@ -60,7 +60,7 @@ def compile_before(
     compiling : callable
         What compiles.
     """
-    cache = session.config.cache
+    cache = getattr(session.config, "cache", None)  # not with `-p no:cacheprovider`
     if os.environ.get("NUMBA_DISABLE_JIT") == "1" or not needs_kernels(item.path for item in session.items):
         return
     if cache is not None and cache.get(REMEMBERED, None) == fingerprint():

@@ -7,6 +7,7 @@ would break its forks.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import stat
@@ -115,7 +116,8 @@ def _private_folder() -> Path | None:
     """A temporary folder of this user alone: we run no code that others compiled. None: no room for one."""
     try:
         folder = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
-        folder.mkdir(mode=0o700, exist_ok=True)
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
         found = folder.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077:
             return folder

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, WithJsonSchema
 
 from app.schemas.fields import Strict, Vector3
 
 MACH_LIMIT = 0.7  # Prandtl-Glauert's linear compressibility holds up to here
+# an enumeration of one: generated clients take a constant beside a number for the only choice
+Auto = Annotated[Literal["auto"], WithJsonSchema({"type": "string", "enum": ["auto"]})]
 
 EXAMPLE_FLIGHT: dict[str, Any] = {
     "airspeed_m_s": 150.0,
     "air_density_kg_m3": 1.225,
     "gravity_m_s2": 9.81,
     "altitude_m": 0.0,
+    "mach": 0.0,
     "start": {
         "alpha_rad": 0.06231329180863801,
         "force_b_n": [341.282868, 0.0, 21.438968],
@@ -44,7 +47,7 @@ class Flight(Strict):
     )
     gravity_m_s2: float = Field(default=9.80665, ge=0.0, le=30.0)
     altitude_m: float = Field(default=0.0, ge=-1000.0, le=20_000.0)
-    mach: Annotated[float, Field(ge=0.0, le=MACH_LIMIT)] | Literal["auto"] | None = Field(
+    mach: Annotated[float, Field(ge=0.0, le=MACH_LIMIT)] | Auto | None = Field(
         default=None, description='Mach number, "auto" from speed and altitude, null for incompressible flow.'
     )
     wind_n_m_s: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Velocity of the air, earth axes (NED).")

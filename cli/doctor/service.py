@@ -17,6 +17,7 @@ STUCK_S = 600.0  # a job that waits so long while a slot is free
 ORPHANED_S = 120.0  # a lease that ran out so long ago was reaped by nobody
 DELIVERY_LATE_S = 3600.0
 LEAST_BROKER = (6, 2)
+OTHERS_MAY = stat.S_IROTH | stat.S_IWOTH
 LARGE_DATABASE = 2 * 2**30  # bytes; its pages are not read one by one
 
 
@@ -54,6 +55,7 @@ def database(settings: Any) -> Iterator[Finding]:
     if settings.uses_sqlite and not _sqlite_file(settings.database_url).exists():
         yield warn("database", f"{url} is not there yet", "`morphid serve` or `morphid db upgrade` makes it")
         return
+    exposed = settings.uses_sqlite and _sqlite_file(settings.database_url).stat().st_mode & OTHERS_MAY
     store = Database(settings.database_url)
     try:
         with store.read() as session:
@@ -73,6 +75,8 @@ def database(settings: Any) -> Iterator[Finding]:
         return
     yield ok("database", f"{url}, revision {revision}")
     yield from sound
+    if exposed:
+        yield _exposed(_sqlite_file(settings.database_url))
     if abs(skew_s) > SKEW_S:
         yield warn(
             "clock", f"the database's clock is {skew_s:+.1f} s off this machine's", "synchronise both by NTP"
@@ -103,10 +107,15 @@ def _sqlite(session: Any, settings: Any) -> Iterator[Finding]:
         )
     else:
         yield ok("journal", "write-ahead")
-    if file.stat().st_mode & (stat.S_IROTH | stat.S_IWOTH):
-        yield warn(
-            "permissions", f"{file} can be read by every user of this machine", f"chmod 700 {file.parent}"
-        )
+
+
+def _exposed(file: Path) -> Finding:
+    """Say what became of a database that others could read: opening it closes one that is ours."""
+    if file.stat().st_mode & OTHERS_MAY:
+        sentence = f"{file} can be read by every user of this machine"
+        return warn("permissions", sentence, f"chmod 700 {file.parent}")
+    sentence = f"{file} could be read by every user of this machine; it no longer can"
+    return warn("permissions", sentence, f"chmod 700 {file.parent} keeps others from the whole folder")
 
 
 def _postgres(session: Any) -> Iterator[Finding]:

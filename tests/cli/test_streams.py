@@ -19,6 +19,7 @@ ENCODINGS = ["latin-1", "ascii", "cp1252", "ascii:strict", "iso8859-7", "utf-8"]
 RESULT: dict[str, Any] = {
     "model": {
         "links_per_wing": 1,
+        "division": [1.0],
         "aero": {"lift_factor": 1.0},
         "stiffness_nm_rad": [[1.0, 2.0, 3.0]],
         "damping_nms_rad": [],

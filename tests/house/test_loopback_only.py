@@ -125,6 +125,7 @@ def test_started_services_get_an_environment_that_leads_nowhere() -> None:
 
 def test_the_demonstration_calls_nobody(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The service that `make demo` starts may send webhooks to this machine only."""
+    monkeypatch.syspath_prepend(str(root / "examples"))  # as for a script that is run
     demo = runpy.run_path(str(root / "examples" / "demo.py"))
     started: list[dict[str, str]] = []
 
