@@ -37,6 +37,7 @@ def test_a_job_whose_message_is_lost(rig: Rig) -> None:
         runs_soon(rig)
 
 
+@pytest.mark.faults
 def test_without_a_broker(rig: Rig) -> None:
     """The broker goes while a job runs and others come: all of them run, on a worker that stays itself."""
     start(rig, slots=2)
@@ -54,6 +55,7 @@ def test_without_a_broker(rig: Rig) -> None:
     assert rig.job(long).attempt == 1
 
 
+@pytest.mark.faults
 def test_a_worker_that_starts_without_a_broker(rig: Rig) -> None:
     """A worker that has never seen a broker runs jobs; told to end, it ends at once."""
     rig.take_away("broker")
@@ -70,6 +72,7 @@ def test_a_worker_that_starts_without_a_broker(rig: Rig) -> None:
     rig.bring_back("worker")
 
 
+@pytest.mark.faults
 def test_the_free_slot_is_used_after_the_broker_was_away(rig: Rig) -> None:
     """One slot is busy for long while the broker restarts: the next hint goes to the other one."""
     start(rig, slots=2)
@@ -85,6 +88,7 @@ def test_the_free_slot_is_used_after_the_broker_was_away(rig: Rig) -> None:
     assert rig.job(long).attempt == 1
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("trouble", ["full", "hung", "wrong type", "forgetful"])
 def test_a_broker_out_of_order(rig: Rig, trouble: str) -> None:
     """A broker that is full, answers nothing, holds nonsense under our name or forgets: jobs run."""
