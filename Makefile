@@ -17,7 +17,7 @@ SIDE_BY_SIDE = $(MAKE) --no-print-directory --keep-going --jobs=2 $(if $(filter 
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-slow faults faults-postgres faults-others conformance bench check openapi locked format clean
+.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow faults faults-postgres faults-others conformance bench check openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -52,19 +52,26 @@ serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 
 test: setup  ## the tests (under 12 minutes on two cores)
 	@$(SIDE_BY_SIDE) test-api test-library
-	@$(BIN)/pytest -q $(API_TESTS:%=--ignore=%) $(LIBRARY_TESTS:%=--ignore=%)
+	@$(SIDE_BY_SIDE) test-command test-services
 
 # the API loads no kernels and the library opens no sockets, so one waits while the other calculates; whole
-# services have both and run alone
+# services have both and come afterwards
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
 	models multibody optimise paper samplefiles simulate)
+COMMAND_TESTS := tests/cli tests/clients
 
 test-api: setup
 	@$(BIN)/pytest -q $(API_TESTS)
 
 test-library: setup
 	@$(BIN)/pytest -q $(LIBRARY_TESTS)
+
+test-command: setup
+	@$(BIN)/pytest -q $(COMMAND_TESTS)
+
+test-services: setup
+	@$(BIN)/pytest -q $(foreach tests,$(API_TESTS) $(LIBRARY_TESTS) $(COMMAND_TESTS),--ignore=$(tests))
 
 test-slow: setup  ## the long proofs
 	@$(BIN)/pytest -q -m slow --timeout 1800

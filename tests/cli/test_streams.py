@@ -166,7 +166,7 @@ app()
 """
 
 
-@pytest.mark.parametrize("more", [[], ["--plain"]])
+@pytest.mark.parametrize("more", [pytest.param([], marks=pytest.mark.slow), ["--plain"]])
 @pytest.mark.parametrize("which", ["stdout", "both"])
 def test_a_reader_who_leaves_changes_nothing_else(tmp_path: Path, more: list[str], which: str) -> None:
     """`morphid ... | head`: files are still written, the exit code is the work's, and nobody complains."""

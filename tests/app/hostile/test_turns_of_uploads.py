@@ -65,6 +65,7 @@ def upload(client: httpx.Client, name: str, content: bytes) -> int:
     return client.post("/trajectories", files={"file": (name, content)}, timeout=120.0).status_code
 
 
+@pytest.mark.slow
 def test_one_owners_bombs_hold_up_nobody_else(keyed: RunningService, bombs: list[float]) -> None:
     """While fourteen of one owner are read or wait, another's small upload is read at once."""
     hostile, honest = (make_key(keyed.database, owner).text for owner in ("alpha", "beta"))

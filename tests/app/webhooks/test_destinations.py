@@ -79,7 +79,7 @@ def by_path(answers: dict[str, int]) -> object:
     return answer
 
 
-@pytest.mark.parametrize(("hooks", "ends"), [(1, 4000), (5, 100)])
+@pytest.mark.parametrize(("hooks", "ends"), [pytest.param(1, 4000, marks=pytest.mark.slow), (5, 100)])
 def test_a_dead_host_sees_a_handful_of_connections(
     database: Database, dead_port: int, dialled: Counter[int], hooks: int, ends: int
 ) -> None:
