@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 RESERVE_BYTES = 8 * 2**20
@@ -33,26 +34,22 @@ class Reserve:
 
     def fill(self) -> None:
         """Take back what is missing, as far as there is room; silent where there is none."""
-        with contextlib.suppress(OSError):
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            try:
-                held = os.fstat(descriptor).st_size
-                disk = os.fstatvfs(descriptor)
-                wanted = min(self._size_bytes, (disk.f_bavail * disk.f_frsize + held) // SHARE)
-                while held < wanted:
-                    held += _grow(descriptor, held, min(SLICE_BYTES, wanted - held))
-            finally:
-                os.close(descriptor)
+        self._grow(lambda held, room: min(self._size_bytes, (room + held) // SHARE), SLICE_BYTES, os.O_CREAT)
 
     def take_back(self) -> None:
         """Take back what is left of a slice, before somebody else's write finds it."""
+        self._grow(lambda held, _room: min(held + SLICE_BYTES, self._size_bytes), STEP_BYTES)
+
+    def _grow(self, size: Callable[[int, int], int], step: int, flags: int = 0) -> None:
+        """Grow in steps to a size that follows from the present one and the disk's free room, bytes."""
         with contextlib.suppress(OSError):
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CLOEXEC)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CLOEXEC | flags, 0o600)
             try:
                 held = os.fstat(descriptor).st_size
-                wanted = min(held + SLICE_BYTES, self._size_bytes)
+                disk = os.fstatvfs(descriptor)
+                wanted = size(held, disk.f_bavail * disk.f_frsize)
                 while held < wanted:
-                    held += _grow(descriptor, held, min(STEP_BYTES, wanted - held))
+                    held += _add_blocks(descriptor, held, min(step, wanted - held))
             finally:
                 os.close(descriptor)
 
@@ -66,7 +63,7 @@ class Reserve:
         return False
 
 
-def _grow(descriptor: int, held: int, by: int) -> int:
+def _add_blocks(descriptor: int, held: int, by: int) -> int:
     """Add blocks that are really there: a hole in a file keeps no room."""
     if hasattr(os, "posix_fallocate"):
         os.posix_fallocate(descriptor, held, by)
