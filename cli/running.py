@@ -106,7 +106,12 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
 
     def uploaded(path: Path, role: str) -> Document:
         require_file(path)
-        return {"name": path.stem, "role": role, "trajectory_id": service.upload(path)["id"]}
+        try:
+            flight = service.upload(path)
+        except CommandError as error:
+            error.given_by = str(path)
+            raise
+        return {"name": path.stem, "role": role, "trajectory_id": flight["id"]}
 
     job = service.submit(request.operation, request.body(uploaded))
     with first_interrupt() as interrupted:

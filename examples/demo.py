@@ -82,7 +82,7 @@ def service() -> Iterator[str]:
 def show_verdict(console: Console, result: dict[str, Any]) -> None:
     """Print warnings, verdict and what to do next."""
     for warning in result.get("warnings") or ():
-        console.print(f"Warning: {warning['message']}. {warning['hint']}.", style="yellow", markup=False)
+        console.print(f"Warning: {warning['message']}; {warning['hint']}.", style="yellow", markup=False)
     use = (
         "Find a smooth morph with the model: .venv/bin/morphid optimize --aircraft examples/aircraft.json "
         f"--flight examples/flight.json --parameters {shown(OUTPUT / 'result.json')} "

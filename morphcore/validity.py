@@ -178,8 +178,8 @@ def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> l
 
 
 def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list[ResultWarning]:
-    """An error (k, 3) above LARGEST_ERROR of a sample's motion (k, 3), both rms over rows and angles."""
-    error, size = (float(np.sqrt(np.mean(values**2))) for values in (errors, motion))
+    """An error (k, 3) above LARGEST_ERROR of a sample's motion (k, 3), both rms of the angles together."""
+    error, size = (float(np.sqrt(np.mean(np.sum(values**2, axis=1)))) for values in (errors, motion))
     if not np.isfinite(error) or error <= max(LARGEST_ERROR * size, LEAST_ERROR_RAD):
         return []
     share = (

@@ -34,7 +34,8 @@ Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each f
 SHOWN_NAMES = 4  # of parameters in a sentence
 COMPARED = {"rigid": "the rigid model", "initial": "the first guess from beam theory"}
 UNSEEN_HINT = (
-    "the samples do not determine it, and its value means little: take fewer links, or samples that show more"
+    "the samples do not determine this, and the value means little: take fewer links, or samples that "
+    "show more"
 )
 UNLIKE_WINGS = 0.02  # relative difference of stiffness or mass beyond which wings are not alike
 
