@@ -39,9 +39,10 @@ REAP_EXPIRES_S = (
 
 def make_app(settings: Settings) -> Celery:
     """Configure Celery for work that our own tables keep track of."""
+    broker = celery_broker(settings.broker_url, "worker.transport:Transport")
     celery = Celery("morphid", include=["worker.tasks"])
     celery.conf.update(
-        celery_broker(settings.broker_url, "worker.transport:Transport"),
+        broker,
         task_default_queue=QUEUE,
         task_acks_late=False,  # redelivery by visibility timeout would run an hour-long job twice
         worker_prefetch_multiplier=1,

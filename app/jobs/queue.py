@@ -24,8 +24,9 @@ def _client(broker_url: str) -> Any:
 
     from app.jobs.transport import celery_broker
 
+    settings = celery_broker(broker_url)
     client = Celery("morphid", set_as_current=False)
-    client.conf.update(celery_broker(broker_url), broker_connection_retry=False)
+    client.conf.update(settings, broker_connection_retry=False)
     return client
 
 

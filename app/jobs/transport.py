@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 from typing import Any
 
+from celery.utils import imports
 from kombu.transport import redis
 from redis import Connection, UnixDomainSocketConnection
 from redis.connection import parse_url
@@ -30,6 +32,9 @@ def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> 
     transport
         Import path of the transport, for Redis and Valkey.
     """
+    # Celery puts the working folder first on the import path while it loads modules of its own; what another
+    # thread imports in that moment would come from there
+    imports.cwd_in_path = nullcontext
     for name in CELERY_VARIABLES:
         os.environ.pop(f"CELERY_{name}", None)
     settings: dict[str, Any] = {

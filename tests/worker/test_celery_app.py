@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -20,6 +23,20 @@ def test_messages_are_hints() -> None:
     assert conf.worker_disable_prefetch is True
     assert conf.task_ignore_result is True
     assert conf.result_backend is None
+
+
+@pytest.mark.parametrize("process", ["worker.celery_app", "app.jobs.queue"])
+def test_celery_imports_nothing_from_the_working_folder(tmp_path: Path, root: Path, process: str) -> None:
+    """Neither in a worker nor in the API does Celery put the working folder on the import path."""
+    (tmp_path / "stranger.py").touch()
+    program = (
+        f"import sys; sys.path.append({str(root)!r}); import {process} as here\n"
+        "getattr(here, '_client', lambda url: None)('redis://127.0.0.1:1/0')\n"
+        "from celery.utils.imports import import_from_cwd\n"
+        "try:\n    import_from_cwd('stranger')\nexcept ModuleNotFoundError:\n    sys.exit(0)\nsys.exit(1)"
+    )
+    command = [sys.executable, "-P", "-c", program]
+    assert subprocess.run(command, cwd=tmp_path, check=False).returncode == 0
 
 
 def test_variables_of_another_application_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
