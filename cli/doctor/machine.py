@@ -102,7 +102,7 @@ def compiler() -> Iterator[Finding]:
     remedy = "pip install -c constraints.txt morphid; the message of the compiler tells more"
     try:
         done = subprocess.run(
-            [sys.executable, "-c", COMPILE],
+            [sys.executable, "-P", "-c", COMPILE],
             capture_output=True,
             text=True,
             timeout=COMPILE_WITHIN_S,

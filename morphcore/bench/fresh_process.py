@@ -26,7 +26,7 @@ def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, s
         f"import json, sys; from {module} import {name}; print(json.dumps({name}(*json.loads(sys.argv[1]))))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program, json.dumps(arguments)],
+        [sys.executable, "-P", "-c", program, json.dumps(arguments)],
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", **(environment or {})},
         capture_output=True,
         text=True,

@@ -36,7 +36,9 @@ def import_times() -> Figures:
     for _ in range(IMPORTS):
         for names, times in taken.items():
             program = f"import time; t = time.process_time(); import {names}; print(time.process_time() - t)"
-            done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+            done = subprocess.run(
+                [sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True
+            )
             times.append(float(done.stdout))
     packages_s, library_s = (statistics.median(times) for times in taken.values())
     return {"packages_s": packages_s, "library_s": library_s, "ratio": library_s / packages_s}

@@ -68,3 +68,13 @@ def test_files_are_small_and_well_named(root: Path, package: str) -> None:
         lines = len(path.read_text().splitlines())
         most = MOST_KERNEL_LINES if "kernels" in path.parts else MOST_LINES
         assert lines <= most, f"{path}: {lines} lines"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_processes_of_ours_import_nothing_from_the_working_folder(root: Path, package: str) -> None:
+    """Every Python process that the product starts is started with ``-P``."""
+    for path in sources(root, package):
+        for node in ast.walk(ast.parse(path.read_text())):
+            words = [ast.unparse(word) for word in node.elts] if isinstance(node, ast.List) else []
+            if "sys.executable" in words:
+                assert "'-P'" in words, f"{path}:{node.lineno}"
