@@ -21,9 +21,15 @@ def make_private_folder(path: Path) -> None:
 
 
 def touch_private(path: Path) -> None:
-    """Make an empty file for this user only, or take what others may do from one that exists."""
-    descriptor = _opened(path, os.O_RDWR)
-    os.close(descriptor)
+    """Make an empty file for this user only, or take what others may do from one that exists.
+
+    One that exists is not opened: closing an SQLite file drops all locks that this process has on it, and
+    another process would take itself for the last one and delete the journal (sqlite.org/howtocorrupt.html).
+    """
+    try:
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, PRIVATE_FILE))
+    except FileExistsError:
+        close_to_others(path)
 
 
 def open_private(path: Path, mode: str) -> IO[str]:
