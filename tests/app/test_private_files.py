@@ -18,7 +18,7 @@ TRY_TO_LOCK = (
 
 
 def test_locks_of_this_process_outlive_a_look_at_the_mode(tmp_path: Path) -> None:
-    """A file that is there is not opened and closed: that would drop SQLite's locks and spoil the database."""
+    """A file that is there is not opened and closed: that would drop the locks of SQLite and spoil it."""
     path = tmp_path / "database"
     touch_private(path)
     path.chmod(0o644)
