@@ -22,7 +22,7 @@ CALLERS = 4
 EFFECTIVE_S = 2.0
 NOISE_S = 3.0  # what a busy machine adds to the slowest of a hundred
 
-pytestmark = [pytest.mark.faults, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.faults, pytest.mark.timed, pytest.mark.timeout(300)]
 
 
 def cancel(rig: Rig, job_id: str) -> float:

@@ -114,6 +114,7 @@ def ended_s(client: httpx.Client, job_id: str) -> float:
     return time.monotonic() - began
 
 
+@pytest.mark.timed
 def test_cancels_of_identifications(short_leases: LiveService) -> None:
     """A real search, cancelled at any moment of its life, ends soon with the best so far; its end, too."""
     rng = random.Random(5)
