@@ -9,10 +9,10 @@ COPY requirements-server.txt ./
 RUN .venv/bin/pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements-server.txt
 COPY pyproject.toml README.md LICENSE ./
 COPY app app
-COPY cli cli
+COPY morphid morphid
 COPY migrations migrations
 COPY morphcore morphcore
-COPY samplefiles samplefiles
+COPY morphdata morphdata
 COPY worker worker
 # what builds it is among the packages above: nothing comes in without a hash
 RUN .venv/bin/pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation -e .

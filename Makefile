@@ -58,8 +58,8 @@ test: setup  ## the tests (under 12 minutes on two cores)
 # services have both and come afterwards
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
-	models multibody optimise paper samplefiles simulate)
-COMMAND_TESTS := tests/cli tests/clients
+	models morphdata multibody optimise paper simulate)
+COMMAND_TESTS := tests/morphid tests/clients
 
 test-api: setup
 	@$(BIN)/pytest -q $(API_TESTS)

@@ -22,11 +22,11 @@ from typing import Any
 from rich.console import Console
 from verdict import verdict
 
-from cli.broker import free_port
-from cli.commands.identify import show_model
-from cli.exits import CommandError
-from cli.screen import meter, print_job_error, stdout
-from cli.service import Service
+from morphid.broker import free_port
+from morphid.commands.identify import show_model
+from morphid.exits import CommandError
+from morphid.screen import meter, print_job_error, stdout
+from morphid.service import Service
 
 EXAMPLES = Path(__file__).resolve().parent
 OUTPUT = EXAMPLES.parent / "demo-output"
@@ -58,7 +58,7 @@ def request() -> dict[str, Any]:
 @contextmanager
 def service() -> Iterator[str]:
     """Run ``morphid serve`` on a free port while the block runs; give its address."""
-    command = [sys.executable, "-m", "cli.main", "serve", "--json", "--port", str(free_port(8000))]
+    command = [sys.executable, "-m", "morphid.main", "serve", "--json", "--port", str(free_port(8000))]
     process = subprocess.Popen(
         [*command, "--data-dir", str(OUTPUT / "service")],
         env={**os.environ, "MORPHID_WEBHOOK_DIAL_ONLY": "127.0.0.1"},  # a demonstration calls nobody

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from samplefiles.fault import Pickled
+from morphdata.samplefiles.fault import Pickled
 
 
 class MorphError(Pickled, Exception):

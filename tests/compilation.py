@@ -19,7 +19,7 @@ KERNEL_FREE = (
     "conformance",
     "docs",
     "house",
-    "samplefiles",
+    "morphdata",
 )  # folders of tests that call no compiled code
 REMEMBERED = "morphid/compiled_kernels"  # key in pytest's cache
 COMPILE = "from morphcore.warming import warm_up, warm_up_further; warm_up(); warm_up_further()"

@@ -36,7 +36,7 @@ def test_importing_adds_little_to_what_the_library_computes_with() -> None:
     packages = modules_after("import numpy, scipy.optimize, numba")
     library = modules_after("import morphcore")
     foreign = {
-        name for name in library - packages if name.partition(".")[0] not in ("morphcore", "samplefiles")
+        name for name in library - packages if name.partition(".")[0] not in ("morphcore", "morphdata")
     }
     print(f"{len(packages)} modules of the packages, {len(foreign)} more")
     assert len(foreign) < len(packages) / 5

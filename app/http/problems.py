@@ -18,9 +18,10 @@ from starlette.routing import compile_path
 
 from app.database_errors import DatabaseTrouble, trouble_of
 from app.documents import finite
-from app.errors import DatabaseAway, Fault, InvalidRequest, ServiceError, StorageFull
+from app.errors import DatabaseAway, InvalidRequest, ServiceError, StorageFull
 from app.http.request_id import current_request_id
 from app.schemas.problem import Problem
+from morphdata.faults import Fault
 
 MEDIA_TYPE = "application/problem+json"
 MAX_FAULTS = 20

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from app.errors import Fault
-from app.identify.schemas import Bounds, SamplesRequest
-from app.schemas.samples import InlineSample
-from app.schemas.vehicle import HingeRange, flexible_wing_faults, hinge_ranges, vehicle_faults
 from app.trajectories.checks import columns_faults
+from morphdata.faults import Fault
+from morphdata.identify import Bounds, SamplesRequest
+from morphdata.samples import InlineSample
+from morphdata.vehicle import HingeRange, flexible_wing_faults, hinge_ranges, vehicle_faults
 
 MAX_TOTAL_ROWS = 200_000
 MAX_DECADES = 12.0  # of a stiffness range: more is no knowledge at all, and spoils a logarithmic search

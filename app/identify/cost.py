@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.identify.schemas import CostEstimate, SamplesRequest, Search, SoughtModel
-from app.schemas.samples import InlineSample
+from morphdata.identify import CostEstimate, SamplesRequest, Search, SoughtModel
+from morphdata.samples import InlineSample
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
 SWARM_PARTICLES = {"pso": 200, "cma": 32}

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from app.http.context import CallerDep, ServiceDep
 from app.identify import service
-from app.identify.schemas import IdentifyRequest, IdentifyValidation
-from app.jobs.schemas import Job
+from app.jobs.schemas import Job, Validation
 from app.jobs.submission import OperationRouter, SubmissionDep, validated
+from morphdata.identify import CostEstimate, IdentifyRequest
 
 router = OperationRouter("identify")
+
+
+class IdentifyValidation(Validation):
+    """The request is valid."""
+
+    operation: Literal["identify"] = "identify"
+    cost: CostEstimate
 
 
 @router.submission("Identify an equivalent model from sample flights")

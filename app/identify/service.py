@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from app.database import Session
 from app.documents import Document
-from app.errors import Fault, InvalidRequest
+from app.errors import InvalidRequest
 from app.identify.checks import samples_request_faults, total_rows_faults
 from app.identify.cost import estimate
-from app.identify.schemas import CostEstimate, IdentifyRequest, SamplesRequest
 from app.identify.warm_start import warm_start_document
 from app.jobs.submission import Order, deadline_s
-from app.schemas.samples import InlineSample, UploadedSample
-from app.schemas.vehicle import vehicle_document
 from app.trajectories import repository as trajectories
+from morphdata.faults import Fault
+from morphdata.identify import CostEstimate, IdentifyRequest, SamplesRequest
+from morphdata.samples import InlineSample, UploadedSample
+from morphdata.vehicle import vehicle_document
 
 REPORT_TIME_S = 120.0  # after the search's own time budget: uncertainty, plots, writing
 

@@ -6,16 +6,17 @@ import json
 
 from app.database import Session
 from app.documents import Document
-from app.errors import Fault, InvalidRequest, JobNotFound, ModelNotFound
-from app.identify.schemas import IdentifyRequest
+from app.errors import InvalidRequest, JobNotFound, ModelNotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
 from app.models.checks import known_model_faults
 from app.models.left_models import left_model
 from app.models.service import as_given
-from app.schemas.parameters import KnownModel, WholeResult
-from app.schemas.search import WarmStart
+from morphdata.faults import Fault
+from morphdata.identify import IdentifyRequest
+from morphdata.parameters import KnownModel, WholeResult
+from morphdata.search import WarmStart
 
 POINTER = "/search/warm_start"
 WAYS = ("job_id", "model_id", "parameters")

@@ -32,7 +32,7 @@ from app.jobs.repository import JobFilter
 from app.jobs.results import JobResult
 from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
 from app.keys.records import Scope
-from app.schemas.execution import Label
+from morphdata.execution import Label
 
 router = APIRouter(tags=["jobs"])
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from app.identify.schemas import IdentifyResult
-from app.optimize.schemas import OptimizeResult
-from app.simulate.schemas import SimulateResult
-from app.study.schemas import StudyResult
+from morphdata.identify import IdentifyResult
+from morphdata.optimize import OptimizeResult
+from morphdata.simulate import SimulateResult
+from morphdata.study import StudyResult
 
 JobResult = IdentifyResult | StudyResult | SimulateResult | OptimizeResult

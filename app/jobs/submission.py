@@ -31,7 +31,7 @@ from app.keys import quota
 from app.keys.records import Scope
 from app.keys.schemas import Quotas
 from app.observability.tracing import current_traceparent
-from app.schemas.execution import Executed, Execution
+from morphdata.execution import Executed, Execution
 
 Cost = TypeVar("Cost")
 Request = TypeVar("Request", bound=Executed)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from app.errors import Fault
 from app.models.left_models import has_flown
-from app.schemas.parameters import AXES, KnownModel, Parameters, WholeResult
+from morphdata.faults import Fault
+from morphdata.parameters import AXES, KnownModel, Parameters, WholeResult
 
 SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
 RAGGED = -1

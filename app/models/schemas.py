@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from app.identify.schemas import IdentifiedParameters, SampleFit
+from morphdata.identify import IdentifiedParameters, SampleFit
 
 
 class ModelSummary(BaseModel):

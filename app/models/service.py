@@ -6,11 +6,12 @@ from pydantic import ValidationError
 
 from app.database import Session
 from app.documents import Document
-from app.errors import Fault, InvalidRequest, ModelNotFound
+from app.errors import InvalidRequest, ModelNotFound
 from app.models import repository
 from app.models.checks import known_model_faults
 from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
-from app.schemas.parameters import KnownModel, Parameters, WholeResult
+from morphdata.faults import Fault
+from morphdata.parameters import KnownModel, Parameters, WholeResult
 
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from app.errors import Fault
-from app.optimize.schemas import Limits, OptimizeRequest
-from app.schemas.vehicle import hinge_ranges
+from morphdata.faults import Fault
+from morphdata.optimize import Limits, OptimizeRequest
+from morphdata.vehicle import hinge_ranges
 
 MOST_FLIGHTS = 2_000_000
 

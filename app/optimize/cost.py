@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.optimize.schemas import OptimizeRequest, ScheduleCost
 from app.simulate.cost import DEFAULT_STEP_S, STEP_CORE_S
+from morphdata.optimize import OptimizeRequest, ScheduleCost
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
 SWARM_PARTICLES, SWARM_GENERATIONS = 50, 100

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from app.http.context import CallerDep, ServiceDep
-from app.jobs.schemas import Job
+from app.jobs.schemas import Job, Validation
 from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.optimize import service
-from app.optimize.schemas import OptimizeRequest, OptimizeValidation
+from morphdata.optimize import OptimizeRequest, ScheduleCost
 
 router = OperationRouter("optimize")
+
+
+class OptimizeValidation(Validation):
+    """The request is valid."""
+
+    operation: Literal["optimize"] = "optimize"
+    cost: ScheduleCost
 
 
 @router.submission("Find the morph schedule that disturbs the attitude least")

@@ -8,8 +8,8 @@ from app.jobs.submission import Order, deadline_s
 from app.models.service import known_model
 from app.optimize.checks import morph_faults, work_faults
 from app.optimize.cost import estimate
-from app.optimize.schemas import OptimizeRequest, ScheduleCost
-from app.schemas.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
+from morphdata.optimize import OptimizeRequest, ScheduleCost
+from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
 
 REPORT_TIME_S = 1800.0  # after the search's own time budget: flights of the flexible model, plots
 

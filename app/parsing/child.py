@@ -14,11 +14,11 @@ from app.errors import MalformedBody
 from app.parsing.confinement import Limits, confine, confine_time
 from app.parsing.frame import BadFrame, pack
 from app.parsing.json_text import parse_json
-from samplefiles.columns import Wanted
-from samplefiles.fault import FileFault
-from samplefiles.reading import read_columns
+from morphdata.samplefiles.columns import Wanted
+from morphdata.samplefiles.fault import FileFault
+from morphdata.samplefiles.reading import read_columns
 
-BODY = "body"  # the JSON body of a request; any other kind is a file's, from `samplefiles.reading`
+BODY = "body"  # the JSON body of a request; any other kind is a file's, from `morphdata.samplefiles.reading`
 LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("scipy.io", "scipy.io.matlab")}
 
 

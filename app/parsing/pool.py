@@ -16,13 +16,14 @@ from typing import Any, BinaryIO
 
 from fastapi.concurrency import run_in_threadpool
 
-from app.errors import Fault, InvalidRequest, MalformedBody, ServiceBusy, UnsupportedMediaType
+from app.errors import InvalidRequest, MalformedBody, ServiceBusy, UnsupportedMediaType
 from app.owner_turns import OwnerTurns
 from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
-from app.schemas.fields import MAX_ROWS
-from samplefiles.fault import TITLES, FileFault, as_sentence
+from morphdata.faults import Fault
+from morphdata.fields import MAX_ROWS
+from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
@@ -81,7 +82,7 @@ class ParserPool:
         owner : str
             Whose upload it is.
         kind : str
-            As `samplefiles.reading.kind_of` says.
+            As `morphdata.samplefiles.reading.kind_of` says.
         file : binary file
             With a descriptor.
         pointer : str

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from app.errors import Fault
-from app.schemas.fields import MAX_ROWS
-from app.schemas.schedules import AnySchedule, ConstantRate, Hold, Quadratic, Schedules, Spline, Tabulated
-from app.schemas.vehicle import HingeRange, hinge_ranges
 from app.simulate.cost import row_count, step_count
-from app.simulate.schemas import SimulateRequest
+from morphdata.faults import Fault
+from morphdata.fields import MAX_ROWS
+from morphdata.schedules import AnySchedule, ConstantRate, Hold, Quadratic, Schedules, Spline, Tabulated
+from morphdata.simulate import SimulateRequest
+from morphdata.vehicle import HingeRange, hinge_ranges
 
 MIN_ROWS = 3
 SIDES = ("left", "right")

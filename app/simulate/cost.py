@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from app.simulate.schemas import FlightCost, SimulateRequest
+from morphdata.simulate import FlightCost, SimulateRequest
 
 # nominal figures, to an order of magnitude, of a flight alone on one core
 DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}

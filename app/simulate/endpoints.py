@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from app.http.context import CallerDep, ServiceDep
-from app.jobs.schemas import Job
+from app.jobs.schemas import Job, Validation
 from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.simulate import service
-from app.simulate.schemas import SimulateRequest, SimulateValidation
+from morphdata.simulate import FlightCost, SimulateRequest
 
 router = OperationRouter("simulate")
+
+
+class SimulateValidation(Validation):
+    """The request is valid."""
+
+    operation: Literal["simulate"] = "simulate"
+    cost: FlightCost
 
 
 @router.submission("Fly a model through a morph")

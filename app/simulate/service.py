@@ -7,10 +7,10 @@ from app.documents import Document
 from app.errors import InvalidRequest
 from app.jobs.submission import Order
 from app.models.service import known_model
-from app.schemas.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
 from app.simulate.checks import air_faults, schedules_faults, size_faults
 from app.simulate.cost import estimate
-from app.simulate.schemas import EquivalentFlightModel, FlightCost, SimulateRequest
+from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest
+from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
 
 
 def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[FlightCost]:

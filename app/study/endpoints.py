@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from app.http.context import CallerDep, ServiceDep
-from app.jobs.schemas import Job
+from app.jobs.schemas import Job, Validation
 from app.jobs.submission import OperationRouter, SubmissionDep, validated
 from app.study import service
-from app.study.schemas import StudyRequest, StudyValidation
+from morphdata.identify import CostEstimate
+from morphdata.study import StudyRequest
 
 router = OperationRouter("study")
+
+
+class StudyValidation(Validation):
+    """The request is valid."""
+
+    operation: Literal["study"] = "study"
+    cost: CostEstimate
 
 
 @router.submission("Compare models of several sizes")

@@ -6,10 +6,10 @@ from app.database import Session
 from app.errors import InvalidRequest
 from app.identify.checks import repeated_faults
 from app.identify.cost import estimate
-from app.identify.schemas import CostEstimate
 from app.identify.service import checked_samples, samples_document, samples_summary
 from app.jobs.submission import Order, deadline_s
-from app.study.schemas import StudyRequest
+from morphdata.identify import CostEstimate
+from morphdata.study import StudyRequest
 
 REPORT_TIME_S = 300.0  # after the search's own time budget: uncertainty and timing of up to eight models
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from app.errors import Fault
-from app.schemas.samples import TrajectoryColumns
-from samplefiles.fault import FileFault, as_sentence
-from samplefiles.flight import INLINE, flight_faults
+from morphdata.faults import Fault
+from morphdata.samplefiles.fault import FileFault, as_sentence
+from morphdata.samplefiles.flight import INLINE, flight_faults
+from morphdata.samples import TrajectoryColumns
 
 
 def columns_faults(columns: TrajectoryColumns, pointer: str) -> list[Fault]:

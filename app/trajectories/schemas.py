@@ -6,8 +6,8 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.schemas.fields import SampleName
-from app.schemas.samples import EXAMPLE_SAMPLE, TrajectoryColumns
+from morphdata.fields import SampleName
+from morphdata.samples import EXAMPLE_SAMPLE, TrajectoryColumns
 
 
 class TrajectoryUpload(TrajectoryColumns):

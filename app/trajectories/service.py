@@ -9,16 +9,17 @@ from pydantic import ValidationError
 from app.audit.records import Action
 from app.audit.service import note
 from app.database import Session
-from app.errors import Fault, InvalidRequest
+from app.errors import InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge_bytes
 from app.parsing.pool import refusal
 from app.trajectories.checks import columns_faults, file_faults
 from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
 from app.trajectories.schemas import TrajectoryUpload
-from samplefiles.fault import FileFault
-from samplefiles.flight import INLINE
-from samplefiles.reading import kind_of
+from morphdata.faults import Fault
+from morphdata.samplefiles.fault import FileFault
+from morphdata.samplefiles.flight import INLINE
+from morphdata.samplefiles.reading import kind_of
 
 
 def file_kind(filename: str) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from app.jobs.schemas import EXAMPLE_ID
-from app.schemas.fields import Strict
+from morphdata.fields import Strict
 
 EXAMPLE_WEBHOOK = "hook_01k0c3v9fh8x2m4n6p8q0r2s4t"
 EXAMPLE_CHALLENGE = "pJ5mXw0cQ1l3nR8tZ2vB7dK4sY6uE9hA"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.database import Session
-from app.errors import Fault, InvalidRequest, TooManyWebhooks, WebhookDisabled, WebhookPending
+from app.errors import InvalidRequest, TooManyWebhooks, WebhookDisabled, WebhookPending
 from app.webhooks import repository
 from app.webhooks.addresses import AddressPolicy, AddressRefused
 from app.webhooks.outbox import note_challenge, note_test
@@ -18,6 +18,7 @@ from app.webhooks.schemas import (
     WebhookStatus,
 )
 from app.webhooks.signature import new_secret
+from morphdata.faults import Fault
 
 MAX_WEBHOOKS = 20  # of one owner
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from samplefiles.csv_table import write_table
+from morphdata.samplefiles.csv_table import write_table
 
 Document = dict[str, Any]
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from morphcore.export.figure import Document
-from samplefiles.csv_table import write_table
+from morphdata.samplefiles.csv_table import write_table
 
 Column = Sequence[float | None]
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from samplefiles.columns import Wanted
-from samplefiles.fault import FileFault
-from samplefiles.reading import FORMATS, kind_of, read_columns
+from morphdata.samplefiles.columns import Wanted
+from morphdata.samplefiles.fault import FileFault
+from morphdata.samplefiles.reading import FORMATS, kind_of, read_columns
 
 Array = NDArray[np.float64]
 

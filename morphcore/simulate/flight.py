@@ -31,8 +31,8 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
 from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
-from samplefiles.csv_table import write_table
-from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
+from morphdata.samplefiles.csv_table import write_table
+from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Schedules = Sequence[Schedule] | Mapping[str, Schedule] | Trajectory

@@ -31,7 +31,7 @@ from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
 from morphcore.validity import documents
-from samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
+from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]

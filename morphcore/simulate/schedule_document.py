@@ -14,7 +14,7 @@ from morphcore.geometry.fields import Fields
 from morphcore.geometry.surface import Side
 from morphcore.simulate.schedule import ConstantRate, Hold, Quadratic, Schedule, Spline, Tabulated
 from morphcore.simulate.schedule_table import LEAST_ROWS
-from samplefiles.flight import LONGEST_FLIGHT_S, MOST_ROWS
+from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.simulate.file_columns import read_file_columns
 from morphcore.simulate.schedule import Schedule, Tabulated
-from samplefiles.csv_table import write_table
-from samplefiles.flight import MOST_ROWS
+from morphdata.samplefiles.csv_table import write_table
+from morphdata.samplefiles.flight import MOST_ROWS
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.shown import Shown
 from morphcore.simulate.file_columns import read_file_columns
-from samplefiles.flight import INLINE, flight_faults, from_first_row
-from samplefiles.titles import FLIGHT
+from morphdata.samplefiles.flight import INLINE, flight_faults, from_first_row
+from morphdata.samplefiles.titles import FLIGHT
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
@@ -98,7 +98,7 @@ def trajectory_from_document(document: dict[str, Any], pointer: str) -> Trajecto
 
 
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
-    """Raise InvalidInput where a sample makes no sense, by the rules of `samplefiles.flight`."""
+    """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in FLIGHT if name != "t"}}
     for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, INLINE):
         row = "" if fault.row is None else f"/{fault.row}"

@@ -14,8 +14,8 @@ from app.broker import canonical
 from app.health.broker import NOT_TRUSTED, UNREACHABLE, broker_state
 from app.jobs.queue import messages_waiting, publish
 from app.settings import Settings, UnsafeSettings, load_settings
-from cli.broker import LOOPBACK, find_server, free_port
-from cli.supervisor import ChildSpec, Supervisor
+from morphid.broker import LOOPBACK, find_server, free_port
+from morphid.supervisor import ChildSpec, Supervisor
 from tests.servers.redis import quiet_port
 from tests.servers.tls import tls_front
 from tests.waiting import until

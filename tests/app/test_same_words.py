@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from app.schemas.fields import Strict
 from morphcore import load_trajectory
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.trajectory import trajectory_from_document
-from samplefiles.fault import as_sentence
+from morphdata.fields import Strict
+from morphdata.samplefiles.fault import as_sentence
 from tests.app.calls import changed, fault, post
 from tests.app.request_documents import identify_document, sample_document, simulate_document
 from tests.app.running_service import RunningService

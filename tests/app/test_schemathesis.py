@@ -28,8 +28,8 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from app.schemas.fields import Identifier
 from app.settings import Settings
+from morphdata.fields import Identifier
 from tests.app.request_documents import RESULT
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.app.tenants import Tenant, client_json, new_tenant, replenish, short_requests

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from cli.service import Service
+from morphid.service import Service
 from tests.identification_request import identification
 from tests.live import LiveService
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_clients import run_client
 from tests.live import LiveService
+from tests.morphid.test_clients import run_client
 
 pytestmark = pytest.mark.timeout(600)
 

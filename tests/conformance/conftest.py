@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.supervisor import Supervisor
+from morphid.supervisor import Supervisor
 from tests.app.conftest import database, database_url, postgres_server
 from tests.servers import redis
 

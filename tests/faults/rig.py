@@ -25,9 +25,9 @@ from app.jobs.queue import publish
 from app.jobs.records import Job
 from app.jobs.store import create_job, get_job
 from app.tables import job_results, jobs
-from cli import serve
-from cli.broker import LOOPBACK, free_port
-from cli.supervisor import Child, ChildSpec, Supervisor
+from morphid import serve
+from morphid.broker import LOOPBACK, free_port
+from morphid.supervisor import Child, ChildSpec, Supervisor
 from tests.faults.ledger import SEED, SUCCEEDED, Ledger
 from tests.servers.redis import BrokerServer
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from cli.service import Service
+from morphid.service import Service
 from tests.identification_request import identification
 from tests.live import LiveService
 

@@ -10,8 +10,8 @@ from dataclasses import replace as replaced
 import httpx
 import pytest
 
-from cli import serve
-from cli.broker import LOOPBACK, free_port
+from morphid import serve
+from morphid.broker import LOOPBACK, free_port
 from tests.app.request_documents import simulate_document
 from tests.faults.rig import Rig
 from tests.faults.walk_length import flight_steps

@@ -14,8 +14,8 @@ from typing import Any
 import httpx
 import pytest
 
-from cli.service import Service
-from cli.supervisor import Supervisor
+from morphid.service import Service
+from morphid.supervisor import Supervisor
 from tests.faults.posting import percentile
 from tests.identification_request import identification
 from tests.live import LiveService

@@ -41,7 +41,7 @@ def test_kernels_are_compiled_once_before_the_tests_that_need_them(monkeypatch: 
         compile_before(session_of(memory, *files), said.append, lambda: compiled.append(True))
         return len(compiled)
 
-    assert run("app/test_main.py", "samplefiles/test_csv.py") == 0  # these call no compiled code
+    assert run("app/test_main.py", "morphdata/samplefiles/test_csv.py") == 0  # these call no compiled code
     assert run("app/test_main.py", "simulate/test_flight.py") == 1
     assert said
     assert run("simulate/test_flight.py") == 0

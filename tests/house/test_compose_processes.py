@@ -20,8 +20,8 @@ import yaml
 from app.database import Database
 from app.jobs.records import Job, JobStatus
 from app.jobs.store import create_job, get_job
-from cli.broker import find_server, free_port, prepare_broker
-from cli.supervisor import ChildSpec, Supervisor
+from morphid.broker import find_server, free_port, prepare_broker
+from morphid.supervisor import ChildSpec, Supervisor
 from tests.servers.postgres import GivenPostgres
 from tests.waiting import until
 

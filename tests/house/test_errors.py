@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from starlette.exceptions import HTTPException
 
-PACKAGES = ("app", "worker", "morphcore", "cli", "samplefiles")
+PACKAGES = ("app", "worker", "morphcore", "morphid", "morphdata")
 SPOKEN: dict[str, Any] = {  # values of constructors' parameters, by their annotation
     "str": "a sentence",
     "int": 429,

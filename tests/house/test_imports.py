@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("app", "worker", "morphcore", "cli", "samplefiles")
+PACKAGES = ("app", "worker", "morphcore", "morphid", "morphdata")
 KERNELS_MAY_IMPORT = {"__future__", "math", "numpy", "numpy.typing", "numba", "typing", "collections.abc"}
 WORKER_MAY_KNOW = (
     *("app.jobs.", "app.settings", "app.database", "app.errors"),

@@ -185,6 +185,6 @@ def test_the_image_takes_only_packages_with_hashes(root: Path) -> None:
 def test_the_image_holds_what_it_runs(root: Path) -> None:
     """Every package that is installed is copied into the image, which does not run as root."""
     text = (root / "Dockerfile").read_text()
-    for package in ("app", "cli", "migrations", "morphcore", "worker"):
+    for package in ("app", "morphid", "migrations", "morphcore", "worker"):
         assert f"COPY {package} {package}" in text
     assert "USER morphid" in text

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.exits import Exit
+from morphid.exits import Exit
 from tests.live import LiveService
 from tests.servers.hostile_folder import OURS, HostileFolder
 

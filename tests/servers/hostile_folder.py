@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-OURS = ("app", "cli", "worker", "morphcore", "samplefiles", "migrations")
+OURS = ("app", "morphid", "worker", "morphcore", "morphdata", "migrations")
 OTHERS = ("celeryconfig", "numpy", "redis", "sqlalchemy", "email")  # what we, or our packages, might look for
 RECORD = "imported.txt"
 SOURCE = """

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cli.broker import LOOPBACK, find_server, free_port, prepare_broker
-from cli.supervisor import ChildSpec
+from morphid.broker import LOOPBACK, find_server, free_port, prepare_broker
+from morphid.supervisor import ChildSpec
 
 
 @dataclass(frozen=True)

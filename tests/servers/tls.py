@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from cli.broker import LOOPBACK
+from morphid.broker import LOOPBACK
 
 POLL_S = 0.1
 

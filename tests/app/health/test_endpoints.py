@@ -23,8 +23,8 @@ from app.jobs import store
 from app.jobs.reaper import reap
 from app.settings import Settings
 from app.tables import workers
-from cli.broker import prepare_broker
-from cli.supervisor import Supervisor
+from morphid.broker import prepare_broker
+from morphid.supervisor import Supervisor
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService, running_service
 from tests.waiting import until

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from app.jobs.artifacts import artifact_headers, is_plain, media_type, store_artifacts
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
-from tests.cli.test_files import NASTY_NAMES
+from tests.morphid.test_files import NASTY_NAMES
 
 STATIC = Path(__file__).resolve().parents[3] / "app" / "web" / "static"
 SCRIPT = b'<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>'

@@ -9,7 +9,7 @@ import pytest
 
 from app.jobs import store
 from app.optimize.checks import shortest_morph_s
-from app.optimize.schemas import Limits
+from morphdata.optimize import Limits
 from tests.app.calls import assert_named, changed, post
 from tests.app.request_documents import RESULT, optimize_document
 from tests.app.running_service import RunningService

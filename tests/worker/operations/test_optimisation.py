@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.optimize.schemas import OptimizeResult
 from morphcore.simulate.schedule_table import load_schedule_csv
+from morphdata.optimize import OptimizeResult
 from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation
 from tests.worker.operations.test_study import timeless
 from worker.attempt import Ending

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.simulate.schemas import SimulateResult
 from morphcore import load_trajectory
+from morphdata.simulate import SimulateResult
 from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation
 from worker.attempt import Ending
 from worker.operations import WorkRefused, find_operation

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.study.schemas import StudyResult
+from morphdata.study import StudyResult
 from tests.worker.operations.jobs_of_the_library import RealWorker, study
 from worker.attempt import Ending
 from worker.operations import WorkRefused, find_operation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from cli.service import Service
+from morphid.service import Service
 from tests.identification_request import identification
 from tests.live import LiveService
 from tests.worker.spread.processes import spread

@@ -1,0 +1,1 @@
+"""Every document that enters or leaves: fields, limits, checks and readers, for all rooms alike."""

@@ -1,0 +1,60 @@
+"""How a job is run: what the requests of all operations say alike and no number depends on."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Protocol
+
+from pydantic import Field
+
+from morphdata.fields import Strict
+
+MAX_PRIORITY = 100
+MAX_LABEL = 100
+MONTH_S = 31 * 86_400.0
+MAX_ATTEMPTS = 10
+MAX_CHUNKS = 256
+
+Label = Annotated[str, Field(min_length=1, max_length=MAX_LABEL, pattern=r"^[^\x00-\x1f\x7f]+$")]
+
+
+class Execution(Strict):
+    """How the job is run; the result is the same whatever stands here."""
+
+    priority: int = Field(
+        default=0,
+        ge=-MAX_PRIORITY,
+        le=MAX_PRIORITY,
+        description="Among your own jobs the highest runs first; other owners take their turns all the same.",
+    )
+    label: Label | None = Field(
+        default=None, description="A word of your own, to find the job again: `GET /jobs?label=`."
+    )
+    max_attempts: Annotated[int, Field(ge=1, le=MAX_ATTEMPTS)] | None = Field(
+        default=None,
+        description="How often the job may be begun, again after its worker was lost; the service's own "
+        "number when left out.",
+    )
+    expires_in_s: Annotated[float, Field(ge=1.0, le=MONTH_S)] | None = Field(
+        default=None, description="A job that has not begun by then is not begun any more: it is `expired`."
+    )
+
+
+class SpreadExecution(Execution):
+    """How an identification is run: on one worker, or its generations spread over several."""
+
+    mode: Literal["single", "distributed"] = Field(
+        default="single",
+        description="`distributed`: whatever workers there are fly each generation together.",
+    )
+    chunks: int = Field(
+        default=16, ge=1, le=MAX_CHUNKS, description="Parts of a generation in the mode `distributed`."
+    )
+
+
+class Executed(Protocol):
+    """A request that says how it is run."""
+
+    @property
+    def execution(self) -> Execution:
+        """How."""
+        ...

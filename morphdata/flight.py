@@ -1,0 +1,54 @@
+"""The flight condition. The JSON of ``examples/flight.json``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, WithJsonSchema
+
+from morphdata.fields import Strict, Vector3
+
+MACH_LIMIT = 0.7  # Prandtl-Glauert's linear compressibility holds up to here
+# an enumeration of one: generated clients take a constant beside a number for the only choice
+Auto = Annotated[Literal["auto"], WithJsonSchema({"type": "string", "enum": ["auto"]})]
+
+EXAMPLE_FLIGHT: dict[str, Any] = {
+    "airspeed_m_s": 150.0,
+    "air_density_kg_m3": 1.225,
+    "gravity_m_s2": 9.81,
+    "altitude_m": 0.0,
+    "mach": 0.0,
+    "start": {
+        "alpha_rad": 0.06231329180863801,
+        "force_b_n": [341.282868, 0.0, 21.438968],
+        "moment_b_n_m": [0.0, -736.319035, 0.0],
+    },
+}
+
+
+class Start(Strict):
+    """A measured start: attitude against the air and the constant force and moment that hold it."""
+
+    alpha_rad: float = Field(ge=-0.5, le=0.5)
+    force_b_n: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Body axes, at the reference point.")
+    moment_b_n_m: Vector3 = Field(
+        default=[0.0, 0.0, 0.0], description="Body axes, about the reference point."
+    )
+
+
+class Flight(Strict):
+    """Speed, air and start of every sample."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_FLIGHT]})
+
+    airspeed_m_s: float = Field(gt=0.0, le=1000.0)
+    air_density_kg_m3: Annotated[float, Field(gt=0.0, le=2.0)] | None = Field(
+        default=None, description="The standard atmosphere's at `altitude_m` when left out."
+    )
+    gravity_m_s2: float = Field(default=9.80665, ge=0.0, le=30.0)
+    altitude_m: float = Field(default=0.0, ge=-1000.0, le=20_000.0)
+    mach: Annotated[float, Field(ge=0.0, le=MACH_LIMIT)] | Auto | None = Field(
+        default=None, description='Mach number, "auto" from speed and altitude, null for incompressible flow.'
+    )
+    wind_n_m_s: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Velocity of the air, earth axes (NED).")
+    start: Start | None = Field(default=None, description='Needed for `model.start = "given"`.')

@@ -1,0 +1,112 @@
+"""Flights as JSON: one object of lists, ``{"t": [...], "theta_deg": [...], ...}``."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from typing import Any, BinaryIO
+
+from morphdata.samplefiles.cells import Clock, Numbers
+from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si, not_finite
+from morphdata.samplefiles.comments import is_comment, is_octave
+from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.titles import chosen
+
+HINT = 'give one object of lists: {"t": [0.0, 0.01], "sweep_left": [...], ...}'
+
+
+def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
+    """Read an object whose fields are the columns; the form of a sample inline in a request is one.
+
+    Raises
+    ------
+    FileFault : naming field and row.
+    """
+    document = _parsed(stream.read())
+    if not isinstance(document, dict):
+        raise FileFault("not_an_object", "the JSON text is not an object", HINT)
+    titles = list(document)
+    found = chosen(titles, wanted.names)
+    names = {name: titles[position] for name, (position, _) in found.items()}
+    values = {}
+    for name in wanted.names:
+        items, title = document[names[name]], names[name]
+        if not isinstance(items, list):
+            raise FileFault("list_type", f"{shown(title)} is not a list", HINT, title=title)
+        if len(items) > wanted.most_rows:
+            raise wanted.too_many_rows()
+        if name == "t" and items and isinstance(items[0], str):
+            items = _dates(items, title)
+        for row, item in enumerate(items):
+            if not _is_number(item):
+                raise not_finite(title, item, row)
+        values[name] = column_in_si(name, items, found[name][1], title)
+    columns = equally_long(FlightColumns(values), names)
+    rows = len(values[wanted.names[0]])
+    if wanted.others:
+        for title, items in document.items():
+            if title not in names.values() and isinstance(items, list) and len(items) == rows:
+                _keep_numbers(columns, title, items)
+    return columns
+
+
+def _dates(items: list[Any], title: str) -> list[float]:
+    """Times, s, of dates (ISO 8601), from the first one."""
+    clock = Clock(1.0, Numbers())
+    times = []
+    for row, item in enumerate(items):
+        time_s = clock.read(item) if isinstance(item, str) and ":" in item else math.nan
+        if not math.isfinite(time_s):
+            raise not_finite(title, item, row)
+        times.append(time_s)
+    return times
+
+
+def _keep_numbers(columns: FlightColumns, title: str, items: list[Any]) -> None:
+    if all(map(_is_number, items)):
+        try:
+            columns.others[title] = in_si(items, 1.0, title)
+        except FileFault:
+            return
+
+
+def _is_number(item: object) -> bool:
+    # an integer beyond the floats would overflow
+    return isinstance(item, float) or (
+        isinstance(item, int) and not isinstance(item, bool) and abs(item) <= sys.float_info.max
+    )
+
+
+def _parsed(data: bytes) -> Any:
+    try:
+        text = data.decode(json.detect_encoding(data)).removeprefix("\ufeff")
+    except UnicodeDecodeError:
+        raise FileFault("not_json", "the text is not UTF-8", "save it in UTF-8") from None
+    if data and not text:
+        raise FileFault("not_json", "there is no text in UTF-8", "save it in UTF-8")
+    if is_octave(text):
+        raise octave_text()
+    try:
+        # no line inside a JSON text begins like a comment: a string cannot go on in the next line
+        lines = (
+            "" if is_comment(line) and not line.lstrip().startswith('"') else line
+            for line in text.split("\n")
+        )
+        return json.loads("\n".join(lines), object_pairs_hook=_object)
+    except json.JSONDecodeError as error:
+        raise FileFault("not_json", f"this is not JSON: {error.msg} in line {error.lineno}", HINT) from None
+    except RecursionError:
+        raise FileFault("not_json", "the text is nested too deeply", HINT) from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise FileFault("not_json", f"this is not JSON: {str(error)[:80]}", "shorten the number") from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document = dict(pairs)
+    if len(document) != len(pairs):
+        keys = [key for key, _ in pairs]
+        seen: set[str] = set()
+        twice = next(key for key in keys if key in seen or seen.add(key))  # type: ignore[func-returns-value]
+        raise FileFault("column_twice", f"the key {shown(twice)!r} appears twice", "keep one of them")
+    return document

@@ -1,0 +1,198 @@
+"""Flights as MATLAB files of the versions 4, 5 and 7, through scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, BinaryIO
+
+from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si
+from morphdata.samplefiles.comments import is_octave
+from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.titles import MOST_COLUMNS, chosen, meaning
+
+NUMBERS = frozenset(
+    {"double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
+)
+CLASSES = {"float64": "double", "float32": "single"}  # numpy -> MATLAB
+OBJECTS = frozenset({"opaque", "object", "function"})
+OCTAVE_BINARY = b"Octave-1-"
+SAVED = "again: save('flight.mat', ..., '-v7')"
+HDF5 = b"\x89HDF\r\n\x1a\n"
+PLAIN = "t = ts.Time(:); theta = ts.Data(:); save('flight.mat', 't', 'theta', ..., '-v7')"
+AS_STRUCT = "s = table2struct(T, 'ToScalar', true); save('flight.mat', 's', '-v7')"
+
+Contents = dict[str, tuple[tuple[int, ...], str]]  # variable -> shape, class
+
+
+def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
+    """Read vectors (rows or columns), or one struct of vectors; variables nobody asked for stay unread.
+
+    Raises
+    ------
+    FileFault : naming the variable and the row.
+    """
+    _refuse_others(stream)
+    try:
+        return _read(stream, _contents(stream), wanted)
+    except (FileFault, MemoryError):
+        raise
+    except NotImplementedError:
+        raise _hdf5() from None
+    # the reader has no error of its own for a broken file: anything comes out of it
+    except Exception as error:  # noqa: BLE001
+        words = shown(error) or type(error).__name__
+        raise FileFault(
+            "not_matlab",
+            f"this is not a readable MATLAB file: {words}",
+            f"save it {SAVED}",
+        ) from None
+
+
+def _refuse_others(stream: BinaryIO) -> None:
+    """Refuse files that are something else by how they begin; scipy would stumble over them somewhere."""
+    head = stream.read(1024)
+    if head.startswith((HDF5, b"MATLAB 7.3")) or head[512:520] == HDF5:
+        raise _hdf5()
+    if is_octave(head.decode("latin-1")):
+        raise octave_text()
+    if head.startswith(OCTAVE_BINARY):
+        raise replace(octave_text(), detail="this is an Octave binary file")
+    if head and not head.startswith(b"MATLAB") and all(byte >= ord("\t") for byte in head):
+        raise FileFault(
+            "not_matlab",
+            "this is a text, not a MATLAB file",
+            f"give a table of text the ending .csv, or save {SAVED}",
+        )
+
+
+def _hdf5() -> FileFault:
+    return FileFault(
+        "matlab_v73",
+        "this is a MATLAB 7.3 (HDF5) file",
+        "save it as version 7: save('flight.mat', ..., '-v7')",
+    )
+
+
+def _contents(stream: BinaryIO) -> Contents:
+    """Every variable's shape and class, from the headers alone."""
+    from scipy.io import whosmat
+
+    stream.seek(0)
+    try:
+        return {name or "": (shape, kind) for name, shape, kind in whosmat(stream)}  # type: ignore[arg-type]
+    except TypeError:  # the size of MATLAB's own objects is unknown outside of MATLAB
+        raise _object_fault("") from None
+
+
+def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns:
+    if len(contents) > MOST_COLUMNS:
+        raise FileFault(
+            "too_many_columns", f"the file has {len(contents)} variables", "keep those that count"
+        )
+    if not any(meaning(name, wanted.names) for name in contents):
+        structs = [name for name, (_, kind) in contents.items() if kind == "struct"]
+        if len(structs) == 1:
+            return _vectors(_fields(stream, structs[0], contents[structs[0]][0]), wanted)
+        _refuse_containers(contents, structs)
+    found = chosen(list(contents), wanted.names)
+    names = [list(contents)[position] for position, _ in found.values()]
+    for name in names:
+        _require_vector(name, *contents[name], wanted)
+    length = max(contents[names[0]][0])
+    others = [
+        name
+        for name, (shape, kind) in contents.items()
+        if wanted.others
+        and name not in names
+        and kind in NUMBERS
+        and _is_vector(shape)
+        and max(shape) == length
+    ]
+    return _vectors(_loaded(stream, [*names, *others]), wanted)
+
+
+def _refuse_containers(contents: Contents, structs: list[str]) -> None:
+    objects = [name for name, (_, kind) in contents.items() if kind in OBJECTS]
+    if len(structs) > 1:
+        listed = ", ".join(shown(name) for name in structs[:5])
+        raise FileFault(
+            "several_structs", f"the file holds several structs: {listed}", "save one flight a file"
+        )
+    if objects:
+        raise _object_fault(objects[0])
+
+
+def _object_fault(name: str) -> FileFault:
+    return FileFault(
+        "matlab_object",
+        f"{shown(name) or 'a variable'} is an object (timeseries, table, ...), which only MATLAB can read",
+        f"save plain vectors: {PLAIN}; or a struct: {AS_STRUCT}",
+        title=name,
+    )
+
+
+def _require_vector(name: str, shape: tuple[int, ...], kind: str, wanted: Wanted) -> None:
+    if kind in OBJECTS:
+        raise _object_fault(name)
+    if kind not in NUMBERS:
+        hint = "save it as a vector of doubles: theta = double(theta(:))"
+        raise FileFault("not_numbers", f"{shown(name)} is of the class {shown(kind)}", hint, title=name)
+    if not _is_vector(shape):
+        size = " x ".join(map(str, shape))
+        raise FileFault("not_a_vector", f"{shown(name)} is {size}", "give one row or column", title=name)
+    if max(shape) > wanted.most_rows:
+        raise wanted.too_many_rows()
+
+
+def _is_vector(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 2 and min(shape) == 1
+
+
+def _loaded(stream: BinaryIO, names: list[str]) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    stream.seek(0)
+    read = loadmat(stream, variable_names=names)  # type: ignore[arg-type]  # takes streams too
+    return {name: item for name, item in read.items() if name in names}
+
+
+def _fields(stream: BinaryIO, name: str, shape: tuple[int, ...]) -> dict[str, Any]:
+    """The fields of the one struct."""
+    if set(shape) != {1}:
+        size = " x ".join(map(str, shape))
+        raise FileFault("not_a_vector", f"{shown(name)} is a {size} array of structs", AS_STRUCT, title=name)
+    struct = _loaded(stream, [name])[name]
+    if struct.dtype.names is None:
+        raise _object_fault(name)
+    record = struct[0, 0]
+    return {field: record[field] for field in struct.dtype.names}
+
+
+def _vectors(arrays: Mapping[str, Any], wanted: Wanted) -> FlightColumns:
+    titles = list(arrays)
+    found = chosen(titles, wanted.names)
+    names = {name: titles[position] for name, (position, _) in found.items()}
+    values = {}
+    for name in wanted.names:
+        title = names[name]
+        item = arrays[title]
+        kind = CLASSES.get(item.dtype.name, item.dtype.name) if hasattr(item, "ravel") else "sparse"
+        _require_vector(title, item.shape, kind, wanted)
+        # Python's own numbers: whole ones of 64 bits are subtracted from each other exactly
+        values[name] = column_in_si(name, item.ravel().tolist(), found[name][1], title)
+    columns = equally_long(FlightColumns(values), names)
+    if not len(values[wanted.names[0]]):
+        raise FileFault("no_rows", "the vectors are empty", "give rows of numbers")
+    if wanted.others:
+        _keep_numbers(columns, arrays, set(names.values()), len(values[wanted.names[0]]))
+    return columns
+
+
+def _keep_numbers(columns: FlightColumns, arrays: Mapping[str, Any], taken: set[str], rows: int) -> None:
+    for title, item in arrays.items():
+        if title not in taken and getattr(item, "size", 0) == rows and item.dtype.kind in "iuf":
+            try:
+                columns.others[title] = in_si(item.ravel().astype(float), 1.0, title)
+            except FileFault:
+                continue

@@ -1,0 +1,98 @@
+"""What POST /study takes and what a study results in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from morphdata.identify import (
+    EXAMPLE_REQUEST,
+    Angles,
+    IdentifiedParameters,
+    SampleFit,
+    SamplesRequest,
+    SoughtModel,
+)
+from morphdata.parameters import MAX_LINKS
+from morphdata.warnings import Warnings
+
+Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
+
+EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": [1, 2, 3, 4]}}
+
+
+class StudiedModels(SoughtModel):
+    """The models that are compared: the same wings with different numbers of links."""
+
+    links_per_wing: list[Links] = Field(
+        default=[1, 2, 3, 4, 5, 6],
+        min_length=1,
+        max_length=MAX_LINKS,
+        description="Numbers of links to compare, all different; 1 is the rigid model with its aerodynamic "
+        "corrections sought.",
+    )
+
+
+class StudyRequest(SamplesRequest):
+    """As for an identification, with a list of numbers of links.
+
+    `search.max_seconds` is the time for all of them together.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_STUDY]})
+
+    model: StudiedModels = StudiedModels()
+
+
+class StudyRow(BaseModel):
+    """Accuracy and cost of one number of links per wing."""
+
+    model_config = ConfigDict(extra="allow")
+
+    links_per_wing: int
+    bodies: int = Field(description="Rigid bodies of the whole model, fuselage included.")
+    parameters: int = Field(description="Unknowns of the identification.")
+    J_train: float | None = Field(description="Sum of squared angle errors over the fitted flights, rad^2.")
+    J_held_out: float | None = Field(description="The same over the flights held out; null without any.")
+    rms_rad: Angles = Field(description="Over the flights held out, else over the fitted ones.")
+    flight_s: float | None = Field(description="Median wall time of one flight of 2 s on one core.")
+    identify_s: float
+    flights: int
+    fit: list[SampleFit]
+    model: IdentifiedParameters | None = Field(
+        description="null where no model of this size flew the samples to fit."
+    )
+    warnings: Warnings = []
+
+
+class Recommendation(BaseModel):
+    """The number of links to take."""
+
+    model_config = ConfigDict(extra="allow")
+
+    links_per_wing: int | None = Field(description="null when no model flew.")
+    reason: str
+
+
+class StudyReport(BaseModel):
+    """How the study went."""
+
+    model_config = ConfigDict(extra="allow")
+
+    seed: int
+    wall_s: float
+
+
+class StudyResult(BaseModel):
+    """Result of a study: a row per number of links, in rising order."""
+
+    model_config = ConfigDict(extra="allow")
+
+    rows: list[StudyRow]
+    recommended: Recommendation
+    search: StudyReport
+    warnings: Warnings = Field(
+        default=[], description="Of the recommended model; without any, of the first row."
+    )
+    partial: bool = Field(default=False, description="The rows so far of a job that did not run to its end.")

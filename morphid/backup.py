@@ -1,0 +1,208 @@
+"""Copies of the database: made while the service runs, put back while it does not."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.private_files import close_to_others, make_private_folder, open_private, touch_private
+from morphid.exits import CommandError, Exit
+
+PAGES_AT_ONCE = 1000  # 4 MB between two looks at writers that wait
+BUSY_S = 30.0
+LOCK_NAME = "serve.lock"  # of `morphid serve`
+
+
+@dataclass(frozen=True, slots=True)
+class Backup:
+    """A copy that was made or put back.
+
+    Attributes
+    ----------
+    path : Path
+        Where it lies.
+    size_bytes : int
+    jobs : int
+        In it, of every state.
+    revision : str
+        Of its tables.
+    """
+
+    path: Path
+    size_bytes: int
+    jobs: int
+    revision: str
+
+
+def backup(url: str, target: Path) -> Backup:
+    """Copy an SQLite database as it is at one moment, while others go on writing to it.
+
+    The copy appears under its name when it is whole, sound and on disk.
+
+    Raises
+    ------
+    CommandError : the database is no SQLite file or is not there, the target exists, the copy is not sound.
+    """
+    source = _file_of(url, 'pg_dump --format=custom --file backup.dump "$MORPHID_DATABASE_URL"')
+    if not source.exists():
+        raise CommandError(
+            f"there is no database {source}", code=Exit.INVALID_INPUT, hint="see MORPHID_DATA_DIR"
+        )
+    if target.exists():
+        raise CommandError(
+            f"{target} exists", code=Exit.INVALID_INPUT, hint="choose another name, or remove it"
+        )
+    growing = target.with_name(target.name + ".part")
+    with _sentences(target):
+        growing.unlink(missing_ok=True)
+        touch_private(growing)  # webhook secrets and everybody's samples are in it
+        try:
+            with (
+                closing(sqlite3.connect(source, timeout=BUSY_S)) as live,
+                closing(sqlite3.connect(growing)) as copy,
+            ):
+                # one read transaction: SQLite begins anew when a writer changes a page between two steps
+                live.execute("BEGIN")
+                live.execute("SELECT count(*) FROM sqlite_master").fetchone()  # now it has begun
+                live.backup(copy, pages=PAGES_AT_ONCE)
+                copy.execute("PRAGMA journal_mode = DELETE")  # one file, without a journal beside it
+            made = inspected(growing)
+            _to_disk(growing)
+            growing.rename(target)
+            _to_disk(target.parent)
+        finally:
+            growing.unlink(missing_ok=True)
+    return Backup(target, target.stat().st_size, made.jobs, made.revision)
+
+
+def restore(url: str, source: Path) -> Backup:
+    """Put a copy in the place of an SQLite database; what was there is kept as ``....before-restore``.
+
+    Raises
+    ------
+    CommandError : the copy is not sound, is of a newer version, or a service uses the database.
+    """
+    target = _file_of(url, 'pg_restore --clean --if-exists --dbname "$MORPHID_DATABASE_URL" backup.dump')
+    if not source.is_file():
+        raise CommandError(f"there is no file {source}", code=Exit.INVALID_INPUT)
+    with _sentences(source):
+        found = inspected(source)
+    make_private_folder(target.parent)
+    growing = target.with_name(target.name + ".part")
+    with _nobody_serves(target), _sentences(target):
+        growing.unlink(missing_ok=True)
+        touch_private(growing)
+        with closing(sqlite3.connect(source)) as copy, closing(sqlite3.connect(growing)) as new:
+            copy.backup(new)
+        _to_disk(growing)
+        if target.exists():
+            close_to_others(target)  # before it is opened: its journals get its mode
+            _fold_journal(target)
+            target.replace(target.with_name(target.name + ".before-restore"))
+        for suffix in ("-wal", "-shm"):  # of the former file: with the new one they would spoil it
+            target.with_name(target.name + suffix).unlink(missing_ok=True)
+        growing.rename(target)
+        _to_disk(target.parent)
+    return Backup(target, target.stat().st_size, found.jobs, found.revision)
+
+
+def inspected(file: Path) -> Backup:
+    """Tell what a database file holds.
+
+    Raises
+    ------
+    CommandError : it is damaged, or none of MorphID's, or of a newer version.
+    """
+    from migrations import HEAD
+
+    try:
+        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as link:
+            told = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
+            if told != ["ok"]:
+                raise CommandError(
+                    f"{file} is damaged: {told[0]}", code=Exit.INVALID_INPUT, hint="take another copy"
+                )
+            revision = str(link.execute("SELECT version_num FROM alembic_version").fetchone()[0])
+            jobs = int(link.execute("SELECT count(*) FROM jobs").fetchone()[0])
+    except (sqlite3.DatabaseError, TypeError) as error:
+        raise CommandError(
+            f"{file} is no database of MorphID: {error}", code=Exit.INVALID_INPUT, hint="take another copy"
+        ) from None
+    if revision > HEAD:
+        raise CommandError(
+            f"{file} has revision {revision}, this version knows {HEAD}",
+            code=Exit.INVALID_INPUT,
+            hint="restore it with the version of MorphID that made it, or a newer one",
+        )
+    return Backup(file, file.stat().st_size, jobs, revision)
+
+
+def _file_of(url: str, instead: str) -> Path:
+    from sqlalchemy import make_url
+
+    parsed = make_url(url)
+    if parsed.get_backend_name() != "sqlite" or not parsed.database:
+        raise CommandError(
+            f"the database is {parsed.get_backend_name()}, which has tools of its own for this",
+            code=Exit.USAGE,
+            hint=instead,
+        )
+    return Path(parsed.database)
+
+
+def _fold_journal(file: Path) -> None:
+    """Bring what lies in the write-ahead journal into the file itself, so that the file alone is all."""
+    with contextlib.suppress(sqlite3.DatabaseError), closing(sqlite3.connect(file, timeout=1.0)) as link:
+        link.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # a damaged file is kept as it is
+
+
+@contextmanager
+def _nobody_serves(target: Path) -> Iterator[None]:
+    """Hold the data directory as `morphid serve` does, and make sure that nobody else has the file open."""
+    busy = CommandError(
+        f"a service uses {target}",
+        code=Exit.ENVIRONMENT,
+        hint="end it first: a running service must not lose its file",
+    )
+    with open_private(target.parent / LOCK_NAME, "a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise busy from None
+        if target.exists() and _others_have_open(target):
+            raise busy
+        yield
+
+
+def _others_have_open(file: Path) -> bool:
+    """Whether another process has the file open (Linux; elsewhere the lock must do)."""
+    wanted = file.stat()
+    for link in Path("/proc").glob("[0-9]*/fd/*"):
+        with contextlib.suppress(OSError):
+            if link.parent.parent.name != str(os.getpid()) and os.path.samestat(link.stat(), wanted):
+                return True
+    return False
+
+
+def _to_disk(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _sentences(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, sqlite3.OperationalError) as error:
+        raise CommandError(
+            f"{path}: {error}", code=Exit.ENVIRONMENT, hint="is there room, and may you read and write here?"
+        ) from None

@@ -1,0 +1,48 @@
+"""``morphid bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from morphid.commands import options
+from morphid.exits import CommandError, Exit
+from morphid.interrupt import first_interrupt
+from morphid.screen import print_json, reports_errors, stdout
+
+
+@reports_errors
+def bench(
+    quick: Annotated[bool, typer.Option("--quick", help="A minute or two instead of several.")] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Measure this alone, such as batch, mujoco, memory; repeat.")
+    ] = None,
+    samples: Annotated[
+        Path | None, typer.Option(help="Folder with aircraft.json, flight.json and the example flights.")
+    ] = None,
+    as_json: options.AsJson = False,
+) -> None:
+    """Measure this machine: speed, operations, memory and start, each beside what it must be."""
+    from worker import numerics
+
+    numerics.prepare_environment(numerics.usable_cores())
+    from morphcore.bench import benchmark_table, run_benchmarks
+    from morphcore.errors import MorphError
+    from morphcore.stopping import Interrupted, stoppable
+
+    try:
+        with first_interrupt() as interrupted, stoppable(interrupted):
+            figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples, sections=only or None)
+    except (Interrupted, KeyboardInterrupt):  # the second: pressed twice
+        raise CommandError(
+            "stopped", code=Exit.INTERRUPTED, hint="no figures: they stand side by side"
+        ) from None
+    except MorphError as error:
+        raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
+    if as_json:
+        print_json(figures)
+        return
+    for what, value, must in benchmark_table(figures):
+        stdout().print(f"{what:<78} {value:<26} {must}".rstrip(), markup=False, soft_wrap=True)

@@ -1,0 +1,174 @@
+"""``morphid simulate``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from morphid.commands import options
+from morphid.exits import CommandError, Exit
+from morphid.files import require_file, require_place, write_bytes
+from morphid.request import Request
+from morphid.screen import reports_errors, short, stdout
+
+schedule_option = partial(typer.Option, rich_help_panel="Schedule and air")
+
+
+FLIGHT_FILE = "flight.csv"  # among what a simulation leaves behind
+
+
+class Model(StrEnum):
+    """What flies."""
+
+    RIGID = "rigid"
+    EQUIVALENT = "equivalent"
+    FLEXIBLE = "flexible"
+
+
+@reports_errors
+def simulate(
+    aircraft: options.AircraftFile,
+    flight: options.FlightFile,
+    model: Annotated[
+        Model | None,
+        options.model_option(help="What flies.", show_default="equivalent with --parameters, else rigid"),
+    ] = None,
+    parameters: options.Parameters = None,
+    model_id: options.ModelId = None,
+    schedule: Annotated[
+        Path | None, schedule_option(help="Sweep over time: a file with t, sweep_left, sweep_right.")
+    ] = None,
+    rate: Annotated[
+        float | None,
+        schedule_option(help="Instead of --schedule: sweep both wings at this mean rate, rad/s."),
+    ] = None,
+    final: Annotated[float | None, schedule_option(help="With --rate: sweep at the end, rad.")] = None,
+    duration: Annotated[
+        float | None, schedule_option(help="Time to fly, s.", show_default="to the end of the schedule")
+    ] = None,
+    environment: Annotated[
+        Path | None, schedule_option(help="Gust and turbulence, JSON; still air without.")
+    ] = None,
+    start: options.StartAt = None,
+    elements: options.Elements = None,
+    chordwise: options.Chordwise = None,
+    spanwise: options.Spanwise = None,
+    core: options.VortexCore = None,
+    out: Annotated[
+        Path | None, options.answer_option(help="Write the flight, CSV, columns as the samples'.")
+    ] = None,
+    url: options.AtUrl = None,
+    api_key: options.AtUrlKey = None,
+    json_out: options.JsonFile = None,
+    plots: options.Plots = None,
+) -> None:
+    """Fly the aircraft through a morph schedule, as a rigid, an equivalent or a flexible model."""
+    from morphid.running import hand_over, run, wrote
+
+    require_place(json_out, "--json")
+    require_place(out, "--out")
+    request = options.flight_request("simulate", aircraft, flight)
+    known = parameters is not None or model_id is not None
+    kind = model or (Model.EQUIVALENT if known else Model.RIGID)
+    request.put("/model/kind", kind, "--model")
+    if known or kind is Model.EQUIVALENT:
+        options.put_known_model(request, parameters, model_id, url)
+    request.put("/model/elements", elements, "--elements")
+    request.put("/model/start", start, "--start")
+    options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
+    if environment is not None:
+        request.put_file("/environment", environment, "--environment")
+    _put_schedules(request, schedule, rate, final, duration)
+    answer = run(request, url, api_key)
+    if out is not None and answer.result is not None:
+        write_bytes(answer.files[FLIGHT_FILE], out)
+        wrote(out)
+    hand_over(answer, show_flight, json_out=json_out, plots=plots)
+
+
+def _put_schedules(
+    request: Request, table: Path | None, rate: float | None, final: float | None, duration: float | None
+) -> None:
+    """Fill in what the hinges do, and for how long to fly."""
+    if table is not None and rate is None and final is None:
+        end_s = _put_table(request, table)
+    elif table is None and rate is not None and final is not None:
+        end_s = _put_rate(request, rate, final)
+    else:
+        raise CommandError(
+            "what the hinges do is not told"
+            if table is None
+            else "--schedule tells already what --rate tells",
+            code=Exit.USAGE,
+            hint="give either --schedule S.csv, or both --rate and --final",
+        )
+    if duration is None:
+        request.put(
+            "/duration_s", end_s, f"--schedule {table}, whose end is" if table else "--rate, which ends at"
+        )
+    else:
+        request.put("/duration_s", duration, "--duration")
+
+
+def _put_table(request: Request, path: Path) -> float:
+    from morphcore.errors import MorphError
+    from morphcore.simulate.schedule_table import load_schedule_csv
+
+    require_file(path)
+    try:
+        schedules = load_schedule_csv(path)
+    except MorphError as error:
+        raise CommandError(
+            error.message, code=Exit.INVALID_INPUT, hint=error.hint, given_by=f"--schedule {path}"
+        ) from None
+    for side, history in schedules.items():
+        document = {
+            "kind": "tabulated",
+            "time_s": history.time_s.tolist(),
+            "angle_rad": history.angle_rad.tolist(),
+        }
+        request.put(f"/schedules/{side}", document, f"--schedule {path}")
+    return float(schedules["left"].time_s[-1])
+
+
+def _put_rate(request: Request, rate: float, final: float) -> float:
+    if not rate > 0.0 or final == 0.0:
+        raise CommandError(
+            f"--rate {rate:g} --final {final:g}: no morph comes of these",
+            code=Exit.INVALID_INPUT,
+            hint="give a positive rate in rad/s, and a final angle in rad other than 0",
+        )
+    document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
+    request.put("/schedules/both", document, f"--rate {rate:g} --final {final:g}")
+    return abs(final) / rate
+
+
+def show_flight(result: Mapping[str, Any]) -> None:
+    """Print what came out, for people."""
+    stdout().print(flight_table(result))
+
+
+def flight_table(result: Mapping[str, Any]) -> Table:
+    """Show how a flight started, how far the attitude went, and what it cost."""
+    trim, summary, cost = (result.get(part) or {} for part in ("trim", "summary", "cost"))
+    tips, largest = trim.get("tip_z_m") or {}, summary.get("max_abs_rad") or {}
+    table = Table(title=f"Flight of the {result['model']['kind']} model", box=SIMPLE_HEAD, show_header=False)
+    table.add_column("what")
+    table.add_column("value", justify="right")
+    table.add_row("angle of attack at the start, rad", short(trim.get("alpha_rad")))
+    for side in ("left", "right"):
+        if tips.get(side) is not None:
+            table.add_row(f"{side} tip at the start, m up", short(0.0 - tips[side]))
+    for angle, letter in (("phi", "φ"), ("theta", "θ"), ("psi", "ψ")):
+        table.add_row(f"largest departure of {letter}, rad", short(largest.get(angle)))
+    table.add_row("variation of the attitude, rad²", short(summary.get("variation_rad2")))
+    table.add_row("computed in, s", short(cost.get("wall_s")))
+    table.add_row("times faster than real time", short(cost.get("real_time_factor")))
+    return table

@@ -1,0 +1,74 @@
+"""Exit codes of the ``morphid`` command and the one error that carries them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from morphdata.samplefiles.fault import Pickled
+
+
+class Exit(IntEnum):
+    """What a shell script can rely on."""
+
+    OK = 0
+    FAILED = 1  # the job failed, or something unforeseen happened
+    USAGE = 2  # the command line itself was wrong (typer's own code)
+    INVALID_INPUT = 3  # a file is missing or unreadable, or a value in it is refused
+    STOPPED = 4  # the job was cancelled or ran out of time; a partial result may have been written
+    UNREACHABLE = 5  # no service answers at the given address
+    ENVIRONMENT = 6  # this machine lacks something: a free port, a program, a writable directory
+    INTERRUPTED = 130  # Ctrl-C
+
+
+class CommandError(Pickled, Exception):
+    """A sentence for the user and the exit code that goes with it.
+
+    Parameters
+    ----------
+    message : what is wrong.
+    code : exit code.
+    hint : what to do about it.
+    pointer : JSON pointer to the offending field, "" when there is none.
+    given_by : the option or file that filled in that field, "" when unknown.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: Exit = Exit.FAILED,
+        hint: str = "",
+        pointer: str = "",
+        given_by: str = "",
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.code = code
+        self.hint = hint
+        self.pointer = pointer
+        self.given_by = given_by
+
+    def to_document(self) -> dict[str, str | int]:
+        """Give the error as the JSON that ``--json`` prints."""
+        return {
+            "error": self.message,
+            "pointer": self.pointer,
+            "hint": self.hint,
+            "given_by": self.given_by,
+            "exit_code": int(self.code),
+        }
+
+
+def package_missing(error: ModuleNotFoundError) -> CommandError:
+    """Say which package a command needs and how to get it.
+
+    Parameters
+    ----------
+    error : of an import; its ``name`` is the module that was not found.
+    """
+    package = (error.name or "").partition(".")[0]
+    return CommandError(
+        f"this command needs the package {package}, which is not installed",
+        code=Exit.ENVIRONMENT,
+        hint="pip install 'morphid[server]' brings all that the service and its tools need",
+    )

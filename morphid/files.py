@@ -1,0 +1,132 @@
+"""Read the user's files and write answers, with errors that name the file and what to do."""
+
+from __future__ import annotations
+
+import glob
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from morphid.exits import CommandError, Exit
+
+STANDARD_OUTPUT = Path("-")
+PLAIN_NAME = re.compile(
+    r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}"
+)  # no folder, no hidden file, no control character
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file.
+
+    Raises
+    ------
+    CommandError : it is missing or is not JSON; the sentence names the file.
+    """
+    require_file(path)
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandError(f"{path} cannot be read: {error}", code=Exit.INVALID_INPUT) from None
+    except json.JSONDecodeError as error:
+        raise CommandError(
+            f"{path} is not JSON: {error.msg} in line {error.lineno}", code=Exit.INVALID_INPUT
+        ) from None
+
+
+def require_file(path: Path) -> None:
+    """Raise CommandError where there is no such file."""
+    if not path.is_file():
+        raise CommandError(
+            f"there is no file {path}", code=Exit.INVALID_INPUT, hint=f"looked in {Path.cwd()}"
+        )
+
+
+def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
+    """The files that are named, patterns (``flights/*.csv``) replaced by what matches them, by name.
+
+    A shell replaces them before, unless they are quoted; a file of that very name is no pattern.
+
+    Raises
+    ------
+    CommandError : nothing matches a pattern.
+    """
+    found: list[Path] = []
+    for path in paths:
+        pattern = str(path)
+        if not glob.has_magic(pattern) or path.exists():
+            found.append(path)
+            continue
+        # a pattern may begin anywhere, which Path.glob does not know
+        names = glob.glob(pattern, recursive=True)  # noqa: PTH207
+        matches = sorted(Path(name) for name in names if Path(name).is_file())
+        if not matches:
+            raise CommandError(
+                f"{option} {pattern}: no file matches",
+                code=Exit.INVALID_INPUT,
+                hint=f"looked in {Path.cwd()}",
+            )
+        found += matches
+    return found
+
+
+def require_place(path: Path | None, option: str) -> None:
+    """Raise CommandError where a file to be written has no folder: better now than after a search.
+
+    Parameters
+    ----------
+    path : None and ``-`` are always fine.
+    option : the option that names it.
+    """
+    if path is not None and path != STANDARD_OUTPUT and not path.absolute().parent.is_dir():
+        raise CommandError(
+            f"{option} {path}: there is no folder {path.parent}",
+            code=Exit.ENVIRONMENT,
+            hint="make it first, or choose another",
+        )
+
+
+def write_json(document: object, path: Path) -> None:
+    """Write a document for machines and people."""
+    write_bytes((json.dumps(document, indent=1) + "\n").encode(), path)
+
+
+def write_bytes(content: bytes, path: Path) -> None:
+    """Write a file; raise CommandError where that cannot be done."""
+    with writing(path):
+        path.write_bytes(content)
+
+
+def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
+    """Write plots and curves into a folder and give their paths.
+
+    Raises
+    ------
+    CommandError : a name is not a plain file name, or something cannot be written. Names may come from a
+        service, which is not trusted to stay in the folder.
+    """
+    for name in files:
+        if not PLAIN_NAME.fullmatch(name):
+            raise CommandError(
+                f"the service sent a file with the name {name[:80]!r}, which is not a plain file name",
+                hint="nothing was written; do not trust this service",
+            )
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    saved = []
+    for name, content in files.items():
+        target = folder / name
+        write_bytes(content, target)
+        saved.append(target)
+    return saved
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Say what cannot be written, and why, as a CommandError."""
+    try:
+        yield
+    except OSError as error:
+        raise CommandError(f"{path} cannot be written: {error.strerror}", code=Exit.ENVIRONMENT) from None

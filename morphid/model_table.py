@@ -1,0 +1,82 @@
+"""An identified model on the screen: every parameter, its unit in its name, with its interval."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from morphid.screen import short
+
+Document = Mapping[str, Any]
+
+AXES = ("flap", "torsion", "lag")
+JOINTS = ("stiffness_nm_rad", "damping_nms_rad")
+
+
+def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
+    """Give the parameters of a model by the names that its uncertainty has, in their order."""
+    separate = bool(model.get("separate_wings"))
+
+    def wings(name: str) -> Sequence[tuple[str, Sequence[Any]]]:
+        values = model[name]
+        return [(f"wing_{i}.", own) for i, own in enumerate(values, 1)] if separate else [("", values)]
+
+    for wing, shares in wings("division"):
+        yield from ((f"{wing}division.{k}", share) for k, share in enumerate(shares, 1))
+    for name in JOINTS:
+        for wing, joints in wings(name):
+            for j, joint in enumerate(joints, 1):
+                # one number for all three axes is allowed, too
+                values = joint if isinstance(joint, Sequence) else [joint] * len(AXES)
+                for axis, value in zip(AXES, values, strict=True):
+                    yield f"{wing}{name}.joint_{j}.{axis}", value
+    yield from model["aero"].items()
+
+
+def model_table(result: Document) -> Table:
+    """Show every parameter with its 95 % interval; grey are those that the samples do not determine."""
+    model, uncertainty = result["model"], result.get("uncertainty") or {}
+    intervals = uncertainty.get("interval_95") or {}
+    unseen, bound = uncertainty.get("undetermined") or (), uncertainty.get("at_bound") or ()
+    table = Table(
+        title=f"Equivalent model, {model['links_per_wing']} links per wing",
+        caption="grey: the samples do not determine it" if unseen else None,
+        box=SIMPLE_HEAD,
+        padding=(0, 1),
+        collapse_padding=True,
+        pad_edge=False,
+    )
+    table.add_column("parameter", no_wrap=True)
+    for title in ("value", "± 95 %"):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("")
+    for name, value in named_parameters(model):
+        known = name in intervals
+        notes = ["unseen"] * (name in unseen) + ["bound"] * (name in bound)
+        table.add_row(
+            name,
+            short(value),
+            shown_interval(intervals[name]) if known else "",
+            " ".join(notes if known or not intervals else ["fixed"]),
+            style="dim" if name in unseen else None,
+        )
+    return table
+
+
+def shown_interval(interval: Sequence[float | None]) -> str:
+    """Give an interval in words; a side that is not bounded is left open."""
+    low, high = interval
+    if low is None and high is None:
+        return "open"
+    if low is None:
+        return f"up to {short(high)}"
+    return f"from {short(low)}" if high is None else f"{short(low)} to {short(high)}"
+
+
+def at_bound_line(result: Document) -> str:
+    """Give a line that lists the parameters that ended at a bound of the search; "" without any."""
+    names = (result.get("uncertainty") or {}).get("at_bound") or ()
+    return f"At a bound of the search: {', '.join(names)}" if names else ""

@@ -1,0 +1,134 @@
+"""The request that a command line asks for, and which option stands behind each part of it."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from morphid.exits import CommandError, Exit
+from morphid.files import read_json
+
+Document = dict[str, Any]
+SampleForm = Callable[[Path, str], Document]
+
+
+class Request:
+    """A request, filled in part by part.
+
+    Parameters
+    ----------
+    operation : name of the operation, which is also its path at a service.
+    """
+
+    def __init__(self, operation: str) -> None:
+        self.operation = operation
+        self.document: Document = {}
+        self._samples: list[tuple[Path, str]] = []
+        self._given_by: dict[str, str] = {}
+
+    def put(self, pointer: str, value: Any, option: str) -> None:
+        """Fill in a part; None leaves it out, so that the library's default holds.
+
+        Parameters
+        ----------
+        pointer : where, as a JSON pointer.
+        option : the option that gave the value, as the user wrote it; named in errors.
+        """
+        if value is None:
+            return
+        *parents, name = pointer.split("/")[1:]
+        place = self.document
+        for parent in parents:
+            place = place.setdefault(parent, {})
+        place[name] = value
+        self._given_by[pointer] = option if isinstance(value, dict | list) else f"{option} {value}"
+
+    def put_file(self, pointer: str, path: Path, option: str) -> None:
+        """Fill in the content of a JSON file."""
+        self.put(pointer, read_json(path), f"{option} {path}")
+
+    def add_samples(self, paths: Sequence[Path], role: str, option: str) -> None:
+        """Add sample files; how they go into the request depends on where it goes (see `body`)."""
+        for path in paths:
+            self._given_by[f"/samples/{len(self._samples)}"] = f"{option} {path}"
+            self._samples.append((path, role))
+
+    def body(self, sample: SampleForm) -> Document:
+        """Give the whole request, with each sample file in the form that ``sample`` gives it."""
+        if not self._samples:
+            return self.document
+        return {**self.document, "samples": [sample(path, role) for path, role in self._samples]}
+
+    def option_at(self, pointer: str) -> str:
+        """Give the option behind a part of the request, "" where nobody chose it."""
+        parts = pointer.split("/")
+        for length in range(len(parts), 1, -1):
+            option = self._given_by.get("/".join(parts[:length]))
+            if option:
+                return option
+        return ""
+
+
+def changed(document: Document, changes: Iterable[str]) -> Document:
+    """Give a request with other values at some places.
+
+    Parameters
+    ----------
+    changes : ``pointer=value`` each; the value is JSON, or a text where it is none.
+
+    Raises
+    ------
+    CommandError : a change has another form, or leads to a place that the request cannot have.
+
+    Examples
+    --------
+    >>> changed({"search": {"seed": 1}}, ["/search/seed=2", "/search/method=cma"])
+    {'search': {'seed': 2, 'method': 'cma'}}
+    """
+    document = copy.deepcopy(document)
+    for change in changes:
+        pointer, equals, text = change.partition("=")
+        if not pointer.startswith("/") or not equals:
+            raise CommandError(
+                f"--set {change}: this is no POINTER=VALUE", code=Exit.USAGE, hint="--set /search/seed=2"
+            )
+        try:
+            value = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        try:
+            _put(document, [_unescaped(token) for token in pointer.split("/")[1:]], value)
+        except (LookupError, ValueError, TypeError, AttributeError):
+            raise CommandError(
+                f"--set {change}: the request has no place {pointer}",
+                code=Exit.INVALID_INPUT,
+                hint="objects are named and list items counted from 0, as in /samples/0/role",
+            ) from None
+    return document
+
+
+def _put(document: Any, tokens: Sequence[str], value: Any) -> None:
+    *parents, last = tokens
+    place = document
+    for token in parents:
+        place = place[_index(token)] if isinstance(place, list) else place.setdefault(token, {})
+    if isinstance(place, list):
+        place[_index(last)] = value
+    elif isinstance(place, dict):
+        place[last] = value
+    else:
+        raise TypeError(last)
+
+
+def _index(token: str) -> int:
+    if not token.isascii() or not token.isdigit():
+        raise ValueError(token)
+    return int(token)
+
+
+def _unescaped(token: str) -> str:
+    """Undo the escapes of RFC 6901."""
+    return token.replace("~1", "/").replace("~0", "~")

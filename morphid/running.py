@@ -1,0 +1,186 @@
+"""Run an operation in this process or at a service, and hand over what comes out.
+
+``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
+progress is shown, the first Ctrl-C asks for the best so far, a result and its files come out.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+from morphid.connections import at_service_of_environment
+from morphid.exits import CommandError, Exit
+from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
+from morphid.interrupt import first_interrupt
+from morphid.request import Document, Request
+from morphid.screen import Meter, exit_for, meter, print_job_error, print_json, print_warnings, stderr
+from morphid.service import Service
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an operation gave.
+
+    Parameters
+    ----------
+    exit : how it ended.
+    result : the result document, None when there is none.
+    files : plots and curves, by name.
+    error : why it failed, in the service's words.
+    """
+
+    exit: Exit
+    result: Document | None
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    error: Document | None = None
+
+
+def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
+    """Run the operation, at the service of this address or in this process; print what went wrong on the way.
+
+    Raises
+    ------
+    CommandError : the request is refused; the error names the option at fault.
+    """
+    if at_service_of_environment(url):
+        stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
+    try:
+        with meter() as bar:
+            if url is None:
+                answer = run_here(request, bar)
+            else:
+                with Service(url, api_key) as service:
+                    answer = run_there(request, service, bar)
+    except CommandError as error:
+        error.given_by = error.given_by or request.option_at(error.pointer)
+        raise
+    if answer.error is not None:
+        print_job_error(answer.error, request.option_at(str(answer.error.get("pointer") or "")))
+    return answer
+
+
+def run_here(request: Request, bar: Meter) -> Answer:
+    """Run in this process; the first Ctrl-C ends it with the best so far."""
+    from worker import numerics
+
+    bar.note("loading the library")
+    threads = numerics.usable_cores()
+    numerics.prepare_environment(threads)
+    from morphcore.stopping import listening
+    from worker.operations import WorkInterrupted, WorkRefused, find_operation
+    from worker.progress import Pace
+
+    checkpoint: bytes | None = None
+    pace = Pace(time.monotonic)
+    try:
+        work = find_operation(request.operation)(request.body(sample_document), threads)
+        with first_interrupt() as interrupted, listening(bar.note):
+            try:
+                for step in work.steps(None, interrupted):
+                    checkpoint = step.checkpoint
+                    bar.show(pace.progress(step))
+            except WorkInterrupted:
+                best = None if checkpoint is None else work.best_so_far(checkpoint)
+                if best is None:
+                    return Answer(exit=Exit.INTERRUPTED, result=None)
+                partial = {**best.document, "partial": True}
+                return Answer(exit=Exit.INTERRUPTED, result=partial, files=best.artifacts)
+            if checkpoint is None:
+                raise CommandError(f"{request.operation} ended without a step")
+            outcome = work.outcome(checkpoint)
+        return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
+    except WorkRefused as error:
+        raise CommandError(
+            error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+        ) from None
+
+
+def run_there(request: Request, service: Service, bar: Meter) -> Answer:
+    """Run at a service: upload the samples, post the job, watch it; Ctrl-C cancels it."""
+
+    def uploaded(path: Path, role: str) -> Document:
+        require_file(path)
+        try:
+            flight = service.upload(path)
+        except CommandError as error:
+            error.given_by = str(path)
+            raise
+        return {"name": path.stem, "role": role, "trajectory_id": flight["id"]}
+
+    job = service.submit(request.operation, request.body(uploaded))
+    with first_interrupt() as interrupted:
+        cancelled = False
+        for seen in service.watch(job["id"]):
+            job = seen
+            bar.show(job.get("progress"), job["status"])
+            if interrupted() and not cancelled:
+                service.cancel(job["id"])
+                cancelled = True
+    result = service.result(job["id"]) if job["status"] == "succeeded" or job.get("partial") else None
+    return Answer(
+        exit=Exit.INTERRUPTED if cancelled else exit_for(job["status"]),
+        result=result,
+        files=service.artifacts(job["id"]),
+        error=job.get("error"),
+    )
+
+
+def hand_over(
+    answer: Answer, show: Callable[[Mapping[str, Any]], None], *, json_out: Path | None, plots: Path | None
+) -> NoReturn:
+    """Save the result and its files as the user wants them, show the result, and exit with the answer's code.
+
+    Parameters
+    ----------
+    show : prints a result for people.
+    json_out : file of the result; ``-`` prints it instead of the tables.
+    plots : folder of plots and curves.
+    """
+    if answer.result is not None:
+        if answer.result.get("partial"):
+            stderr().print("ended before its end: this is the best so far")
+        if json_out == STANDARD_OUTPUT:
+            print_json(answer.result)
+        else:
+            if json_out is not None:
+                write_json(answer.result, json_out)
+                wrote(json_out)
+            show(answer.result)
+        print_warnings(answer.result)
+    if plots is not None:
+        for path in save_files(answer.files, plots):
+            wrote(path)
+    raise typer.Exit(int(answer.exit))
+
+
+def wrote(path: Path) -> None:
+    """Say that a file was written."""
+    stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
+
+
+def sample_document(path: Path, role: str) -> Document:
+    """Read a sample file and give it as it stands inline in a request."""
+    from morphcore import load_trajectory
+    from morphcore.errors import MorphError
+
+    require_file(path)
+    try:
+        trajectory = load_trajectory(path)
+    except MorphError as error:
+        raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
+    return {
+        "name": path.stem,
+        "role": role,
+        "time_s": trajectory.time_s.tolist(),
+        "sweep_left_rad": trajectory.sweep_left.tolist(),
+        "sweep_right_rad": trajectory.sweep_right.tolist(),
+        "phi_rad": trajectory.phi.tolist(),
+        "theta_rad": trajectory.theta.tolist(),
+        "psi_rad": trajectory.psi.tolist(),
+    }

@@ -1,0 +1,221 @@
+"""``morphid serve``: broker, API, worker and beat as supervised children of one command."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.private_files import OTHERS, close_to_others, make_private_folder, open_private
+from morphid.broker import LOOPBACK, Broker, free_port, prepare_broker
+from morphid.exits import CommandError, Exit
+from morphid.migrate import upgrade_to
+from morphid.screen import print_json_line, stderr, stdout
+from morphid.supervisor import Child, ChildSpec, Supervisor
+from worker.numerics import ensure_cache
+
+if TYPE_CHECKING:
+    from app.settings import Settings
+
+BROKER_WITHIN_S = 10.0
+API_WITHIN_S = 30.0
+WORKER_STOP_S = 25.0  # a running job is checkpointed and handed back in this time
+LOCK_NAME = "serve.lock"
+
+
+class Announcer:
+    """Tell the user what happens, in sentences or as JSON lines."""
+
+    def __init__(self, *, json_events: bool) -> None:
+        self._json = json_events
+
+    def event(self, kind: str, sentence: str, **data: object) -> None:
+        """Announce one event."""
+        if self._json:
+            print_json_line({"event": kind, "message": sentence, **data})
+        else:
+            stdout().print(sentence, markup=False, soft_wrap=True)
+
+
+def serve(settings: Settings, *, json_events: bool) -> None:
+    """Run the service until Ctrl-C or SIGTERM.
+
+    Parameters
+    ----------
+    settings : where the API listens (port 0 takes a free one), jobs at once, data directory and all else.
+    json_events : one JSON object per line instead of sentences.
+
+    Raises
+    ------
+    CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
+    """
+    announcer = Announcer(json_events=json_events)
+    ensure_cache()  # here, where its warning is seen; the workers inherit the folder
+    data_dir = settings.data_dir
+    with _own_data_dir(data_dir):
+        port = _api_port(settings.host, settings.port)
+        environment = _environment(settings, port)
+        upgrade_to(environment["MORPHID_DATABASE_URL"])
+        supervisor = Supervisor(
+            data_dir / "logs", report=lambda sentence: announcer.event("restart", f"morphid: {sentence}")
+        )
+        supervisor.on_signals()
+        try:
+            _start_children(supervisor, environment, settings, port)
+            if not supervisor.stopping:
+                url = f"http://{_in_url(settings.host)}:{port}"
+                announcer.event(
+                    "ready",
+                    f"MorphID is ready at {url} (documentation at {url}/docs, logs in {data_dir / 'logs'}). "
+                    "Ctrl-C ends it.",
+                    url=url,
+                    pid=os.getpid(),
+                    children={name: child.pid for name, child in supervisor.children.items()},
+                )
+                supervisor.watch()
+        finally:
+            announcer.event("stopping", "morphid: ending")
+            supervisor.stop()
+
+
+def _start_children(
+    supervisor: Supervisor, environment: dict[str, str], settings: Settings, port: int
+) -> None:
+    if not settings.names_broker:
+        broker = prepare_broker(settings.data_dir)
+        environment["MORPHID_BROKER_URL"] = broker.url
+        _start_broker(supervisor, broker)
+    if supervisor.stopping:
+        return
+    api = supervisor.start(_api(environment, settings.host, port))
+    # the worker loads while the API does; a wake-up that comes early waits in the queue
+    supervisor.start(_worker(environment, settings.workers))
+    supervisor.start(_beat(environment))
+    _expect(supervisor, api, lambda: _alive(settings.host, port), API_WITHIN_S)
+
+
+def _start_broker(supervisor: Supervisor, broker: Broker) -> None:
+    child = supervisor.start(broker.spec)
+    _expect(supervisor, child, broker.answers, BROKER_WITHIN_S)
+
+
+def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], within_s: float) -> None:
+    if supervisor.wait_until(child, ready, within_s) or supervisor.stopping:
+        return
+    state = "ended" if child.exit_code is not None else f"did not answer within {within_s:g} s"
+    raise CommandError(
+        f"the {child.spec.name} {state}; the end of its log {child.log_path}:\n{child.last_words()}",
+        code=Exit.ENVIRONMENT,
+        hint="repair what the log says and start again",
+    )
+
+
+def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
+    command = _python("app.http.server", "--host", host, "--port", str(port))
+    return ChildSpec(name="api", command=command, environment=environment)
+
+
+def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
+    command = _python("worker.process", "worker", "--concurrency", str(workers))
+    return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
+
+
+def _beat(environment: dict[str, str]) -> ChildSpec:
+    # not inside the worker: nobody would notice its death, and no lost job would be found any more
+    return ChildSpec(name="beat", command=_python("worker.process", "beat"), environment=environment)
+
+
+def _python(module: str, *arguments: str) -> list[str]:
+    """Run one of our modules; nothing is imported from the working folder (-P), whatever lies there."""
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def _environment(settings: Settings, port: int) -> dict[str, str]:
+    """Hand on what options said: the children read variables."""
+    return {
+        "MORPHID_DATA_DIR": str(settings.data_dir),
+        "MORPHID_HOST": settings.host,
+        "MORPHID_PORT": str(port),
+        "MORPHID_DATABASE_URL": settings.database_url,
+        "MORPHID_WORKERS": str(settings.workers),
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+@contextmanager
+def _own_data_dir(home: Path) -> Iterator[None]:
+    """Make the data directory and hold it alone."""
+    try:
+        make_private_folder(home)
+        _close_to_others(home)
+        lock = open_private(home / LOCK_NAME, "a")
+    except OSError as error:
+        raise CommandError(
+            f"the data directory {home} cannot be written: {error.strerror}",
+            code=Exit.ENVIRONMENT,
+            hint="choose another: morphid serve --data-dir DIR",
+        ) from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise CommandError(
+                f"another `morphid serve` uses the data directory {home}",
+                code=Exit.ENVIRONMENT,
+                hint="end it first, or choose another: morphid serve --data-dir DIR",
+            ) from None
+        yield
+
+
+def _close_to_others(home: Path) -> None:
+    """Let nobody else look into a data directory that is ours; say what is done with one that exists.
+
+    One that holds other things, such as a home directory, is somebody else's to close. What we write there is
+    private all the same.
+    """
+    names = {path.name for path in home.iterdir()}
+    if not home.stat().st_mode & OTHERS:
+        return
+    if (not names or LOCK_NAME in names) and close_to_others(home):
+        said = f"the data directory {home} was open to other users; it is yours alone now"
+    else:
+        said = f"other users may list {home}, not read what MorphID writes there; chmod 700 closes it"
+    stderr().print(f"morphid: {said}", markup=False, soft_wrap=True)
+
+
+def _api_port(host: str, port: int) -> int:
+    if port == 0:
+        return free_port(0, host)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise CommandError(
+                f"cannot listen on {host} port {port}: {error.strerror}",
+                code=Exit.ENVIRONMENT,
+                hint="another program may use it; take any free port with `morphid serve --port 0`",
+            ) from None
+    return port
+
+
+def _in_url(host: str) -> str:
+    everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}  # noqa: S104 - recognised here, not bound
+    return everywhere.get(host, f"[{host}]" if ":" in host else host)
+
+
+def _alive(host: str, port: int) -> bool:
+    try:
+        with closing(HTTPConnection(_in_url(host), port, timeout=1.0)) as link:  # which knows no proxies
+            link.request("GET", "/livez")
+            return link.getresponse().status == HTTPStatus.OK
+    except (HTTPException, OSError):
+        return False

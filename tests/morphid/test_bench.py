@@ -1,0 +1,61 @@
+"""``morphid bench`` and Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import morphcore.bench
+from morphcore.bench import fresh_process, run
+from morphcore.stopping import Interrupted, heed, stoppable
+from morphid.exits import Exit
+from morphid.main import app
+
+RUNNER = CliRunner()
+
+
+@pytest.mark.parametrize("interrupts", [1, 2])
+def test_ctrl_c_ends_it(interrupts: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first is asked for between two measurements, an exception may be lost; the second ends at once."""
+    reached: list[str] = []
+
+    def measure(*_: object, **__: object) -> dict[str, Any]:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)  # an exception would be lost here, where a kernel is loaded
+        except KeyboardInterrupt:
+            reached.append("lost")
+        reached.append("loaded")
+        if interrupts == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+        heed()
+        reached.append("worked on")
+        return {}
+
+    monkeypatch.setattr(morphcore.bench, "run_benchmarks", measure)
+    before = signal.getsignal(signal.SIGINT)
+    ended = RUNNER.invoke(app, ["bench", "--quick"])
+    assert (ended.exit_code, reached) == (Exit.INTERRUPTED, ["loaded"])
+    assert "stopped" in ended.stderr
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_measurements_ask_whether_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two sections, and where a process of its own was ended by the same Ctrl-C."""
+    seen: list[str] = []
+    monkeypatch.setattr(run, "warm_up", lambda: None)
+    monkeypatch.setattr(
+        run,
+        "SECTIONS",
+        {name: lambda _bench, name=name: {name: seen.append(name)} for name in ("one", "two")},
+    )
+    with pytest.raises(Interrupted), stoppable(lambda: "one" in seen):
+        run.run_benchmarks(sections=("one", "two"))
+    assert seen == ["one"]
+    with pytest.raises(Interrupted), stoppable(lambda: True):
+        fresh_process.in_fresh_process("os:abort")
+    with pytest.raises(RuntimeError, match="os:abort"):
+        fresh_process.in_fresh_process("os:abort")

@@ -1,0 +1,118 @@
+"""``morphid identify`` against a service that a test plays."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from morphid.exits import Exit
+from morphid.main import app
+from tests.morphid.played_service import Play, PlayedService
+
+RUNNER = CliRunner()
+ANGLES = {"phi": 1e-5, "theta": 4e-4, "psi": 2e-5}
+RESULT = {
+    "model": {
+        "links_per_wing": 1,
+        "division": [1.0],
+        "stiffness_nm_rad": [[1.0e4, 2.0e4, 3.0e4]],
+        "damping_nms_rad": [[10.0, 20.0, 30.0]],
+        "aero": {},
+    },
+    "fit": [
+        {
+            "sample": "a",
+            "role": "train",
+            "J_rigid": 0.2,
+            "J_initial": 0.1,
+            "J_identified": 1e-4,
+            "rms_rad": ANGLES,
+            "max_abs_rad": ANGLES,
+        }
+    ],
+}
+
+
+def arguments(examples: Path) -> list[str]:
+    """Give the command line of a small identification."""
+    files = ["--aircraft", examples / "aircraft.json", "--flight", examples / "flight.json"]
+    samples = ["--sample", examples / "train_rate_0.5.csv", "--held-out", examples / "train_rate_0.8.csv"]
+    return ["identify", *(str(word) for word in [*files, *samples]), "--url", "http://there", "--seed", "3"]
+
+
+def test_the_choices_reach_the_service(examples: Path, tmp_path: Path, play: Play) -> None:
+    """Roles, model and search of the command line stand in the request; result and plots are saved."""
+    played = play(PlayedService("identify", RESULT))
+    out, plots = tmp_path / "out.json", tmp_path / "plots"
+    ended = RUNNER.invoke(
+        app, [*arguments(examples), "--links", "1", "--json", str(out), "--plots", str(plots)]
+    )
+    assert ended.exit_code == Exit.OK, ended.output
+    assert [(sample["name"], sample["role"]) for sample in played.body["samples"]] == [
+        ("train_rate_0.5", "train"),
+        ("train_rate_0.8", "held_out"),
+    ]
+    assert played.body["model"] == {"links_per_wing": 1}
+    assert played.body["search"] == {"seed": 3}
+    assert json.loads(out.read_text()) == RESULT
+    assert (plots / "convergence.svg").read_bytes() == b"<svg/>"
+
+
+def test_json_on_standard_output_is_nothing_but_json(examples: Path, play: Play) -> None:
+    """With ``--json -`` standard output can be piped into a program."""
+    play(PlayedService("identify", RESULT))
+    ended = RUNNER.invoke(app, [*arguments(examples), "--json", "-"])
+    assert json.loads(ended.stdout) == RESULT
+
+
+@pytest.mark.parametrize(
+    ("ending", "code"), [("failed", Exit.FAILED), ("cancelled", Exit.STOPPED), ("expired", Exit.STOPPED)]
+)
+def test_the_exit_code_tells_the_ending(examples: Path, play: Play, ending: str, code: Exit) -> None:
+    """A script learns from the exit code how the job ended, a person from the sentence."""
+    play(PlayedService("identify", RESULT, ending))
+    ended = RUNNER.invoke(app, arguments(examples))
+    assert ended.exit_code == code
+    assert ("it flew apart (stiffen it)" in ended.stderr) == (ending == "failed")
+
+
+def test_a_missing_file_is_named(examples: Path) -> None:
+    """A sample that is not there ends the command with its name and exit code 3."""
+    command = arguments(examples)
+    command[2] = "nowhere.json"
+    ended = RUNNER.invoke(app, command)
+    assert ended.exit_code == Exit.INVALID_INPUT
+    assert "nowhere.json" in ended.stderr
+
+
+def test_a_refused_sample_is_a_sentence(examples: Path, tmp_path: Path) -> None:
+    """In this process too, a sample whose time falls is refused with a sentence and exit code 3."""
+    rows = (examples / "train_rate_0.8.csv").read_text().splitlines()
+    (tmp_path / "falls.csv").write_text("\n".join([*rows[:5], rows[3], *rows[5:]]))
+    ended = RUNNER.invoke(
+        app,
+        [
+            *("identify", "--aircraft", str(examples / "aircraft.json")),
+            *("--flight", str(examples / "flight.json"), "--sample", str(tmp_path / "falls.csv")),
+        ],
+    )
+    assert ended.exit_code == Exit.INVALID_INPUT
+    assert "rise" in ended.stderr
+
+
+def test_a_refused_flight_names_the_field(examples: Path, tmp_path: Path) -> None:
+    """A value that the library refuses is named by its JSON pointer."""
+    flight = json.loads((examples / "flight.json").read_text())
+    (tmp_path / "flight.json").write_text(json.dumps({**flight, "airspeed_m_s": -1.0}))
+    ended = RUNNER.invoke(
+        app,
+        [
+            *("identify", "--aircraft", str(examples / "aircraft.json")),
+            *("--flight", str(tmp_path / "flight.json"), "--sample", str(examples / "train_rate_0.8.csv")),
+        ],
+    )
+    assert ended.exit_code == Exit.INVALID_INPUT
+    assert "/flight/airspeed_m_s" in ended.stderr
