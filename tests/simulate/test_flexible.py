@@ -335,6 +335,21 @@ def test_a_flight_can_be_watched_and_stopped() -> None:
     del fractions
 
 
+def test_a_trim_that_stalls_in_its_last_digits_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tolerance below round-off changes the flight by no more than the imbalance that is accepted."""
+    trimming = importlib.import_module("morphcore.simulate.flexible_trim")
+
+    def pitch() -> Array:
+        held = {"left": Hold(), "right": Hold()}
+        return simulate(
+            example_aircraft(), example_flight(), held, model="flexible", elements=2, duration_s=0.02
+        ).trajectory.theta
+
+    reached = pitch()
+    monkeypatch.setattr(trimming, "TOLERANCE", 1e-18)
+    np.testing.assert_allclose(pitch(), reached, rtol=0.0, atol=trimming.ACCEPTED)
+
+
 def test_wings_too_weak_to_fly_say_so() -> None:
     """Wings without stiffness find no trim, or leave the model's domain: an error, never a number."""
     weak = changed({}, youngs_modulus_pa=2e6)
