@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
-from morphdata.fields import Strict
+from morphdata.base import Document
 
 MAX_PRIORITY = 100
 MAX_LABEL = 100
@@ -17,7 +17,7 @@ MAX_CHUNKS = 256
 Label = Annotated[str, Field(min_length=1, max_length=MAX_LABEL, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
-class Execution(Strict):
+class Execution(Document):
     """How the job is run; the result is the same whatever stands here."""
 
     priority: int = Field(

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from morphdata.base import Document
 from morphdata.execution import Execution, SpreadExecution
-from morphdata.fields import Strict
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import Lattice, Start, StepS
 from morphdata.parameters import MAX_LINKS
@@ -26,7 +26,7 @@ Range = Annotated[
 ]
 
 
-class Bounds(Strict):
+class Bounds(Document):
     """Where the search may look; what is left out gets bounds from beam theory around the physical guess."""
 
     stiffness_nm_rad: Range | None = None
@@ -38,7 +38,7 @@ class Bounds(Strict):
     lag_s: Range | None = None
 
 
-class SoughtModel(Strict):
+class SoughtModel(Document):
     """A model whose parameters are sought: wings of rigid links with gimbal joints."""
 
     separate_wings: bool = Field(
@@ -102,7 +102,7 @@ EXAMPLE_REQUEST: dict[str, Any] = {
 }
 
 
-class SamplesRequest(Strict):
+class SamplesRequest(Document):
     """A request to fit models to sample flights."""
 
     aircraft: Aircraft

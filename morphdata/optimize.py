@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from morphdata.base import Angle, Document
 from morphdata.execution import Execution
-from morphdata.fields import Angle, Strict
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel
@@ -27,7 +27,7 @@ class SearchedModel(KnownModel):
     step_s: StepS | None = Field(default=None, description=OWN_OR_CHOSEN)
 
 
-class Morph(Strict):
+class Morph(Document):
     """The change of shape that is wanted; all hinges follow one schedule."""
 
     initial_rad: Angle = 0.0
@@ -54,7 +54,7 @@ class Morph(Strict):
     front_points: int = Field(default=7, ge=2, le=50, description="Durations on the front of `pareto`.")
 
 
-class Limits(Strict):
+class Limits(Document):
     """What no schedule may exceed; what is left out is not limited."""
 
     max_rate_rad_s: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
@@ -65,7 +65,7 @@ class Limits(Strict):
     )
 
 
-class Weights(Strict):
+class Weights(Document):
     """Weights of the angles' squared departures in what is minimised."""
 
     phi: Weight = 1.0
@@ -87,7 +87,7 @@ class ScheduleSearch(SwarmSearch):
     )
 
 
-class VerifyingModel(Strict):
+class VerifyingModel(Document):
     """The flexible model in which the schedules are flown again."""
 
     elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
@@ -105,7 +105,7 @@ EXAMPLE_OPTIMIZATION: dict[str, Any] = {
 }
 
 
-class OptimizeRequest(Strict):
+class OptimizeRequest(Document):
     """Aircraft, flight condition, an equivalent model, the morph that is wanted and its limits."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_OPTIMIZATION]})

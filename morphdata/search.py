@@ -6,14 +6,14 @@ from typing import Annotated
 
 from pydantic import Field
 
-from morphdata.fields import Identifier, Strict
+from morphdata.base import Document, Identifier
 from morphdata.parameters import GivenParameters
 
 MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
 WEEK_S = 7 * 86_400.0
 
 
-class WarmStart(Strict):
+class WarmStart(Document):
     """The model that a search begins from: of an earlier job, an identified one, or its parameters."""
 
     job_id: Identifier | None = Field(
@@ -29,7 +29,7 @@ class WarmStart(Strict):
     parameters: GivenParameters | None = None
 
 
-class SwarmSearch(Strict):
+class SwarmSearch(Document):
     """The swarm's pulls and the seed; how large the swarm may be is each search's own."""
 
     c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from app.simulate.cost import row_count, step_count
+from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
-from morphdata.fields import MAX_ROWS
 from morphdata.schedules import AnySchedule, ConstantRate, Hold, Quadratic, Schedules, Spline, Tabulated
 from morphdata.simulate import SimulateRequest
 from morphdata.vehicle import HingeRange, hinge_ranges

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-from morphdata.samplefiles.fault import Pickled
+from morphdata.faults import Pickled
 
 Document = dict[str, Any]
 Stop = Callable[[], bool]
