@@ -81,7 +81,7 @@ def create_app(settings: Settings | None = None, *, sending: SenderSettings | No
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
     app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
-    install_problem_handlers(app, known_fields=lambda: _request_fields(app))
+    install_problem_handlers(app)
     bodies = BODIES_AT_ONCE * chosen.max_body_bytes
     limits = BodyLimits(
         chosen.max_body_bytes,
@@ -100,14 +100,6 @@ def _wrap(app: FastAPI) -> None:
     """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
     inner = app.build_middleware_stack
     app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
-
-
-def _request_fields(app: FastAPI) -> list[str]:
-    """Names of all documented fields, to guess what a misspelt one meant."""
-    names: set[str] = set()
-    for schema in openapi_document(app)["components"]["schemas"].values():
-        names.update(schema.get("properties", {}))
-    return sorted(names)
 
 
 def _sending(settings: Settings) -> SenderSettings:

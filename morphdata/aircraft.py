@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from morphdata.fields import Angle, Length, Position, Strict, Text
+from morphdata.base import Angle, Document, Length, Position, Text
 
 HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
 MAX_SURFACES = 16
@@ -44,7 +44,7 @@ Row3 = Annotated[list[Inertia], Field(min_length=3, max_length=3)]
 Stiffness = Annotated[float, Field(gt=0.0, le=1e15)]
 
 
-class Fuselage(Strict):
+class Fuselage(Document):
     """A rigid body: a box of uniform density, or mass and inertia given outright."""
 
     shape: Literal["box"] | None = Field(
@@ -67,7 +67,7 @@ class Fuselage(Strict):
     )
 
 
-class Material(Strict):
+class Material(Document):
     """An isotropic material."""
 
     density_kg_m3: float = Field(gt=0.0, le=30_000.0)
@@ -78,7 +78,7 @@ class Material(Strict):
     )
 
 
-class Section(Strict):
+class Section(Document):
     """Section properties given outright, instead of those of a solid box."""
 
     ei_flap_n_m2: Stiffness
@@ -90,7 +90,7 @@ class Section(Strict):
     )
 
 
-class Hinge(Strict):
+class Hinge(Document):
     """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence."""
 
     position_m: Position = Field(
@@ -105,7 +105,7 @@ class Hinge(Strict):
     )
 
 
-class Surface(Strict):
+class Surface(Document):
     """A lifting surface, hinged (it morphs) or fixed (a tail)."""
 
     name: Text
@@ -134,7 +134,7 @@ class Surface(Strict):
     flexible: bool = True
 
 
-class Aircraft(Strict):
+class Aircraft(Document):
     """A fuselage with its lifting surfaces."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_AIRCRAFT]})

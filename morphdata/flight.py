@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from morphdata.fields import Strict, Vector3
+from morphdata.base import Document, Vector3
 
 MACH_LIMIT = 0.7  # Prandtl-Glauert's linear compressibility holds up to here
 # an enumeration of one: generated clients take a constant beside a number for the only choice
@@ -26,7 +26,7 @@ EXAMPLE_FLIGHT: dict[str, Any] = {
 }
 
 
-class Start(Strict):
+class Start(Document):
     """A measured start: attitude against the air and the constant force and moment that hold it."""
 
     alpha_rad: float = Field(ge=-0.5, le=0.5)
@@ -36,7 +36,7 @@ class Start(Strict):
     )
 
 
-class Flight(Strict):
+class Flight(Document):
     """Speed, air and start of every sample."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_FLIGHT]})

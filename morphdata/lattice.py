@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from morphdata.fields import Strict
+from morphdata.base import Document
 
 
-class VortexCore(Strict):
+class VortexCore(Document):
     """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
 
     law: Literal["line", "smoothed"] = "line"
@@ -20,7 +20,7 @@ class VortexCore(Strict):
     )
 
 
-class Lattice(Strict):
+class Lattice(Document):
     """Panels of each wing's vortex lattice, and the core of its vortices."""
 
     chordwise: int = Field(default=4, ge=1, le=8)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from morphdata.fields import Identifier, Strict
+from morphdata.base import Document, Identifier
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 
 MAX_LINKS = 8
@@ -29,7 +29,7 @@ Joint = Annotated[list[Stiffness], Field(min_length=AXES, max_length=AXES)]
 Joints = Annotated[list[Joint], Field(max_length=MAX_LINKS - 1)]
 
 
-class Corrections(Strict):
+class Corrections(Document):
     """Aerodynamic corrections of an equivalent model."""
 
     lift_factor: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
@@ -40,7 +40,7 @@ class Corrections(Strict):
     lag_s: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
-class Parameters(Strict):
+class Parameters(Document):
     """The `model` of an identification's result, as it stands there."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_PARAMETERS]})
@@ -62,7 +62,7 @@ class Parameters(Strict):
     start: Start | None = None
 
 
-class WholeResult(Strict):
+class WholeResult(Document):
     """A whole result of an identification: only its `model` is looked at."""
 
     model: Parameters
@@ -84,7 +84,7 @@ GivenParameters = Annotated[
 ]
 
 
-class KnownModel(Strict):
+class KnownModel(Document):
     """An equivalent model by its parameters, or by the id of an identified one.
 
     Lattice, step and start are those it was identified with where they are left out.

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from morphdata.fields import AngleSeries, Identifier, SampleName, Strict, TimeSeries
+from morphdata.base import AngleSeries, Document, Identifier, SampleName, TimeSeries
 
 Role = Literal["train", "held_out"]
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
@@ -24,7 +24,7 @@ EXAMPLE_SAMPLE: dict[str, Any] = {
 }
 
 
-class TrajectoryColumns(Strict):
+class TrajectoryColumns(Document):
     """Columns of one flight, equally long; time rises, steps may be uneven."""
 
     time_s: TimeSeries
@@ -47,7 +47,7 @@ class InlineSample(TrajectoryColumns):
     weight: Weight = 1.0
 
 
-class UploadedSample(Strict):
+class UploadedSample(Document):
     """A sample whose rows were uploaded with POST /trajectories."""
 
     trajectory_id: Identifier

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, FailFast, Field
 
-from morphdata.fields import MAX_ROWS, Angle, Strict
+from morphdata.base import MAX_ROWS, Angle, Document
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
 
 MAX_DURATION_S = LONGEST_FLIGHT_S
@@ -26,14 +26,14 @@ ClockTime = Annotated[float, Field(ge=-MAX_DURATION_S, le=1e6)]
 Rate = Annotated[float, Field(gt=0.0, le=100.0)]
 
 
-class Hold(Strict):
+class Hold(Document):
     """A hinge that does not move."""
 
     kind: Literal["hold"]
     angle_rad: Angle = 0.0
 
 
-class ConstantRate(Strict):
+class ConstantRate(Document):
     """From one angle to another at constant rate, with ramps of the rate inside the duration."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SCHEDULE]})
@@ -51,7 +51,7 @@ class ConstantRate(Strict):
     )
 
 
-class Quadratic(Strict):
+class Quadratic(Document):
     """Angle quadratic in time, then held."""
 
     kind: Literal["quadratic"]
@@ -61,7 +61,7 @@ class Quadratic(Strict):
     start_s: Moment = 0.0
 
 
-class Spline(Strict):
+class Spline(Document):
     """Clamped cubic spline through knots: at rest before the first and after the last."""
 
     kind: Literal["spline"]
@@ -69,7 +69,7 @@ class Spline(Strict):
     knot_angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
 
 
-class Tabulated(Strict):
+class Tabulated(Document):
     """A history in rows, interpolated differentiably; held before the first row and after the last."""
 
     kind: Literal["tabulated"]
@@ -81,7 +81,7 @@ AnySchedule = Hold | ConstantRate | Quadratic | Spline | Tabulated
 Schedule = Annotated[AnySchedule, Field(discriminator="kind")]
 
 
-class Schedules(Strict):
+class Schedules(Document):
     """What the hinges do: both sides the same, or each side its own."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"both": EXAMPLE_SCHEDULE}]})

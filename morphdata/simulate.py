@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
+from morphdata.base import Document
 from morphdata.execution import Execution
-from morphdata.fields import Strict
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.parameters import KnownModel
@@ -24,7 +24,7 @@ Direction = Annotated[
 ]  # of any length
 
 
-class RigidModel(Strict):
+class RigidModel(Document):
     """Rigid wings, without aerodynamic corrections."""
 
     kind: Literal["rigid"]
@@ -39,7 +39,7 @@ class EquivalentFlightModel(KnownModel):
     kind: Literal["equivalent"]
 
 
-class FlexibleModel(Strict):
+class FlexibleModel(Document):
     """Wings of geometrically exact beams: the reference, and hundreds of times slower."""
 
     kind: Literal["flexible"]
@@ -52,7 +52,7 @@ class FlexibleModel(Strict):
 FlightModel = Annotated[RigidModel | EquivalentFlightModel | FlexibleModel, Field(discriminator="kind")]
 
 
-class Gust(Strict):
+class Gust(Document):
     """A gust of the shape 1 - cos (EASA CS-25.341): frozen in the air that the aircraft crosses."""
 
     amplitude_m_s: GustSpeed
@@ -61,7 +61,7 @@ class Gust(Strict):
     direction_n: Direction = Field(default=[0.0, 0.0, -1.0], description="Earth axes (NED); up by default.")
 
 
-class Turbulence(Strict):
+class Turbulence(Document):
     """Dryden turbulence (MIL-F-8785C)."""
 
     wind_20ft_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
@@ -72,7 +72,7 @@ class Turbulence(Strict):
     )
 
 
-class Environment(Strict):
+class Environment(Document):
     """Gust and turbulence on top of the flight's uniform wind."""
 
     gust: Gust | None = None
@@ -89,7 +89,7 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 }
 
 
-class SimulateRequest(Strict):
+class SimulateRequest(Document):
     """Aircraft, flight condition, a model, and what the hinges do."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})

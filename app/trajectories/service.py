@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePosixPath
-
-from pydantic import ValidationError
 
 from app.audit.records import Action
 from app.audit.service import note
@@ -16,7 +15,7 @@ from app.parsing.pool import refusal
 from app.trajectories.checks import columns_faults, file_faults
 from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
 from app.trajectories.schemas import TrajectoryUpload
-from morphdata.faults import Fault
+from morphdata.faults import InvalidInput
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.flight import INLINE
 from morphdata.samplefiles.reading import kind_of
@@ -59,17 +58,16 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
     named = {INLINE[key]: values for key, values in columns.items()}
     try:
         return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **named)
-    except ValidationError as error:
-        faults = [
-            Fault(
-                item["type"],
-                f"{item['msg']}.",
-                "/name" if item["loc"][0] == "name" else f"/file/{item['loc'][-1]}/{item['loc'][0]}",
-                "Check the name, and the units of the columns.",
-            )
-            for item in error.errors(include_url=False)
-        ]
-        raise InvalidRequest.of(faults) from None
+    except InvalidInput as error:
+        raise InvalidRequest.of(
+            [replace(fault, pointer=_in_file(fault.pointer)) for fault in error.faults]
+        ) from None
+
+
+def _in_file(pointer: str) -> str:
+    """Turn /column/row of a document into the /file/row/column of an upload."""
+    column, _, row = pointer[1:].partition("/")
+    return "/name" if column == "name" else f"/file/{row}/{column}" if row else f"/file/{column}"
 
 
 def store_trajectory(

@@ -1,10 +1,11 @@
-"""Bounded, strict building blocks of the request documents: no NaN, no infinity, no unknown field."""
+"""Base and building blocks of the documents: strict, bounded, no NaN, no unknown field, every fault named."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Annotated, Any, get_args
+from numbers import Integral
+from typing import Annotated, Any, Self, get_args
 
 from pydantic import (
     AfterValidator,
@@ -12,9 +13,13 @@ from pydantic import (
     ConfigDict,
     FailFast,
     Field,
+    ValidationError,
     model_validator,
 )
+from pydantic_core import PydanticCustomError
 
+from morphdata.faults import Fault, InvalidInput
+from morphdata.refusals import FAULTS, faults_of
 from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
@@ -23,10 +28,58 @@ MIN_ROWS = FEWEST_ROWS
 LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 
 
-class Strict(BaseModel):
-    """Base of everything a client sends: a misspelt field is an error, text is not a number."""
+class Document(BaseModel):
+    """Base of everything that a client sends: a misspelt field is an error, text is not a number.
+
+    A document refuses to be built of what is wrong, with `InvalidInput` that names every fault, whether it
+    is parsed or constructed in Python.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    def __init__(self, /, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise _refused(error, fields, type(self)) from None
+
+    # pydantic would call an __init__ of ours for every nested object, too, and not see where an error is from
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def parse(cls, value: Any, pointer: str = "") -> Self:
+        """Build the document of parsed JSON.
+
+        Parameters
+        ----------
+        value : object
+            Parsed JSON; objects in it may be documents already.
+        pointer : str
+            Where it stands in a larger document, for errors.
+
+        Raises
+        ------
+        InvalidInput
+            Naming every fault.
+        """
+        try:
+            return cls.model_validate(value)
+        except ValidationError as error:
+            raise _refused(error, value, cls, pointer) from None
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what is wrong across the fields, with pointers relative to this object.
+
+        It is called when each field by itself is right.
+        """
+        return iter(())
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        found = tuple(self.faults())
+        if found:
+            raise PydanticCustomError(FAULTS, "the fields contradict each other", {FAULTS: found})
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -35,6 +88,10 @@ class Strict(BaseModel):
         if not isinstance(given, dict):
             return given
         return {**given, **{name: _whole(given[name]) for name in _whole_fields(cls) if name in given}}
+
+
+def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer: str = "") -> InvalidInput:
+    return InvalidInput.of(faults_of(error.errors(include_url=False), value, model, pointer))
 
 
 @cache
@@ -53,7 +110,9 @@ def _kinds(annotation: Any) -> Iterator[Any]:
 def _whole(value: Any) -> Any:
     if isinstance(value, list):
         return [_whole(item) for item in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
+    if isinstance(value, float):
+        return int(value) if value.is_integer() else value
+    return value if isinstance(value, bool) or not isinstance(value, Integral) else int(value)  # numpy's own
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
