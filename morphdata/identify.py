@@ -186,9 +186,9 @@ class Search(SwarmSearch):
     method: Annotated[Method, Option("--method", SEARCH)] = Field(
         default="hybrid", description="How the parameters are searched."
     )
-    particles: Annotated[
-        Annotated[int, Field(ge=1, le=100_000)] | None, Option("--particles", SEARCH)
-    ] = Field(default=None, description="Size of the swarm, or candidates of the other methods.")
+    particles: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, Option("--particles", SEARCH)] = (
+        Field(default=None, description="Size of the swarm, or candidates of the other methods.")
+    )
     generations: Annotated[
         Annotated[int, Field(ge=1, le=100_000)] | None, Option("--generations", SEARCH)
     ] = Field(default=None, description="Generations of the swarm, or iterations of the other methods.")

@@ -48,9 +48,7 @@ class Morph(Document):
     final_rad: Annotated[Angle, Option("--final", MORPH)] = Field(
         description="Sweep at the end of the morph, rad."
     )
-    duration_s: Annotated[
-        float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)
-    ] = Field(
+    duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)] = Field(
         description="Time that the morph takes, s; of the goals `minimum_time` and `pareto` the longest that "
         "is looked at."
     )
@@ -60,9 +58,7 @@ class Morph(Document):
         le=20,
         description="Of the spline, both ends included; the times between are searched.",
     )
-    settle_s: Annotated[
-        float, Field(ge=0.0, le=LONGEST_MORPH_S), Option("--settle", MORPH)
-    ] = Field(
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S), Option("--settle", MORPH)] = Field(
         default=2.0,
         description="How long after `duration_s` the attitude still counts, of shorter morphs too.",
     )
@@ -126,7 +122,8 @@ class Limits(Document):
     max_hinge_torque_nm: Annotated[
         Annotated[float, Field(gt=0.0, le=1e9)] | None, Option("--torque-limit", LIMITS)
     ] = Field(
-        default=None, description="Largest torque of any hinge's motor, N m, in the model that is searched with."
+        default=None,
+        description="Largest torque of any hinge's motor, N m, in the model that is searched with.",
     )
 
     def shortest_morph_s(self, change_rad: float) -> float:
@@ -168,12 +165,12 @@ class ScheduleSearch(SwarmSearch):
     method: Annotated[Literal["hybrid", "pso"], Option("--method", SEARCH)] = Field(
         default="hybrid", description="How the schedule is searched."
     )
-    particles: Annotated[
-        Annotated[int, Field(ge=1, le=10_000)] | None, Option("--particles", SEARCH)
-    ] = Field(default=None, description="Size of the swarm, or schedules among which `hybrid` starts.")
-    generations: Annotated[
-        Annotated[int, Field(ge=1, le=10_000)] | None, Option("--generations", SEARCH)
-    ] = Field(default=None, description="Generations of the swarm, or iterations of `hybrid`.")
+    particles: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--particles", SEARCH)] = (
+        Field(default=None, description="Size of the swarm, or schedules among which `hybrid` starts.")
+    )
+    generations: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--generations", SEARCH)] = (
+        Field(default=None, description="Generations of the swarm, or iterations of `hybrid`.")
+    )
     preset: Annotated[Literal["paper"] | None, Option("--preset", SEARCH)] = Field(
         default=None, description="`paper`: a swarm of 50 particles, c1 = c2 = 1, as published."
     )

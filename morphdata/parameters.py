@@ -101,3 +101,23 @@ class KnownModel(Document):
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=OWN_OR_CHOSEN)
     start: Start | None = None
+
+    @property
+    def known(self) -> Parameters | None:
+        """The parameters, also those of a whole result; None where only an id is given."""
+        return self.parameters.model if isinstance(self.parameters, WholeResult) else self.parameters
+
+    @property
+    def flown_lattice(self) -> Lattice | None:
+        """The lattice to fly with: given here, else that of the identification."""
+        return self.lattice or (self.known.lattice if self.known else None)
+
+    @property
+    def flown_step_s(self) -> float | None:
+        """The longest time step to fly with, s: given here, else that of the identification."""
+        return self.step_s or (self.known.step_s if self.known else None)
+
+    @property
+    def flown_start(self) -> Start | None:
+        """Where to start: given here, else as the identification did."""
+        return self.start or (self.known.start if self.known else None)

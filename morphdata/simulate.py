@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document
-from morphdata.execution import Execution
+from morphdata.execution import Request
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.parameters import KnownModel
@@ -89,7 +89,7 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 }
 
 
-class SimulateRequest(Document):
+class SimulateRequest(Request):
     """Aircraft, flight condition, a model, and what the hinges do."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
@@ -103,7 +103,6 @@ class SimulateRequest(Document):
         default=0.01, description="Between the rows of the trajectory."
     )
     environment: Environment | None = None
-    execution: Execution = Execution()
 
 
 class FlightCost(BaseModel):

@@ -9,4 +9,4 @@ from morphdata.operations import OPERATIONS
 if TYPE_CHECKING:
     JobResult = Any
 else:
-    JobResult = Union[tuple(operation.result for operation in OPERATIONS)]
+    JobResult = Union[tuple(operation.result for operation in OPERATIONS)]  # noqa: UP007 - of a list

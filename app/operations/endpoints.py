@@ -52,7 +52,7 @@ def _add(operation: Operation[Any]) -> None:
             f"{name.capitalize()}Validation",
             __base__=Validation,
             __doc__="The request is valid.",
-            operation=(Literal[name], name),
+            operation=(Literal[name], name),  # type: ignore[arg-type]  # each its own
             cost=(operation.cost_model, ...),
         ),
         responses=documented(*BODY_ERRORS),

@@ -52,7 +52,8 @@ def resolved(session: Session, owner: str, request: Asked) -> Asked:
     if not found:
         return request
     _require_rows(session, owner, [item for item in found if item.field == "trajectory_id"], request)
-    document, faults = request.document(), []
+    document = request.document()
+    faults: list[Fault] = []
     for item in found:
         try:
             _put(document, item, RESOLVERS[item.field](session, owner, item))
@@ -113,7 +114,9 @@ def _require_rows(session: Session, owner: str, uploads: list[Reference], reques
         for item in uploads
         if item.id not in rows
     ]
-    inline = sum(len(sample.time_s) for sample in getattr(request, "samples", []) if hasattr(sample, "time_s"))
+    inline = sum(
+        len(sample.time_s) for sample in getattr(request, "samples", []) if hasattr(sample, "time_s")
+    )
     faults += total_rows_faults(inline + sum(rows.get(item.id, 0) for item in uploads))
     if faults:
         raise InvalidInput.of(faults)

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from morphdata.identify import CostEstimate, IdentifyRequest, IdentifyResult, SamplesRequest, Search, SoughtModel
+from morphdata.identify import (
+    CostEstimate,
+    IdentifyRequest,
+    IdentifyResult,
+    SamplesRequest,
+    Search,
+    SoughtModel,
+)
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
 

@@ -41,8 +41,8 @@ OPTIMIZE = Operation(
     help="Searches the morph schedule that disturbs the attitude least.",
     noun="an optimisation",
     title="Find the morph schedule that disturbs the attitude least",
-    description="The schedule found with the equivalent model is compared with the constant rate and with the "
-    "one found with the rigid model, all three flown in every model.",
+    description="The schedule found with the equivalent model is compared with the constant rate and with "
+    "the one found with the rigid model, all three flown in every model.",
     request=OptimizeRequest,
     result=OptimizeResult,
     cost_model=ScheduleCost,

@@ -34,8 +34,8 @@ STUDY = Operation(
     help="Does so for several numbers of links per wing and recommends one.",
     noun="a study",
     title="Compare models of several sizes",
-    description="A model is identified for every number of links per wing from the same samples; accuracy and "
-    "cost of each are reported, and one is recommended. The recommended model becomes one of yours: see "
+    description="A model is identified for every number of links per wing from the same samples; accuracy "
+    "and cost of each are reported, and one is recommended. The recommended model becomes one of yours: see "
     "`model_id` of the job.",
     request=StudyRequest,
     result=StudyResult,

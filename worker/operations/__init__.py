@@ -1,8 +1,8 @@
 """The work of the operations: what each has to offer a worker, and where it begins.
 
-The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported on
-first use, so that the pool's parent process never loads the compiler; for the same reason such modules translate
-the library's errors.
+The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported
+on first use, so that the pool's parent process never loads the compiler; for the same reason such modules
+translate the library's errors.
 """
 
 from __future__ import annotations
