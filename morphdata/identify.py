@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -15,7 +15,7 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import Lattice, Start, StepS
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
-from morphdata.parameters import MAX_LINKS, WholeResult
+from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
 from morphdata.vehicle import flexible_wing_faults, hinge_ranges, vehicle_faults
@@ -245,10 +245,9 @@ class SamplesRequest(Request):
         """Check aircraft, flight and samples together."""
         yield from vehicle_faults(self.aircraft, self.flight, start=self.model.start)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
-        yield from self._role_faults()
+        yield from samples_faults(self.samples)
         samples = self.inline_samples()
         yield from total_rows_faults(sum(len(sample.time_s) for sample in samples.values()))
-        yield from _name_faults(samples)
         hinges = hinge_ranges(self.aircraft)
         for number, sample in samples.items():
             for side, hinge in hinges.items():
@@ -256,15 +255,6 @@ class SamplesRequest(Request):
                 pointer = f"/samples/{number}/sweep_{side}_rad"
                 faults = (hinge.fault(side, angle, f"{pointer}/{row}") for row, angle in enumerate(column))
                 yield from (fault for fault in (next(filter(None, faults), None),) if fault is not None)
-
-    def _role_faults(self) -> Iterator[Fault]:
-        if all(sample.role != "train" for sample in self.samples):
-            yield Fault(
-                "no_training_sample",
-                "Every sample is held out.",
-                "/samples/0/role",
-                'Give at least one sample the role "train".',
-            )
 
 
 def total_rows_faults(total: int) -> Iterator[Fault]:
@@ -278,9 +268,33 @@ def total_rows_faults(total: int) -> Iterator[Fault]:
         )
 
 
-def _name_faults(samples: dict[int, InlineSample]) -> Iterator[Fault]:
+class Named(Protocol):
+    """A sample flight as far as others must be told apart from it."""
+
+    @property
+    def name(self) -> str | None:
+        """Its name; None for that of the uploaded flight."""
+        ...
+
+    @property
+    def role(self) -> str:
+        """``train`` or ``held_out``."""
+        ...
+
+
+def samples_faults(samples: Sequence[Named]) -> Iterator[Fault]:
+    """Check that something can be fitted, and that every sample has a name of its own."""
+    if all(sample.role != "train" for sample in samples):
+        yield Fault(
+            "no_training_sample",
+            "Every sample is held out.",
+            "/samples/0/role",
+            'Give at least one sample the role "train".',
+        )
     names: dict[str, int] = {}
-    for number, sample in samples.items():
+    for number, sample in enumerate(samples):
+        if sample.name is None:
+            continue
         if sample.name in names:
             yield Fault(
                 "name_not_unique",
@@ -304,10 +318,9 @@ class IdentifyRequest(SamplesRequest):
         """Check what belongs together, and that the model to begin from has the form that is searched."""
         yield from super().faults()
         warm_start = self.search.warm_start
-        known = None if warm_start is None else warm_start.parameters
+        known = None if warm_start is None else parameters_in(warm_start.parameters)
         if known is None:
             return
-        known = known.model if isinstance(known, WholeResult) else known
         at, links = "/search/warm_start/parameters", self.model.links_per_wing
         if known.links_per_wing != links:
             yield Fault(

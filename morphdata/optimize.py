@@ -30,6 +30,7 @@ SCREEN, DESCENT_STARTS, DESCENT_ITERATIONS = 16, 3, 8
 SEARCHES = 2  # with the rigid model too
 DURATIONS_TRIED = 10  # on the way to the shortest
 
+Verify = Literal["flexible", "none"]
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
@@ -159,6 +160,17 @@ class Weights(Document):
             yield Fault("weights_all_zero", "No angle counts.", hint="Give one of them a weight.")
 
 
+def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
+    """Check that a goal that seeks a duration has a shortest one."""
+    if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
+        yield Fault(
+            "missing",
+            f"Without a limit the goal {morph.goal!r} has no shortest duration.",
+            "/limits",
+            "Give max_rate_rad_s or max_accel_rad_s2.",
+        )
+
+
 class ScheduleSearch(SwarmSearch):
     """How the schedule is searched; what is left out depends on the method."""
 
@@ -210,7 +222,7 @@ class OptimizeRequest(Request):
         default=Weights(), description="Weights of roll, pitch and yaw in the variation."
     )
     search: ScheduleSearch = ScheduleSearch()
-    verify: Annotated[Literal["flexible", "none"], Option("--verify", MODEL)] = Field(
+    verify: Annotated[Verify, Option("--verify", MODEL)] = Field(
         default="flexible", description="Fly the schedules again in the flexible model: minutes."
     )
     flexible: VerifyingModel = VerifyingModel()
@@ -268,13 +280,7 @@ class OptimizeRequest(Request):
                 "/morph/duration_s",
                 f"Give more than {least_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
             )
-        if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
-            yield Fault(
-                "missing",
-                f"Without a limit the goal {morph.goal!r} has no shortest duration.",
-                "/limits",
-                "Give max_rate_rad_s or max_accel_rad_s2.",
-            )
+        yield from goal_faults(morph, limits)
 
 
 class ScheduleCost(BaseModel):

@@ -84,6 +84,11 @@ GivenParameters = Annotated[
 ]
 
 
+def parameters_in(given: Parameters | WholeResult | None) -> Parameters | None:
+    """Return the parameters themselves, also of a whole result."""
+    return given.model if isinstance(given, WholeResult) else given
+
+
 class KnownModel(Document):
     """An equivalent model by its parameters, or by the id of an identified one.
 
@@ -105,7 +110,7 @@ class KnownModel(Document):
     @property
     def known(self) -> Parameters | None:
         """The parameters, also those of a whole result; None where only an id is given."""
-        return self.parameters.model if isinstance(self.parameters, WholeResult) else self.parameters
+        return parameters_in(self.parameters)
 
     @property
     def flown_lattice(self) -> Lattice | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -61,3 +61,8 @@ class SwarmSearch(Document):
     max_seconds: Annotated[
         Annotated[float, Field(gt=0.0, le=WEEK_S)] | None, Option("--max-seconds", SEARCH)
     ] = Field(default=None, description="Time budget of the search; the best so far is the result.")
+
+    def swarm_settings(self) -> dict[str, Any]:
+        """Collect what is said about the swarm: size, generations, pulls, inertia."""
+        names = {"particles", "generations", "c1", "c2", "inertia"}
+        return self.model_dump(include=names, exclude_none=True)
