@@ -229,8 +229,8 @@ EXAMPLE_REQUEST: dict[str, Any] = {
 class SamplesRequest(Request):
     """A request to fit models to sample flights."""
 
-    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)]
-    flight: Annotated[Flight, Option("--flight", VEHICLE)]
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SoughtModel
     search: Search = Search()

@@ -213,8 +213,8 @@ class OptimizeRequest(Request):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_OPTIMIZATION]})
 
-    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)]
-    flight: Annotated[Flight, Option("--flight", VEHICLE)]
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     model: SearchedModel
     morph: Morph
     limits: Limits = Limits()

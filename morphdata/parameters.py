@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from morphdata.base import Document, Identifier
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
+from morphdata.options import MODEL, Option
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -95,17 +96,19 @@ class KnownModel(Document):
     Lattice, step and start are those it was identified with where they are left out.
     """
 
-    parameters: GivenParameters | None = Field(
+    parameters: Annotated[GivenParameters | None, Option("--parameters", MODEL)] = Field(
         default=None, description="The `model` of an identification's result, or the whole result."
     )
-    model_id: Identifier | None = Field(
+    model_id: Annotated[Identifier | None, Option("--model-id", MODEL)] = Field(
         default=None,
         description="Instead of `parameters`: an identified model, see GET /models.",
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=OWN_OR_CHOSEN)
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
     @property
     def known(self) -> Parameters | None:
