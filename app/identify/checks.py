@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from app.trajectories.checks import columns_faults
 from morphdata.faults import Fault
 from morphdata.identify import Bounds, SamplesRequest
 from morphdata.samples import InlineSample
-from morphdata.vehicle import HingeRange, flexible_wing_faults, hinge_ranges, vehicle_faults
+from morphdata.vehicle import HingeRange, flexible_wing_faults, hinge_ranges, start_faults
 
 MAX_TOTAL_ROWS = 200_000
 MAX_DECADES = 12.0  # of a stiffness range: more is no knowledge at all, and spoils a logarithmic search
@@ -35,7 +34,7 @@ def samples_request_faults(request: SamplesRequest, samples: Sequence[InlineSamp
     """
     model = request.model
     faults = [
-        *vehicle_faults(request.aircraft, request.flight, start=model.start),
+        *start_faults(request.flight, model.start),
         *flexible_wing_faults(request.aircraft, "nothing_to_identify"),
         *_bounds_faults(model.bounds),
         *_together_faults(samples),
@@ -45,7 +44,6 @@ def samples_request_faults(request: SamplesRequest, samples: Sequence[InlineSamp
     ]
     hinges = hinge_ranges(request.aircraft)
     for number, sample in enumerate(samples):
-        faults += columns_faults(sample, f"/samples/{number}")
         faults += _sweep_faults(sample, f"/samples/{number}", hinges)
     return faults
 

@@ -10,12 +10,11 @@ from app.errors import InvalidRequest, JobNotFound, ModelNotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
-from app.models.checks import known_model_faults
 from app.models.left_models import left_model
 from app.models.service import as_given
 from morphdata.faults import Fault
 from morphdata.identify import IdentifyRequest
-from morphdata.parameters import KnownModel, WholeResult
+from morphdata.parameters import WholeResult
 from morphdata.search import WarmStart
 
 POINTER = "/search/warm_start"
@@ -55,9 +54,6 @@ def _parameters(session: Session, owner: str, warm_start: WarmStart) -> Document
         return as_given(document["model"])
     if warm_start.job_id is not None:
         return _of_job(session, owner, warm_start.job_id)
-    faults = known_model_faults(KnownModel(parameters=warm_start.parameters), POINTER)
-    if faults:
-        raise InvalidRequest.of(faults)
     given = warm_start.parameters
     model = given.model if isinstance(given, WholeResult) else given
     return {} if model is None else model.model_dump(exclude_none=True)

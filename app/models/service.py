@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import ValidationError
-
 from app.database import Session
 from app.documents import Document
 from app.errors import InvalidRequest, ModelNotFound
 from app.models import repository
-from app.models.checks import known_model_faults
 from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
-from morphdata.faults import Fault
-from morphdata.parameters import KnownModel, Parameters, WholeResult
+from morphdata.faults import Fault, InvalidInput
+from morphdata.parameters import KnownModel, Parameters
 
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
 
@@ -47,11 +44,8 @@ def known_model(session: Session, owner: str, model: KnownModel, pointer: str = 
     Raises
     ------
     InvalidRequest
-        The owner has no such model, or the parameters do not fit together.
+        The owner has no such model.
     """
-    faults = known_model_faults(model, pointer)
-    if faults:
-        raise InvalidRequest.of(faults)
     parameters = _parameters(session, owner, model, f"{pointer}/model_id")
     chosen = model.model_dump(include=set(HOW_IDENTIFIED), exclude_none=True)
     identified = {name: parameters[name] for name in HOW_IDENTIFIED if parameters.get(name) is not None}
@@ -65,16 +59,15 @@ def as_given(model: Document) -> Document:
     that no request could hold any more, of an earlier version say, stays as it is.
     """
     try:
-        return Parameters.model_validate(model).model_dump(exclude_none=True)
-    except ValidationError:
+        return Parameters.parse(model).model_dump(exclude_none=True)
+    except InvalidInput:
         return model
 
 
 def _parameters(session: Session, owner: str, model: KnownModel, pointer: str) -> Document:
     """Find the parameters: in the request, or in the owner's identified model."""
-    given = model.parameters
-    if given is not None:
-        return (given.model if isinstance(given, WholeResult) else given).model_dump(exclude_none=True)
+    if model.known is not None:
+        return model.known.model_dump(exclude_none=True)
     try:
         _, document = repository.get_model(session, owner, model.model_id or "")
     except ModelNotFound as error:

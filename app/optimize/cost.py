@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from app.simulate.cost import DEFAULT_STEP_S, STEP_CORE_S
+from app.simulate.cost import STEP_CORE_S
 from morphdata.optimize import OptimizeRequest, ScheduleCost
+from morphdata.simulate import DEFAULT_STEP_S
 
 # nominal figures, to an order of magnitude: what a request does not say is the solver's choice
 SWARM_PARTICLES, SWARM_GENERATIONS = 50, 100

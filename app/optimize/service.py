@@ -9,7 +9,7 @@ from app.models.service import known_model
 from app.optimize.checks import morph_faults, work_faults
 from app.optimize.cost import estimate
 from morphdata.optimize import OptimizeRequest, ScheduleCost
-from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
+from morphdata.vehicle import flexible_wing_faults, start_faults, vehicle_document
 
 REPORT_TIME_S = 1800.0  # after the search's own time budget: flights of the flexible model, plots
 
@@ -25,7 +25,7 @@ def prepare(session: Session, owner: str, request: OptimizeRequest) -> Order[Sch
     model = known_model(session, owner, request.model)
     cost = estimate(request)
     faults = [
-        *vehicle_faults(request.aircraft, request.flight, start=model.get("start")),
+        *start_faults(request.flight, model.get("start")),
         *flexible_wing_faults(request.aircraft, "nothing_to_bend"),
         *morph_faults(request),
         *work_faults(cost.flights),

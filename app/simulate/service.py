@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from app.database import Session
 from app.documents import Document
-from app.errors import InvalidRequest
 from app.jobs.submission import Order
 from app.models.service import known_model
-from app.simulate.checks import air_faults, schedules_faults, size_faults
 from app.simulate.cost import estimate
 from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest
-from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
+from morphdata.vehicle import vehicle_document
 
 
 def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[FlightCost]:
@@ -18,37 +16,28 @@ def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[Fli
 
     Raises
     ------
-    InvalidRequest
+    InvalidInput
         Naming every fault.
     """
     model = _model_document(session, owner, request)
-    step_s = model.get("step_s")
-    faults = [
-        *vehicle_faults(request.aircraft, request.flight, start=model.get("start")),
-        *schedules_faults(request),
-        *air_faults(request),
-        *size_faults(request, step_s),
-    ]
-    if request.model.kind != "rigid":
-        faults += flexible_wing_faults(request.aircraft, "nothing_to_bend")
-    if faults:
-        raise InvalidRequest.of(faults)
+    document = {
+        **vehicle_document(request.aircraft, request.flight),
+        **request.model_dump(
+            include={"schedules", "duration_s", "output_step_s", "environment"}, exclude_none=True
+        ),
+        "model": model,
+    }
+    resolved = SimulateRequest.parse(document)  # a model that was named by its id may ask for more
     return Order(
         operation="simulate",
-        document={
-            **vehicle_document(request.aircraft, request.flight),
-            **request.model_dump(
-                include={"schedules", "duration_s", "output_step_s", "environment"}, exclude_none=True
-            ),
-            "model": model,
-        },
+        document=document,
         summary={
             "aircraft": request.aircraft.name,
             "model": request.model.kind,
             "links_per_wing": model.get("parameters", {}).get("links_per_wing"),
             "duration_s": request.duration_s,
         },
-        cost=estimate(request, step_s),
+        cost=estimate(resolved),
     )
 
 
