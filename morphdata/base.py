@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cache
 from numbers import Integral
@@ -83,11 +84,14 @@ class Document(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _whole_numbers(cls, given: Any) -> Any:
-        """Take 3.0 where a whole number is wanted: JSON Schema makes no difference."""
+    def _plain_values(cls, given: Any) -> Any:
+        """Take 3.0 where a whole number is wanted, as JSON Schema does; tuples and arrays for lists."""
         if not isinstance(given, dict):
             return given
-        return {**given, **{name: _whole(given[name]) for name in _whole_fields(cls) if name in given}}
+        whole = _whole_fields(cls)
+        return {
+            name: _whole(_listed(value)) if name in whole else _listed(value) for name, value in given.items()
+        }
 
 
 def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer: str = "") -> InvalidInput:
@@ -107,6 +111,11 @@ def _kinds(annotation: Any) -> Iterator[Any]:
         yield from _kinds(part)
 
 
+def _listed(value: Any) -> Any:
+    """Return what Python code gives for a list, a tuple or an array of numpy, as a list."""
+    return list(value) if isinstance(value, tuple) else value.tolist() if hasattr(value, "tolist") else value
+
+
 def _whole(value: Any) -> Any:
     if isinstance(value, list):
         return [_whole(item) for item in value]
@@ -117,7 +126,7 @@ def _whole(value: Any) -> Any:
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
-Angle = Annotated[float, Field(ge=-3.2, le=3.2)]
+Angle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
 Vector3 = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
 Position = Annotated[list[Annotated[float, Field(ge=-1000.0, le=1000.0)]], Field(min_length=3, max_length=3)]
 SampleName = Annotated[str, Field(pattern=SAMPLE_NAME_PATTERN)]

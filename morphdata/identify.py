@@ -18,7 +18,7 @@ from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, vehicle_faults
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
@@ -243,7 +243,7 @@ class SamplesRequest(Request):
 
     def faults(self) -> Iterator[Fault]:
         """Check aircraft, flight and samples together."""
-        yield from vehicle_faults(self.aircraft, self.flight, start=self.model.start)
+        yield from start_faults(self.flight, self.model.start)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
         yield from samples_faults(self.samples)
         samples = self.inline_samples()

@@ -15,10 +15,10 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
-from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel
+from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
 from morphdata.simulate import MAX_ELEMENTS
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, vehicle_faults
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
@@ -246,7 +246,7 @@ class OptimizeRequest(Request):
 
     def faults(self) -> Iterator[Fault]:
         """Check aircraft, model and morph together, and the size of the search."""
-        yield from vehicle_faults(self.aircraft, self.flight, start=self.model.flown_start)
+        yield from start_faults(self.flight, flown_with(self.model).start)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         yield from self._hinge_faults()
         yield from self._time_faults()

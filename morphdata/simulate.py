@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.base import Document
+from morphdata.base import MAX_ROWS, MIN_ROWS, Document
+from morphdata.environment import Environment
 from morphdata.execution import Request
+from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
-from morphdata.parameters import KnownModel
-from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
-from morphdata.search import MAX_SEED
+from morphdata.parameters import KnownModel, flown_with
+from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
 from morphdata.warnings import Warnings
 
 MAX_ELEMENTS = 100
-
-GustSpeed = Annotated[float, Field(ge=-100.0, le=100.0)]
-Direction = Annotated[
-    list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=3, max_length=3)
-]  # of any length
+MAX_STEPS = {
+    "rigid": 1_200_000,
+    "equivalent": 1_200_000,
+    "flexible": 60_000,
+}  # about ten minutes of computing
+DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}
+ROUND_OFF = 1e-9  # of a number of rows or steps
 
 
 class RigidModel(Document):
@@ -59,34 +65,6 @@ class FlexibleModel(Document):
 FlightModel = Annotated[RigidModel | EquivalentFlightModel | FlexibleModel, Field(discriminator="kind")]
 
 
-class Gust(Document):
-    """A gust of the shape 1 - cos (EASA CS-25.341): frozen in the air that the aircraft crosses."""
-
-    amplitude_m_s: GustSpeed
-    gradient_m: Annotated[float, Field(gt=0.0, le=1e4)] = Field(description="From the edge to the peak.")
-    start_s: Moment = Field(default=0.0, description="When the aircraft meets the edge.")
-    direction_n: Direction = Field(default=[0.0, 0.0, -1.0], description="Earth axes (NED); up by default.")
-
-
-class Turbulence(Document):
-    """Dryden turbulence (MIL-F-8785C)."""
-
-    wind_20ft_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        default=0.0, description="Mean wind at 20 ft, which rules low altitudes: 7.7 is light, 15.4 moderate."
-    )
-    sigma_high_m_s: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
-        default=0.0, description="Standard deviation above 2000 ft."
-    )
-
-
-class Environment(Document):
-    """Gust and turbulence on top of the flight's uniform wind."""
-
-    gust: Gust | None = None
-    turbulence: Turbulence | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
-
-
 EXAMPLE_SIMULATION: dict[str, Any] = {
     "aircraft": EXAMPLE_AIRCRAFT,
     "flight": EXAMPLE_FLIGHT,
@@ -112,6 +90,39 @@ class SimulateRequest(Request):
     environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
         default=None, description="Gust and turbulence; still air without."
     )
+
+    @property
+    def rows(self) -> int:
+        """Rows of the trajectory."""
+        return int(self.duration_s / self.output_step_s + ROUND_OFF) + 1
+
+    @property
+    def steps(self) -> int:
+        """Time steps: a whole number of them between two rows, none longer than the model's."""
+        longest_s = flown_with(self.model).step_s or DEFAULT_STEP_S[self.model.kind]
+        return math.ceil(self.output_step_s / longest_s - ROUND_OFF) * (self.rows - 1)
+
+    def faults(self) -> Iterator[Fault]:
+        """The flight can begin, its hinges stay in range, it is neither too short nor too long."""
+        yield from start_faults(self.flight, flown_with(self.model).start)
+        for fault in self.schedules.range_faults(hinge_ranges(self.aircraft)):
+            yield fault.under("/schedules")
+        if not MIN_ROWS <= self.rows <= MAX_ROWS:
+            yield Fault(
+                "too_many_rows" if self.rows > MAX_ROWS else "too_few_rows",
+                f"{self.duration_s:g} s in steps of {self.output_step_s:g} s make {self.rows} rows.",
+                "/output_step_s",
+                f"Choose duration_s and output_step_s for {MIN_ROWS} to {MAX_ROWS} rows.",
+            )
+        if self.steps > MAX_STEPS[self.model.kind]:
+            yield Fault(
+                "too_much_work",
+                f"The flight takes {self.steps} time steps of the {self.model.kind} model.",
+                "/duration_s",
+                f"At most {MAX_STEPS[self.model.kind]}: fly shorter, or choose a longer model.step_s.",
+            )
+        if self.model.kind != "rigid":
+            yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
 
 
 class FlightCost(BaseModel):

@@ -80,9 +80,9 @@ async def upload_trajectory(
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
     kind = media_type(request)
     if kind == "multipart/form-data":
-        upload, pointer = await _from_form(request, app, caller.owner), "/file"
+        upload = await _from_form(request, app, caller.owner)
     elif is_json(kind):
-        upload, pointer = TrajectoryUpload.parse(await json_document(request)), ""
+        upload = TrajectoryUpload.parse(await json_document(request))
     else:
         raise UnsupportedMediaType(
             f"The body is announced as {kind[:60] or 'nothing'!r}.",
@@ -94,7 +94,7 @@ async def upload_trajectory(
 
     def store() -> repository.StoredTrajectory:
         with app.database.write() as session:
-            return service.store_trajectory(session, caller, upload, pointer)
+            return service.store_trajectory(session, caller, upload)
 
     stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"

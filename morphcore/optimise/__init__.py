@@ -18,6 +18,7 @@ from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.optimize import Limits, Morph, OptimizeRequest, Verify, Weights
+from morphdata.parameters import flown_with
 
 __all__ = [
     "FlexibleSettings",
@@ -90,7 +91,7 @@ def optimisation_from_request(request: OptimizeRequest, threads: int | None = No
     if threads is not None:
         use_threads(threads)
     given, model = request.document(), request.model
-    lattice = model.flown_lattice
+    flown = flown_with(model)
     return ScheduleOptimisation(
         aircraft_from_document(given["aircraft"]),
         flight_from_document(given["flight"]),
@@ -101,9 +102,7 @@ def optimisation_from_request(request: OptimizeRequest, threads: int | None = No
         search=schedule_search(request.search),
         verify=request.verify,
         flexible=flexible_settings(request.flexible),
-        lattice=DEFAULT_LATTICE
-        if lattice is None
-        else lattice_settings(lattice.model_dump(exclude_none=True)),
-        start=model.flown_start or "trim",
-        step_s=model.flown_step_s,
+        lattice=lattice_settings(flown.lattice.model_dump(exclude_none=True)),
+        start=flown.start,
+        step_s=flown.step_s,
     )

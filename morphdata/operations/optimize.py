@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from morphdata.operations.descriptor import Operation, after_budget
-from morphdata.operations.simulate import DEFAULT_STEP_S, STEP_CORE_S
+from morphdata.operations.simulate import STEP_CORE_S
 from morphdata.optimize import OptimizeRequest, OptimizeResult, ScheduleCost
+from morphdata.simulate import DEFAULT_STEP_S
 
 REAL_TIME_FACTOR = 150.0  # on one core: every flight has a schedule, and so a lattice over time, of its own
 COMPARED_SCHEDULES = 3  # constant rate and both optima

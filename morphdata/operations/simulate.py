@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from morphdata.operations.descriptor import Operation
 from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest, SimulateResult
 
 # nominal figures, to an order of magnitude, of a flight alone on one core
-DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}
 STEP_CORE_S = {"rigid": 5e-5, "equivalent": 1e-4, "flexible": 2e-3}
 START_CORE_S = 1.0  # trim, the lattice along the morph, tables and plots
 
 
-def row_count(request: SimulateRequest) -> int:
-    """Rows of the trajectory."""
-    return int(request.duration_s / request.output_step_s + 1e-9) + 1
-
-
-def step_count(request: SimulateRequest) -> int:
-    """Time steps: a whole number of them between two rows, none longer than the model's step."""
-    model = request.model
-    given_s = model.flown_step_s if isinstance(model, EquivalentFlightModel) else model.step_s
-    longest_s = DEFAULT_STEP_S[model.kind] if given_s is None else given_s
-    return math.ceil(request.output_step_s / longest_s - 1e-9) * (row_count(request) - 1)
-
-
 def _cost(request: SimulateRequest) -> FlightCost:
-    steps = step_count(request)
     return FlightCost(
-        rows=row_count(request),
-        steps=steps,
+        rows=request.rows,
+        steps=request.steps,
         flight_s=request.duration_s,
-        core_s=START_CORE_S + steps * STEP_CORE_S[request.model.kind],
+        core_s=START_CORE_S + request.steps * STEP_CORE_S[request.model.kind],
     )
 
 

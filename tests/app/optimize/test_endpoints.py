@@ -18,7 +18,7 @@ BAD_FIELDS = [
     ("/morph/final_rad", 0.0, None, "nothing_to_morph", "another"),
     ("/morph/final_rad", 1.4, None, "sweep_out_of_range", "-1.3 to 1.3"),
     ("/morph/initial_rad", -1.4, None, "sweep_out_of_range", "-1.3 to 1.3"),
-    ("/morph/final_rad", 57.0, None, "less_than_equal", "at most 3.2"),
+    ("/morph/final_rad", 57.0, None, "less_than_equal", "at most 3.14"),
     ("/morph/duration_s", 1.0, None, "morph_too_short", "more than 1 s"),
     ("/morph/duration_s", 0.7, None, "morph_too_short", "max_rate_rad_s"),
     ("/limits/max_accel_rad_s2", 0.5, "/morph/duration_s", "morph_too_short", "2.828"),
@@ -40,7 +40,7 @@ BAD_FIELDS = [
     ("/model", {"model_id": "model_none"}, "/model/model_id", "model_not_found", "GET /models"),
     ("/model/parameters/links_per_wing", 4, "/model/parameters/division", "wrong_shape", "result"),
     ("/model/step_s", 0.02, None, "less_than_equal", "at most 0.01"),
-    ("/model/kind", "equivalent", None, "unknown_field", "another object"),
+    ("/model/kind", "equivalent", None, "unknown_field", "Leave it out"),
 ]
 
 
