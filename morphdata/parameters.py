@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_serializer
 
 from morphdata.base import Document, Identifier
 from morphdata.faults import Fault
@@ -133,6 +133,10 @@ class WholeResult(Document):
     cost: Unread = None
     partial: Unread = None
     warnings: Unread = None
+
+    @model_serializer
+    def _only_the_model(self) -> Parameters:
+        return self.model
 
     def faults(self) -> Iterator[Fault]:
         """The model flies the samples that it was fitted to."""
