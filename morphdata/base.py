@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from functools import cache
 from numbers import Integral
+from pathlib import Path
 from typing import Annotated, Any, Self, get_args
 
 from pydantic import (
@@ -67,6 +69,27 @@ class Document(BaseModel):
             return cls.model_validate(value)
         except ValidationError as error:
             raise _refused(error, value, cls, pointer) from None
+
+    @classmethod
+    def load(cls, path: str | Path, pointer: str = "") -> Self:
+        """Read the document from a JSON file.
+
+        Raises
+        ------
+        InvalidInput
+            The file cannot be read, or naming every fault of the document.
+        """
+        try:
+            document = json.loads(Path(path).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InvalidInput(f"{path} does not exist", hint="check the path") from None
+        except OSError as error:
+            raise InvalidInput(f"{path} cannot be read: {error.strerror}", hint="check the path") from None
+        except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of absurd numbers
+            raise InvalidInput(f"{path} is not JSON: {error}", hint="see the examples") from None
+        if not isinstance(document, dict):
+            raise InvalidInput(f"{path} holds no JSON object", hint="see the examples")
+        return cls.parse(document, pointer)
 
     def faults(self) -> Iterator[Fault]:
         """Yield what is wrong across the fields, with pointers relative to this object.

@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore import Aircraft, Flight, Simulation, Trajectory, simulate
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore import Aircraft, Flight, Simulation, Trajectory
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.shown import Summary, brief
+from morphdata.lattice import Lattice
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 from tests.optimise.morphs import last, optimisation
+from tests.simulate.flights import fly
 
 MOST_LINES = 40
 WIDEST = 160
-COARSE = ModelSettings(links_per_wing=2, lattice=LatticeSettings(1, 4), step_s=0.01)
+COARSE = ModelSettings(links_per_wing=2, lattice=Lattice(chordwise=1, spanwise=4), step_s=0.01)
 FLIGHTS = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric", "held_out"), 60)]
 QUICK = SearchSettings(method="least_squares", iterations=1)
 
@@ -46,8 +47,12 @@ def optimised() -> Any:
 
 def flown() -> Simulation:
     """A flight."""
-    return simulate(
-        reference_aircraft(), reference_flight(), FLIGHTS[0], lattice=LatticeSettings(1, 4), step_s=0.01
+    return fly(
+        reference_aircraft(),
+        reference_flight(),
+        FLIGHTS[0],
+        lattice=Lattice(chordwise=1, spanwise=4),
+        step_s=0.01,
     )
 
 

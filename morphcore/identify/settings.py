@@ -9,13 +9,13 @@ from typing import Any, Literal
 from morphcore.errors import InvalidInput
 from morphcore.evolution import FEWEST, EvolutionSettings
 from morphcore.geometry.fields import Fields, WholeNumbers
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import BOUND_NAMES
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
 from morphcore.swarm import SwarmSettings
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
 
@@ -45,7 +45,7 @@ class ModelSettings(WholeNumbers):
     separate_wings: bool = False
     aero_coefficients: tuple[str, ...] | None = None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    lattice: LatticeSettings = DEFAULT_LATTICE
+    lattice: Lattice = DEFAULT_LATTICE
     step_s: float | None = None
     start: StartMode = "trim"
 
@@ -88,7 +88,7 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
         separate_wings=fields.flag("separate_wings", default=False),
         aero_coefficients=None if listed is None else tuple(listed),
         bounds=pairs,
-        lattice=lattice_settings(fields.raw("lattice", {}), f"{pointer}/lattice"),
+        lattice=Lattice.parse(fields.raw("lattice", {}), f"{pointer}/lattice"),
         step_s=fields.optional_number("step_s", least=SHORTEST_STEP_S, most=STEP_S),
         start=fields.choice("start", ("trim", "given")) if fields.has("start") else "trim",  # type: ignore[arg-type]
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import Fields
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters_document import parameters_from_document
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import (
@@ -25,10 +25,14 @@ from morphcore.optimise.settings import (
     schedule_search,
     weights_settings,
 )
-from morphcore.simulate.request import flown_model
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.optimize import SearchedModel
+from morphdata.parameters import flown_with
 
 __all__ = [
     "FlexibleSettings",
@@ -46,8 +50,8 @@ __all__ = [
 
 
 def optimise_schedule(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     model: ParameterBatch,
     *,
     morph: Morph,
@@ -55,7 +59,7 @@ def optimise_schedule(
     weights: Weights | None = None,
     search: ScheduleSearch | None = None,
     verify: Verify = "flexible",
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
 ) -> ScheduleResult:
     """Find the morph schedule that disturbs the attitude least, from start to end.
 
@@ -73,8 +77,8 @@ def optimise_schedule(
     trimmed.
     """
     run = ScheduleOptimisation(
-        aircraft,
-        flight,
+        Aircraft.of(aircraft),
+        Flight.of(flight),
         model,
         morph=morph,
         limits=limits,
@@ -101,14 +105,20 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
     if threads is not None:
         use_threads(threads)
     fields = Fields(document, "")
-    aircraft = aircraft_from_document(fields.raw("aircraft"))
-    flight = flight_from_document(fields.raw("flight"))
-    parameters = parameters_from_document(fields.child("model").raw("parameters"), "/model/parameters")
-    model = flown_model({"kind": "equivalent", **fields.raw("model")})
+    aircraft = Aircraft.of(AircraftDocument.parse(fields.raw("aircraft"), "/aircraft"))
+    flight = Flight.of(FlightDocument.parse(fields.raw("flight"), "/flight"))
+    given = SearchedModel.parse(fields.raw("model"), "/model")
+    if given.known is None:
+        raise InvalidInput(
+            "only a service knows a model by its id",
+            pointer="/model/model_id",
+            hint="give the model's parameters instead",
+        )
+    model = flown_with(given)
     run = ScheduleOptimisation(
         aircraft,
         flight,
-        parameters,
+        parameter_batch(given.known),
         morph=morph_settings(fields.raw("morph")),
         limits=limits_settings(fields.raw("limits", {})),
         weights=weights_settings(fields.raw("weights", {})),

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields, WholeNumbers
-from morphcore.geometry.lattice import LatticeSettings, lattice_settings
 from morphcore.swarm import SwarmSettings
+from morphdata.lattice import Lattice
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ class FlexibleSettings(WholeNumbers):
     """
 
     elements: int = DEFAULT_ELEMENTS
-    lattice: LatticeSettings | None = None
+    lattice: Lattice | None = None
 
 
 def morph_settings(document: dict[str, Any], pointer: str = "/morph") -> Morph:
@@ -190,9 +190,7 @@ def flexible_settings(document: dict[str, Any], pointer: str = "/flexible") -> F
     fields = Fields(document, pointer)
     settings = FlexibleSettings(
         elements=fields.whole("elements", default=DEFAULT_ELEMENTS, least=1, most=100),
-        lattice=lattice_settings(fields.raw("lattice"), f"{pointer}/lattice")
-        if fields.has("lattice")
-        else None,
+        lattice=Lattice.parse(fields.raw("lattice"), f"{pointer}/lattice") if fields.has("lattice") else None,
     )
     fields.done()
     return settings

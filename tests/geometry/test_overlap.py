@@ -97,7 +97,7 @@ def test_pairs_that_everybody_can_judge(changes: dict[str, Any], expected: bool)
 def test_a_wing_folded_through_a_tail_crosses_it() -> None:
     """A surface folded up by 80 degrees cuts another one above it, and meets none at its own root."""
     wing = example_aircraft().surfaces[0]
-    folding = replace(wing, hinge=replace(wing.hinge, axis="x"))
+    folding = replace(wing, hinge=wing.hinge.model_copy(update={"axis": "x"}))
     above = pair(folding, position_m=(0.0, 0.35, -1.0), hinge=None)
     assert overlap(above, 1.4, 0.0)
     assert not overlap(above, 0.0, 0.0)

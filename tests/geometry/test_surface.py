@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import quad
 
 from morphcore.frames import axis_rotation
-from morphcore.geometry.section import Material
-from morphcore.geometry.surface import Hinge, Surface
+from morphcore.geometry.surface import Surface
+from morphdata.aircraft import Hinge, Material
 
-WOOD = Material(500.0, 2.1e9, 0.3, 0.004)
+WOOD = Material(density_kg_m3=500.0, youngs_modulus_pa=2.1e9, poisson_ratio=0.3, stiffness_damping_s=0.004)
 SIDES: tuple[Literal["right", "left"], ...] = ("right", "left")
 
 
@@ -27,7 +27,7 @@ def surface(side: Literal["right", "left"], axis: Literal["x", "y", "z"]) -> Sur
         tip_chord_m=0.2,
         thickness_m=0.1,
         material=WOOD,
-        hinge=Hinge((0.0, 0.35, 0.0), axis),
+        hinge=Hinge(position_m=(0.0, 0.35, 0.0), axis=axis),
         position_m=(0.0, 0.35, 0.0),
         flexible=True,
     )
