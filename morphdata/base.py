@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
+import reprlib
 from collections.abc import Iterator
 from functools import cache
 from numbers import Integral
@@ -28,6 +30,7 @@ from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
 MAX_ROWS = MOST_ROWS  # of one sample
 MIN_ROWS = FEWEST_ROWS
+SHOWN_ITEMS = 4  # of a list, at a prompt
 LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 
 
@@ -98,6 +101,13 @@ class Document(BaseModel):
         """
         return iter(())
 
+    def __repr__(self) -> str:
+        """A few lines: names instead of objects, ends instead of long lists."""
+        return "\n  ".join([type(self).__name__, *(f"{name} = {_brief(value)}" for name, value in self)])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(repr(self))}</pre>"
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         found = tuple(self.faults())
@@ -115,6 +125,16 @@ class Document(BaseModel):
         return {
             name: _whole(_listed(value)) if name in whole else _listed(value) for name, value in given.items()
         }
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, Document):
+        return str(getattr(value, "name", type(value).__name__))
+    if isinstance(value, list) and len(value) > SHOWN_ITEMS:
+        return f"{len(value)} items from {_brief(value[0])} to {_brief(value[-1])}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_brief, value))}]"
+    return reprlib.repr(value)
 
 
 def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer: str = "") -> InvalidInput:

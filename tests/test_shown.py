@@ -14,7 +14,13 @@ from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.shown import Summary, brief
 from morphdata.lattice import Lattice
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
 from tests.optimise.morphs import last, optimisation
 from tests.simulate.flights import fly
 
@@ -105,7 +111,7 @@ def test_a_result_fits_a_screen(name: str) -> None:
 
 def test_what_goes_in_fits_a_screen() -> None:
     """Aircraft, flight and sample: names instead of numbers, ranges instead of columns."""
-    aircraft, flight, sample = reference_aircraft(), reference_flight(), example("rate_0.8")
+    (aircraft, flight), sample = reference_documents(), example("rate_0.8")
     for value, kind, word in (
         (aircraft, Aircraft, "right wing"),
         (flight, Flight, "150"),

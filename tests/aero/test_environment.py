@@ -18,7 +18,7 @@ def flight(altitude_m: float = 0.0, wind=(0.0, 0.0, 0.0)) -> Flight:
 
 def test_air_is_the_flights_wind_by_default():
     """Without gust and turbulence the air moves with the flight's uniform wind."""
-    velocity_N = air_velocity(flight(wind=(3.0, -1.0, 0.5)), [0.0, 0.3, 2.0])
+    velocity_N = air_velocity(Environment(), flight(wind=(3.0, -1.0, 0.5)), [0.0, 0.3, 2.0])
     np.testing.assert_array_equal(velocity_N, np.tile((3.0, -1.0, 0.5), (3, 1)))
 
 

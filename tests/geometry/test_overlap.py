@@ -62,7 +62,10 @@ def test_surfaces_in_one_plane_against_a_net_of_points() -> None:
     for _ in range(150):
         place = (rng.uniform(-0.6, 0.6), 0.35 + rng.uniform(-3.5, 3.5), rng.choice([0.0, 0.04, 0.3]))
         aircraft = pair(
-            wing, position_m=place, span_m=rng.uniform(0.5, 3.0), hinge=replace(wing.hinge, position_m=place)
+            wing,
+            position_m=place,
+            span_m=rng.uniform(0.5, 3.0),
+            hinge=wing.hinge.model_copy(update={"position_m": list(place)}),
         )
         one, other = aircraft.surfaces
         angles = (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
+from tests.models.chains import example_aircraft, example_flight
 
 DOCUMENT: dict[str, Any] = {
     "links_per_wing": 2,

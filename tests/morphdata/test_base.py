@@ -86,7 +86,7 @@ class _Outer(Document):
 
 
 def test_a_model_says_what_is_wrong_across_its_fields() -> None:
-    """Pointers of an inner model are relative to it; the outer one is checked once the inner ones are right."""
+    """Pointers of an inner model are relative to it; the outer one is checked once those are right."""
     upside_down, right = {"low": 2.0, "high": 1.0}, {"low": 1.0, "high": 2.0}
     with pytest.raises(InvalidInput) as caught:
         _Outer.parse({"ranges": [right, upside_down, upside_down]}, "/x")

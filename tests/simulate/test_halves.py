@@ -18,6 +18,7 @@ from morphcore.models.kinematics import whole_joints
 from morphcore.simulate.plan import common_path, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trim import trim
+from morphdata.environment import Environment, Gust
 from tests.models.chains import aircraft_of, example_aircraft, example_flight
 from tests.simulate.flights import example_model, fly, sample, sample_schedules, steps
 
@@ -101,8 +102,6 @@ def test_a_single_flight_tells_of_both_halves() -> None:
 
     A gust of no strength keeps the simulator from halving.
     """
-    from morphcore.aero.environment import Environment
-
     aircraft, schedule = tailed(), ConstantRate(0.0, 0.3, 0.5, start_s=0.05)
     still = Environment(gust=Gust(amplitude_m_s=0.0, gradient_m=10.0))
     half, whole = (
