@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from morphcore.errors import InvalidInput
 from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import WholeNumbers
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters_document import parameters_from_document
-from morphcore.simulate.trim import StartMode
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.swarm import SwarmSettings
-from morphdata.identify import IdentifySearch, Method, Search, SoughtModel
+from morphdata.identify import IdentifySearch, Method, Search
 from morphdata.parameters import parameters_in
 
 PAPER_PARTICLES = 2500
@@ -24,24 +22,6 @@ DEFAULT_SCREEN = 64  # candidates flown to find them
 WARM_STARTS = 3
 WARM_SCREEN = 32
 UNCHOSEN = IdentifySearch()
-
-
-@dataclass(frozen=True)
-class ModelSettings(WholeNumbers):
-    """The model whose parameters are searched.
-
-    ``aero_coefficients`` : the corrections to search; None: those that the flights to fit can tell (see
-    ``morphcore/identify/sought.py``). ``step_s`` : s; None: the longest that holds the tolerance of
-    ``morphcore/simulate/step_choice.py`` on the flights to fit.
-    """
-
-    links_per_wing: int = 3
-    separate_wings: bool = False
-    aero_coefficients: tuple[str, ...] | None = None
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    lattice: LatticeSettings = DEFAULT_LATTICE
-    step_s: float | None = None
-    start: StartMode = "trim"
 
 
 @dataclass(frozen=True)
@@ -67,27 +47,24 @@ class SearchSettings(WholeNumbers):
     warm_start: ParameterBatch | None = None
 
 
-def model_settings(model: SoughtModel) -> ModelSettings:
-    """Take the model's part of a request; of several numbers of links the first."""
-    listed = model.aero_coefficients
-    return ModelSettings(
-        links_per_wing=model.numbers_of_links()[0],
-        separate_wings=model.separate_wings,
-        aero_coefficients=None if listed is None else tuple(listed),
-        bounds={} if model.bounds is None else model.bounds.given(),
-        lattice=lattice_settings(model.lattice.model_dump(exclude_none=True)),
-        step_s=model.step_s,
-        start=model.start,
-    )
-
-
 def search_settings(search: Search) -> SearchSettings:
-    """Choose what a request leaves to the method; ``preset: "paper"`` is the swarm of the 2021 paper."""
+    """Choose what a request leaves to the method; ``preset: "paper"`` is the swarm of the 2021 paper.
+
+    Raises
+    ------
+    InvalidInput : the model to begin from is named by an id.
+    """
     paper = search.preset == "paper"
     swarm = search.swarm_settings()
     evolution = {name: swarm[name] for name in ("particles", "generations") if name in swarm}
     warm_start = search.warm_start if isinstance(search, IdentifySearch) else None
     known = None if warm_start is None else parameters_in(warm_start.parameters)
+    if warm_start is not None and known is None:
+        raise InvalidInput(
+            "only a service knows a model by an id",
+            pointer=f"/search/warm_start/{'job_id' if warm_start.model_id is None else 'model_id'}",
+            hint="give the model's parameters instead",
+        )
     return SearchSettings(
         method="pso" if paper else search.method,
         seed=search.seed,
@@ -97,5 +74,5 @@ def search_settings(search: Search) -> SearchSettings:
         screen=search.particles or (DEFAULT_SCREEN if known is None else WARM_SCREEN),
         starts=DEFAULT_STARTS if known is None else WARM_STARTS,
         iterations=search.generations or DEFAULT_ITERATIONS,
-        warm_start=None if known is None else parameters_from_document(known.model_dump(exclude_none=True)),
+        warm_start=None if known is None else parameter_batch(known),
     )

@@ -15,7 +15,7 @@ from functools import cached_property
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify import flown_inputs
 from morphcore.identify.identification import Clock, Identification
-from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
+from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
@@ -25,6 +25,9 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread, use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.identify import EquivalentModel, Search, SoughtModel
 from morphdata.study import StudiedModels, StudyRequest
 
 LINKS = tuple(StudiedModels().links_per_wing)
@@ -52,19 +55,17 @@ class Study:
         samples: Sequence[Trajectory],
         *,
         links: Sequence[int] = LINKS,
-        model: ModelSettings | None = None,
+        model: SoughtModel | None = None,
         search: SearchSettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.links = tuple(StudiedModels.parse({"links_per_wing": [*links]}, "/model").links_per_wing)
         self.search = search or SearchSettings()
         self._clock = clock
-        settings = model or ModelSettings()
+        settings = StudiedModels() if model is None else model
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = tuple(
-            Identification(
-                aircraft, flight, samples, replace(settings, links_per_wing=n), self.search, clock=clock
-            )
+            Identification(aircraft, flight, samples, _of_links(settings, n), self.search, clock=clock)
             for n in self.links
         )
         self._prepared: FlightTiming | None = None
@@ -240,13 +241,13 @@ class Study:
 
 
 def study(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
     links: Sequence[int] = LINKS,
-    model: ModelSettings | None = None,
-    search: SearchSettings | None = None,
+    model: SoughtModel | None = None,
+    search: Search | None = None,
 ) -> StudyResult:
     """Study several numbers of links per wing, from start to end.
 
@@ -260,7 +261,14 @@ def study(
     ------
     InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
-    run = Study(aircraft, flight, samples, links=links, model=model, search=search)
+    run = Study(
+        Aircraft.of(aircraft),
+        Flight.of(flight),
+        samples,
+        links=links,
+        model=model,
+        search=search_settings(search or Search()),
+    )
     checkpoint = b""
     for step in run.steps():
         checkpoint = step.checkpoint
@@ -279,9 +287,13 @@ def study_from_request(request: StudyRequest, threads: int | None = None) -> Stu
     return Study(
         *flown_inputs(request),
         links=request.model.links_per_wing,
-        model=model_settings(request.model),
+        model=request.model,
         search=search_settings(request.search),
     )
+
+
+def _of_links(model: SoughtModel, links: int) -> EquivalentModel:
+    return EquivalentModel(**{**dict(model), "links_per_wing": links})
 
 
 def _found(row: StudyRow) -> str:

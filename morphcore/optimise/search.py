@@ -17,7 +17,7 @@ from morphcore.optimise.descent import DescentState, first_descent, next_descent
 from morphcore.optimise.ease import EaseState, next_ease
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.limits import HELD, MorphSpace
-from morphcore.optimise.settings import ScheduleSearch
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.torque_limit import TorqueLimit, Trials
 from morphcore.stopping import Stop
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
@@ -66,7 +66,7 @@ class SearchRun:
     """What one search flies with."""
 
     def __init__(
-        self, space: MorphSpace, flights: MorphFlights, settings: ScheduleSearch, weights: Weights
+        self, space: MorphSpace, flights: MorphFlights, settings: ScheduleSettings, weights: Weights
     ) -> None:
         self.space, self.flights, self.settings, self.weights = space, flights, settings, weights
         self.limit = TorqueLimit(space.limits.max_hinge_torque_nm)
@@ -234,7 +234,7 @@ class SearchRun:
         )
 
 
-def search_share(state: SearchState, settings: ScheduleSearch) -> float:
+def search_share(state: SearchState, settings: ScheduleSettings) -> float:
     """How far a search has come, 0..1, as far as one can know."""
     if state.phase == "done":
         return 1.0

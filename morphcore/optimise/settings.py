@@ -6,19 +6,18 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from morphcore.geometry.fields import WholeNumbers
-from morphcore.geometry.lattice import LatticeSettings, lattice_settings
 from morphcore.swarm import SwarmSettings
-from morphdata import optimize
+from morphdata.optimize import ScheduleSearch
 
 PAPER_PARTICLES = 50  # of the paper's swarm
 DEFAULT_SCREEN = 16  # schedules flown to find the descent's starts
 DEFAULT_STARTS = 3
 DEFAULT_ITERATIONS = 25
-UNCHOSEN = optimize.ScheduleSearch()
+UNCHOSEN = ScheduleSearch()
 
 
 @dataclass(frozen=True)
-class ScheduleSearch(WholeNumbers):
+class ScheduleSettings(WholeNumbers):
     """The choices of all methods.
 
     "hybrid" descends from ``starts`` of ``screen`` schedules by constrained Gauss-Newton steps,
@@ -34,9 +33,9 @@ class ScheduleSearch(WholeNumbers):
     iterations: int = DEFAULT_ITERATIONS
 
 
-def schedule_search(search: optimize.ScheduleSearch) -> ScheduleSearch:
+def schedule_settings(search: ScheduleSearch) -> ScheduleSettings:
     """Choose what a request leaves to the method; ``preset: "paper"`` is the swarm of the 2021 paper."""
-    return ScheduleSearch(
+    return ScheduleSettings(
         method="pso" if search.preset == "paper" else search.method,
         seed=search.seed,
         max_seconds=search.max_seconds,
@@ -44,21 +43,3 @@ def schedule_search(search: optimize.ScheduleSearch) -> ScheduleSearch:
         screen=search.particles or DEFAULT_SCREEN,
         iterations=search.generations or DEFAULT_ITERATIONS,
     )
-
-
-@dataclass(frozen=True)
-class FlexibleSettings(WholeNumbers):
-    """The flexible model that verifies.
-
-    elements : of each surface. lattice : None for the equivalent model's.
-    """
-
-    elements: int = optimize.VerifyingModel().elements
-    lattice: LatticeSettings | None = None
-
-
-def flexible_settings(model: optimize.VerifyingModel) -> FlexibleSettings:
-    """Take the flexible model's part of a request."""
-    lattice = model.lattice
-    chosen = None if lattice is None else lattice_settings(lattice.model_dump(exclude_none=True))
-    return FlexibleSettings(model.elements, chosen)

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from morphcore.frames import wrap_angle
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
-from morphcore.optimise import Limits, Morph, ScheduleOptimisation, ScheduleSearch
-from morphcore.optimise.settings import PAPER_PARTICLES, FlexibleSettings
+from morphcore.optimise import ScheduleOptimisation
+from morphcore.optimise.settings import PAPER_PARTICLES, ScheduleSettings
 from morphcore.paper.identification import searched
 from morphcore.paper.scenario import (
     FINAL_RAD,
@@ -40,6 +40,7 @@ from morphcore.paper.stages import Progress, Results, Work, part
 from morphcore.paper.truth import Resolution, flown_flexible
 from morphcore.simulate.schedule import Spline
 from morphcore.swarm import SwarmSettings
+from morphdata.optimize import Limits, Morph, VerifyingModel
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -54,18 +55,18 @@ OTHER_SEARCHES = ("swarm_morph", "free_morph", "unsettled_morph", "fastest_morph
 CHECK_POINTS = 20_001  # at which an optimised schedule's rate is looked at
 SAMPLE_S = 0.01  # between the rows whose squares make the variation
 
-Search = Callable[[PaperSettings], ScheduleSearch]
+Search = Callable[[PaperSettings], ScheduleSettings]
 
 
-def our_search(settings: PaperSettings) -> ScheduleSearch:
+def our_search(settings: PaperSettings) -> ScheduleSettings:
     """Descent from several schedules."""
-    return ScheduleSearch(seed=settings.seed)
+    return ScheduleSettings(seed=settings.seed)
 
 
-def paper_search(settings: PaperSettings) -> ScheduleSearch:
+def paper_search(settings: PaperSettings) -> ScheduleSettings:
     """The paper's swarm, for as many generations as there is time."""
     swarm = SwarmSettings(particles=PAPER_PARTICLES, generations=settings.effort.schedule_generations)
-    return ScheduleSearch(method="pso", seed=settings.seed, swarm=swarm)
+    return ScheduleSettings(method="pso", seed=settings.seed, swarm=swarm)
 
 
 def morph_inputs(settings: PaperSettings, morph: Morph, search: Search) -> Document:
@@ -168,7 +169,7 @@ def departures(curves: Document, model: str, schedule: str) -> Array:
 
 
 def _optimisation(
-    settings: PaperSettings, results: Results, morph: Morph, search: ScheduleSearch, *, verify: bool
+    settings: PaperSettings, results: Results, morph: Morph, search: ScheduleSettings, *, verify: bool
 ) -> ScheduleOptimisation:
     return ScheduleOptimisation(
         aircraft(),
@@ -178,7 +179,7 @@ def _optimisation(
         limits=LIMITS,
         search=search,
         verify="flexible" if verify else "none",
-        flexible=FlexibleSettings(settings.elements),
+        flexible=VerifyingModel(elements=settings.elements),
         lattice=settings.lattice,
     )
 

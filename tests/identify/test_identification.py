@@ -19,7 +19,6 @@ from morphcore.evolution import EvolutionSettings
 from morphcore.identify import (
     Identification,
     Interrupted,
-    ModelSettings,
     SearchSettings,
     Step,
     identification_from_request,
@@ -31,7 +30,7 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.plan import STEP_S
 from morphcore.swarm import SwarmSettings
 from morphcore.threads import thread_count
-from morphdata.identify import IdentifyRequest
+from morphdata.identify import EquivalentModel, IdentifyRequest
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
@@ -42,7 +41,7 @@ from tests.identify.flights import (
     synthetic,
 )
 
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 QUICK = SearchSettings(seed=3, screen=32, starts=3, iterations=6)
 SWARM = SearchSettings(method="pso", seed=3, swarm=SwarmSettings(particles=16, generations=4))
 EVOLUTION = SearchSettings(method="cma", seed=3, evolution=EvolutionSettings(particles=16, generations=4))
@@ -81,7 +80,7 @@ def test_finds_the_parameters_that_flew_the_sample() -> None:
         synthetic(batch, name="apart", left_rad=0.3, right_rad=0.5),
     ]
     # with the step that flew the samples: another would leave its own error in J
-    same_step = replace(TWO, step_s=STEP_S)
+    same_step = TWO.model_copy(update={"step_s": STEP_S})
     run = Identification(
         reference_aircraft(), reference_flight(), samples, same_step, replace(QUICK, iterations=25)
     )
@@ -117,7 +116,7 @@ def test_looks_elsewhere_only_where_the_guess_leads_to_a_poor_fit() -> None:
             reference_aircraft(),
             reference_flight(),
             [shortened(example("rate_0.8"), 120)],
-            ModelSettings(links_per_wing=1),
+            EquivalentModel(links_per_wing=1),
             replace(QUICK, method=method),  # type: ignore[arg-type]
         )
         step = last(run)
@@ -231,7 +230,7 @@ def test_one_link_has_only_corrections_to_find() -> None:
     """The rigid model can be identified too: without joints only the corrections that show are sought."""
     samples = [shortened(example("rate_0.8"), 60)]
     run = Identification(
-        reference_aircraft(), reference_flight(), samples, ModelSettings(links_per_wing=1), QUICK
+        reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=1), QUICK
     )
     document = run.result(last(run).checkpoint).to_document()
     assert run.space.names == ("lift_factor", "centre_shift_m", "lag_s")

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput
-from morphcore.identify import Identification, ModelSettings, SearchSettings, Step
+from morphcore.identify import Identification, SearchSettings, Step
 from morphcore.identify.parameters import search_space
 from morphcore.identify.settings import search_settings
 from morphcore.models.equivalent import ParameterBatch, chain_model
 from morphcore.models.parameters_document import parameters_from_document
-from morphdata.identify import IdentifySearch
+from morphdata.identify import EquivalentModel, IdentifySearch
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 COLD = SearchSettings(seed=3, screen=48, starts=3, iterations=10)
 CHAIN = chain_model(reference_aircraft(), reference_flight(), 2)
 MODEL = {

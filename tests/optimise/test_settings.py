@@ -10,7 +10,7 @@ from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.optimise import optimisation_from_request
-from morphcore.optimise.settings import schedule_search
+from morphcore.optimise.settings import schedule_settings
 from morphdata.optimize import Limits, OptimizeRequest, ScheduleSearch, Weights
 from tests.identification_request import identification
 from tests.identify.flights import reference_aircraft, reference_flight
@@ -61,7 +61,7 @@ def test_defaults_are_the_documented_ones() -> None:
 
 def test_the_papers_preset_is_its_swarm() -> None:
     """``preset: paper`` means 50 particles with c1 = c2 = 1; generations are free."""
-    search = schedule_search(ScheduleSearch(preset="paper", generations=20))
+    search = schedule_settings(ScheduleSearch(preset="paper", generations=20))
     assert search.method == "pso"
     swarm = search.swarm
     assert (swarm.particles, swarm.c1, swarm.c2, swarm.generations) == (50, 1.0, 1.0, 20)
@@ -69,7 +69,7 @@ def test_the_papers_preset_is_its_swarm() -> None:
 
 def test_particles_and_generations_steer_the_hybrid_too() -> None:
     """Of the default method they are the schedules screened and the iterations of the descent."""
-    search = schedule_search(ScheduleSearch(particles=7, generations=3))
+    search = schedule_settings(ScheduleSearch(particles=7, generations=3))
     assert (search.method, search.screen, search.iterations) == ("hybrid", 7, 3)
 
 
