@@ -7,16 +7,18 @@ import importlib
 import numpy as np
 
 from morphcore import evolution, swarm
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
-from morphcore.simulate.flight import simulate
+from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
+from morphdata import aircraft as documents
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import Lattice
 
 _WING = {
     "span_m": 1.0,
@@ -26,7 +28,7 @@ _WING = {
 }
 
 
-_SMALL = LatticeSettings(chordwise=1, spanwise=4)
+_SMALL = Lattice(chordwise=1, spanwise=4)
 _SIDES = (("right", 0.1), ("left", -0.1))
 
 
@@ -54,7 +56,10 @@ def warm_up_further() -> None:
     states = np.zeros((held.grid.steps + 1, model.state_rows))
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
-    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=_SMALL, step_s=0.01)
+    for _ in flight_steps(
+        aircraft, flight, sample, model="flexible", elements=1, lattice=_SMALL, step_s=0.01
+    ):
+        pass
     # packages that the searches load when they are first needed
     importlib.import_module("scipy.stats")
     evolution.strategies()
@@ -63,7 +68,7 @@ def warm_up_further() -> None:
 
 def _tiny() -> tuple[Aircraft, Flight, Trajectory]:
     """A small aircraft and a flight of three rows."""
-    aircraft = aircraft_from_document(
+    aircraft = documents.Aircraft.parse(
         {
             "fuselage": {"length_m": 1.0, "width_m": 0.2, "height_m": 0.2, "density_kg_m3": 100.0},
             "surfaces": [
@@ -72,8 +77,8 @@ def _tiny() -> tuple[Aircraft, Flight, Trajectory]:
             ],
         }
     )
-    flight = flight_from_document({"airspeed_m_s": 30.0, "gravity_m_s2": 9.81})
+    flight = FlightDocument(airspeed_m_s=30.0, gravity_m_s2=9.81)
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
     sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
-    return aircraft, flight, sample
+    return Aircraft.of(aircraft), Flight.of(flight), sample

@@ -14,6 +14,8 @@ from typing import Any, NoReturn
 
 import typer
 
+from morphdata.faults import InvalidInput
+from morphdata.operations import operation_named
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
 from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
@@ -69,6 +71,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
+    # what is wrong outside the samples is said before the library is loaded, which reads them
+    require_valid(request.operation, request.document, beside="/samples")
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
@@ -79,7 +83,9 @@ def run_here(request: Request, bar: Meter) -> Answer:
     checkpoint: bytes | None = None
     pace = Pace(time.monotonic)
     try:
-        work = find_operation(request.operation)(request.body(sample_document), threads)
+        body = request.body(sample_document)
+        require_valid(request.operation, body)
+        work = find_operation(request.operation)(body, threads)
         with first_interrupt() as interrupted, listening(bar.note):
             try:
                 for step in work.steps(None, interrupted):
@@ -99,6 +105,29 @@ def run_here(request: Request, bar: Meter) -> Answer:
         raise CommandError(
             error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
         ) from None
+
+
+def require_valid(operation: str, body: Document, *, beside: str = "") -> None:
+    """Refuse a request that the operation's document refuses.
+
+    Parameters
+    ----------
+    beside : part that is not there yet, a JSON pointer: what is missing there is not looked at.
+
+    Raises
+    ------
+    CommandError : with the first fault as its own, and a line for each of the others.
+    """
+    try:
+        operation_named(operation).request.parse(body)
+    except InvalidInput as error:
+        faults = [fault for fault in error.faults if not beside or not fault.pointer.startswith(beside)]
+    else:
+        return
+    if faults:
+        first, *others = faults
+        hint = "\n".join([first.hint, *(f"{f.pointer}: {f.detail} ({f.hint})" for f in others)])
+        raise CommandError(first.detail, code=Exit.INVALID_INPUT, hint=hint.strip(), pointer=first.pointer)
 
 
 def run_there(request: Request, service: Service, bar: Meter) -> Answer:

@@ -13,7 +13,6 @@ from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_ME
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import whole_number
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.mirror import Mirror, mirror_of
 from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
@@ -28,6 +27,7 @@ from morphcore.models.kernels.layout import (
 from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -147,7 +147,7 @@ class ChainModel(Shown):
 
 
 def chain_model(
-    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: LatticeSettings = DEFAULT_LATTICE
+    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
     """The equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
 
@@ -165,7 +165,7 @@ def _chain_model(
     aircraft: Aircraft,
     flight: Flight,
     links_per_wing: int,
-    lattice: LatticeSettings,
+    lattice: Lattice,
     images: Sequence[Surface] = (),
 ) -> ChainModel:
     lattices = aircraft_lattice(aircraft, lattice, images)

@@ -5,72 +5,52 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from morphcore.errors import InvalidInput
-from morphcore.geometry.fields import Fields
-from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
+from morphcore.models.equivalent import ParameterBatch
+from morphdata.parameters import AXES, Parameters, WholeResult
 
-Array = NDArray[np.float64]
 Document = dict[str, Any]
-
-AXES = 3  # flap, torsion, lag
-SUM_TOLERANCE = 1e-6  # of the division fractions: documents may be rounded for printing
 
 
 def parameters_from_document(document: Document, pointer: str = "/model") -> ParameterBatch:
-    """Read one parameter set.
+    """Read one parameter set: the ``model`` of an identification's result, or the whole result.
 
     Parameters
     ----------
-    document : a ``model`` object of an identification's result, or the whole result that holds one.
-        ``division`` (n,), ``stiffness_nm_rad`` (n - 1, 3) of flap, torsion and lag in N m/rad,
-        ``damping_nms_rad`` (n - 1, 3) in N m s/rad (or one number for a joint's three axes); each with one
-        more leading axis where the wings have parameters of their own. ``aero``: ``lift_factor`` (-),
-        ``centre_shift_m`` (forward positive), ``profile_drag`` (-), ``lag_s``. Other fields are not looked
-        at.
-    pointer : where the document stands, for errors.
+    document : dict
+        Parsed JSON.
+    pointer : str
+        Where the document stands, for errors.
 
     Returns
     -------
-    ParameterBatch of one particle.
+    ParameterBatch
+        Of one particle.
 
     Raises
     ------
-    InvalidInput : a field is missing, has another shape than ``links_per_wing`` says, or is out of its range;
-        or the result is of a search whose best model never flew.
+    InvalidInput
+        A field is missing or out of its range, the lists do not fit the number of links, or the result is of
+        a search whose best model never flew.
     """
-    whole = Fields(document, pointer)
-    _require_flown(document, pointer)
-    fields = Fields(whole.raw("model"), pointer) if whole.has("model") else whole
-    fields.raw("links_per_wing")
-    links = fields.whole("links_per_wing", default=1, least=1, most=MOST_LINKS)
-    division = _array(fields, "division")
-    wings = 1 if division.ndim == 1 else division.shape[0]
-    division = _shaped(fields, "division", division, (wings, links))
-    if np.any(division <= 0.0) or np.any(np.abs(division.sum(axis=1) - 1.0) > SUM_TOLERANCE):
-        raise _error(fields, "division", "the shares of the span are not positive or do not add up to 1")
-    stiffness = _array(fields, "stiffness_nm_rad")
-    stiffness = _shaped(fields, "stiffness_nm_rad", stiffness, (wings, links - 1, AXES))
-    damping = _array(fields, "damping_nms_rad")
-    if damping.ndim > 0 and damping.size == wings * (links - 1):
-        damping = np.repeat(damping.reshape(wings, links - 1, 1), AXES, axis=2)
-    damping = _shaped(fields, "damping_nms_rad", damping, (wings, links - 1, AXES))
-    for name, values in (("stiffness_nm_rad", stiffness), ("damping_nms_rad", damping)):
-        if np.any(values < 0.0):
-            raise _error(fields, name, f"{name} has a negative entry")
-    aero = fields.child("aero")
-    corrections = {
-        "lift_factor": aero.number("lift_factor", default=1.0, above=0.0, most=100.0),
-        "centre_shift": aero.number("centre_shift_m", default=0.0, least=-100.0, most=100.0),
-        "profile_drag": aero.number("profile_drag", least=0.0, most=10.0),
-        "lag": aero.number("lag_s", least=0.0, most=100.0),
-    }
+    if "model" in document:
+        return parameter_batch(WholeResult.parse(document, pointer).model)
+    return parameter_batch(Parameters.parse(document, pointer))
+
+
+def parameter_batch(given: Parameters) -> ParameterBatch:
+    """Return the parameters of a document as a batch of one particle; the division adds up to 1 exactly."""
+    wings, links = len(given.divisions), given.links_per_wing
+    division = np.array(given.divisions)
+    joints = (1, wings, links - 1, AXES)
     return ParameterBatch(
         division=(division / division.sum(axis=1, keepdims=True))[None],
-        stiffness=stiffness[None],
-        damping=damping[None],
-        **{name: np.array([value]) for name, value in corrections.items()},
+        stiffness=np.array(given.stiffness_nm_rad, dtype=np.float64).reshape(joints),
+        damping=np.array(given.damping_nms_rad, dtype=np.float64).reshape(joints),
+        lift_factor=np.array([given.aero.lift_factor]),
+        centre_shift=np.array([given.aero.centre_shift_m]),
+        profile_drag=np.array([given.aero.profile_drag]),
+        lag=np.array([given.aero.lag_s]),
     )
 
 
@@ -96,43 +76,3 @@ def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
             "lag_s": float(batch.lag[particle]),
         },
     }
-
-
-def _require_flown(document: Document, pointer: str) -> None:
-    """Refuse a result without a model, or with one that did not fly what it was fitted to."""
-    fit = document.get("fit")
-    lost = [
-        row.get("sample")
-        for row in (fit if isinstance(fit, list) else [])
-        if isinstance(row, dict) and row.get("role") == "train" and row.get("J_identified", 0.0) is None
-    ]
-    if lost or ("model" in document and document["model"] is None):
-        raise InvalidInput(
-            "the result holds no model that flies the samples it was fitted to",
-            pointer=f"{pointer}/model",
-            hint="its warnings say why; give the result of an identification that succeeded",
-        )
-
-
-def _array(fields: Fields, name: str) -> Array:
-    raw = fields.raw(name)
-    try:
-        values = np.array(raw, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise _error(fields, name, f"{name} is not a list of numbers") from None
-    if values.ndim == 0 or not np.all(np.isfinite(values)):
-        raise _error(fields, name, f"{name} is not a list of finite numbers")
-    return values
-
-
-def _shaped(fields: Fields, name: str, values: Array, shape: tuple[int, ...]) -> Array:
-    # no entries at all (one link has no joints): [] and [[]] are the same
-    if values.size != np.prod(shape) or (values.size and values.shape not in {shape, shape[1:]}):
-        wanted = " x ".join(str(n) for n in (shape if shape[0] > 1 else shape[1:]))
-        raise _error(fields, name, f"{name} does not hold {wanted} numbers")
-    return values.reshape(shape)
-
-
-def _error(fields: Fields, name: str, message: str) -> InvalidInput:
-    hint = "give the model of an identification's result"
-    return InvalidInput(message, pointer=f"{fields.pointer}/{name}", hint=hint)
