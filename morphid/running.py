@@ -14,6 +14,8 @@ from typing import Any, NoReturn
 
 import typer
 
+from morphdata.faults import InvalidInput
+from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
 from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
@@ -104,7 +106,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
 def run_there(request: Request, service: Service, bar: Meter) -> Answer:
     """Run at a service: upload the samples, post the job, watch it; Ctrl-C cancels it."""
 
-    def uploaded(path: Path, role: str) -> Document:
+    def uploaded(path: Path, role: Role) -> Document:
         require_file(path)
         try:
             flight = service.upload(path)
@@ -164,23 +166,10 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: str) -> Document:
+def sample_document(path: Path, role: Role) -> Document:
     """Read a sample file and give it as it stands inline in a request."""
-    from morphcore import load_trajectory
-    from morphcore.errors import MorphError
-
     require_file(path)
     try:
-        trajectory = load_trajectory(path)
-    except MorphError as error:
+        return load_sample(path, role).model_dump(exclude_defaults=True) | {"role": role}
+    except InvalidInput as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
-    return {
-        "name": path.stem,
-        "role": role,
-        "time_s": trajectory.time_s.tolist(),
-        "sweep_left_rad": trajectory.sweep_left.tolist(),
-        "sweep_right_rad": trajectory.sweep_right.tolist(),
-        "phi_rad": trajectory.phi.tolist(),
-        "theta_rad": trajectory.theta.tolist(),
-        "psi_rad": trajectory.psi.tolist(),
-    }
