@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -51,10 +51,19 @@ class SpreadExecution(Execution):
     )
 
 
-class Executed(Protocol):
-    """A request that says how it is run."""
+class Request(Document):
+    """Base of the requests for long work."""
 
-    @property
-    def execution(self) -> Execution:
-        """How."""
-        ...
+    execution: Execution = Execution()
+
+    def document(self) -> dict[str, Any]:
+        """Build the JSON document of this request; today's defaults are written out.
+
+        Parsed again, by a later version too, it is the same request. Aircraft and flight stand in it as they
+        came: they are documents of the user's own.
+        """
+        own = {"aircraft", "flight"} & type(self).model_fields.keys()
+        return {
+            **self.model_dump(exclude_none=True, exclude_unset=True, include=own),
+            **self.model_dump(exclude_none=True, exclude=own),
+        }

@@ -106,3 +106,10 @@ class InvalidInput(MorphError):
         every = tuple(faults)
         first = every[0]
         return cls(first.detail, pointer=first.pointer, hint=first.hint, faults=every)
+
+
+def refuse(faults: Iterable[Fault]) -> None:
+    """Raise InvalidInput that names all of these faults; return where there is none."""
+    found = tuple(faults)
+    if found:
+        raise InvalidInput.of(found)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field
 
 from morphdata.base import Document
+from morphdata.options import MODEL, Option
 
 # Core radius of "line" as a fraction of the smaller side of a panel (2.5 per cent of the chord at four rows).
 # Control points lie half a panel from their own ring's edges: Vatistas's factor there is
@@ -25,7 +26,9 @@ CORE_LAWS: tuple[CoreLaw, ...] = get_args(CoreLaw)
 class VortexCore(Document):
     """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
 
-    law: CoreLaw = "line"
+    law: Annotated[CoreLaw, Option("--core", MODEL)] = Field(
+        default="line", description="Core of the lattice's vortices."
+    )
     fraction: Annotated[float, Field(gt=0.0, le=0.5)] | None = Field(
         default=None,
         description="Core radius over the smaller side of a panel (line, 0.1 when left out) or over the mean "
@@ -43,8 +46,12 @@ class VortexCore(Document):
 class Lattice(Document):
     """Panels of each wing's vortex lattice, and the core of its vortices."""
 
-    chordwise: int = Field(default=4, ge=1, le=8)
-    spanwise: int = Field(default=10, ge=4, le=20)
+    chordwise: Annotated[int, Option("--chordwise", MODEL)] = Field(
+        default=4, ge=1, le=8, description="Lattice panels along the chord."
+    )
+    spanwise: Annotated[int, Option("--spanwise", MODEL)] = Field(
+        default=10, ge=4, le=20, description="Lattice panels along the span."
+    )
     core: VortexCore = VortexCore()
 
     def to_document(self) -> dict[str, Any]:

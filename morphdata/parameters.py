@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_serializer
 
 from morphdata.base import Document, Identifier
 from morphdata.faults import Fault
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
+from morphdata.options import MODEL, Option
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -133,6 +134,10 @@ class WholeResult(Document):
     partial: Unread = None
     warnings: Unread = None
 
+    @model_serializer
+    def _only_the_model(self) -> Parameters:
+        return self.model
+
     def faults(self) -> Iterator[Fault]:
         """The model flies the samples that it was fitted to."""
         if not has_flown(self.fit):
@@ -154,28 +159,35 @@ GivenParameters = Annotated[
 ]
 
 
+def parameters_in(given: Parameters | WholeResult | None) -> Parameters | None:
+    """Return the parameters themselves, also of a whole result."""
+    return given.model if isinstance(given, WholeResult) else given
+
+
 class KnownModel(Document):
     """An equivalent model by its parameters, or by the id of an identified one.
 
     Lattice, step and start are those it was identified with where they are left out.
     """
 
-    parameters: GivenParameters | None = Field(
+    parameters: Annotated[GivenParameters | None, Option("--parameters", MODEL)] = Field(
         default=None, description="The `model` of an identification's result, or the whole result."
     )
-    model_id: Identifier | None = Field(
+    model_id: Annotated[Identifier | None, Option("--model-id", MODEL)] = Field(
         default=None,
         description="Instead of `parameters`: an identified model, see GET /models.",
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=OWN_OR_CHOSEN)
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
     @property
     def known(self) -> Parameters | None:
         """The parameters, where the document holds them."""
-        return self.parameters.model if isinstance(self.parameters, WholeResult) else self.parameters
+        return parameters_in(self.parameters)
 
     def faults(self) -> Iterator[Fault]:
         """The model is given once."""

@@ -11,10 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import MAX_ROWS, MIN_ROWS, Document
 from morphdata.environment import Environment
-from morphdata.execution import Execution
+from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
+from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
 from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
@@ -36,7 +37,9 @@ class RigidModel(Document):
     kind: Literal["rigid"]
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=CHOSEN)
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
 
 class EquivalentFlightModel(KnownModel):
@@ -49,10 +52,14 @@ class FlexibleModel(Document):
     """Wings of geometrically exact beams: the reference, and hundreds of times slower."""
 
     kind: Literal["flexible"]
-    elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
+    elements: Annotated[int, Option("--elements", MODEL)] = Field(
+        default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing of the flexible model."
+    )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
 
 FlightModel = Annotated[RigidModel | EquivalentFlightModel | FlexibleModel, Field(discriminator="kind")]
@@ -67,21 +74,22 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 }
 
 
-class SimulateRequest(Document):
+class SimulateRequest(Request):
     """Aircraft, flight condition, a model, and what the hinges do."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
 
-    aircraft: Aircraft
-    flight: Flight
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     model: FlightModel
     schedules: Schedules
     duration_s: Duration
     output_step_s: Annotated[float, Field(ge=0.0005, le=MAX_DURATION_S)] = Field(
         default=0.01, description="Between the rows of the trajectory."
     )
-    environment: Environment | None = None
-    execution: Execution = Execution()
+    environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
+        default=None, description="Gust and turbulence; still air without."
+    )
 
     @property
     def rows(self) -> int:

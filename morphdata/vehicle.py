@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from morphdata.aircraft import Aircraft
 from morphdata.faults import Fault
@@ -35,14 +34,6 @@ class HingeRange:
             pointer,
             f"{hint} Correct the angle, or the hinge's min_rad and max_rad.",
         )
-
-
-def vehicle_document(aircraft: Aircraft, flight: Flight) -> dict[str, Any]:
-    """Build the aircraft and flight of a worker's request: as they came."""
-    return {
-        "aircraft": aircraft.model_dump(exclude_unset=True, exclude_none=True),
-        "flight": flight.model_dump(exclude_unset=True, exclude_none=True),
-    }
 
 
 def hinge_ranges(aircraft: Aircraft) -> Mapping[str, HingeRange]:

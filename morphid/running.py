@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import typer
 
 from morphdata.faults import InvalidInput
+from morphdata.operations import operation_named
 from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
@@ -71,6 +72,9 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
+    # what is wrong is said before the library is loaded, which takes seconds
+    body = request.body(sample_document)
+    require_valid(request.operation, body)
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
@@ -81,7 +85,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
     checkpoint: bytes | None = None
     pace = Pace(time.monotonic)
     try:
-        work = find_operation(request.operation)(request.body(sample_document), threads)
+        work = find_operation(request.operation)(body, threads)
         with first_interrupt() as interrupted, listening(bar.note):
             try:
                 for step in work.steps(None, interrupted):
@@ -100,6 +104,23 @@ def run_here(request: Request, bar: Meter) -> Answer:
     except WorkRefused as error:
         raise CommandError(
             error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+        ) from None
+
+
+def require_valid(operation: str, body: Document) -> None:
+    """Refuse a request that the operation's document refuses.
+
+    Raises
+    ------
+    CommandError : with the first fault as its own, and a line for each of the others.
+    """
+    try:
+        operation_named(operation).request.parse(body)
+    except InvalidInput as error:
+        first, *others = error.faults
+        hint = "\n".join([first.hint, *(f"{f.pointer}: {f.detail} ({f.hint})" for f in others)])
+        raise CommandError(
+            first.detail, code=Exit.INVALID_INPUT, hint=hint.strip(), pointer=first.pointer
         ) from None
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from morphcore import Aircraft, Flight, Simulation, Trajectory
-from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.shown import Summary, brief
+from morphdata.identify import EquivalentModel
 from morphdata.lattice import Lattice
 from tests.identify.flights import (
     example,
@@ -26,7 +27,7 @@ from tests.simulate.flights import fly
 
 MOST_LINES = 40
 WIDEST = 160
-COARSE = ModelSettings(links_per_wing=2, lattice=Lattice(chordwise=1, spanwise=4), step_s=0.01)
+COARSE = EquivalentModel(links_per_wing=2, lattice=Lattice(chordwise=1, spanwise=4), step_s=0.01)
 FLIGHTS = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric", "held_out"), 60)]
 QUICK = SearchSettings(method="least_squares", iterations=1)
 

@@ -12,9 +12,10 @@ import numpy as np
 from morphcore.bench.setting import LINKS, RATE_SAMPLES, Bench, Clock, Figures
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.identification import SCREEN_SPREAD, Identification
-from morphcore.identify.settings import ModelSettings, SearchSettings, search_settings
+from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
+from morphdata.identify import EquivalentModel, Search
 
 WITHIN = 0.1  # of the best known J: there a search has arrived
 # "scattered" is "least_squares" from points drawn around the physical guess: a descent from the guess itself
@@ -70,7 +71,7 @@ def search_figures(
     JSON-able figures: best_known_J, target_J, methods: by name the runs, how many arrived, medians over those
     that did (flight_sets_to_target, wall_s_to_target) and over all (flight_sets, wall_s).
     """
-    model = ModelSettings(links_per_wing=links_per_wing)
+    model = EquivalentModel(links_per_wing=links_per_wing)
     runs: dict[str, dict[int, _Run]] = {}
     listed = tuple(seeds)
     for method in methods:
@@ -126,8 +127,10 @@ def search_benchmark(bench: Bench) -> Figures:
 
 def _settings(method: str, seed: int) -> SearchSettings:
     if method == "paper":
-        return search_settings({"preset": "paper", "seed": seed})
-    return search_settings({"method": "least_squares" if method == "scattered" else method, "seed": seed})
+        return search_settings(Search(preset="paper", seed=seed))
+    return search_settings(
+        Search.parse({"method": "least_squares" if method == "scattered" else method, "seed": seed})
+    )
 
 
 def _searched(run: Identification, method: str, most_sets: int | None, clock: Clock) -> _Run:

@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.fields import Fields
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
-from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
+from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
-from morphdata.samples import InlineSample
+from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 
 __all__ = [
     "GenerationTask",
     "Identification",
     "IdentifyResult",
     "Interrupted",
-    "ModelSettings",
     "SearchSettings",
     "Step",
-    "identification_from_document",
+    "identification_from_request",
     "identify",
 ]
 
@@ -38,10 +35,10 @@ def identify(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: int = 3,
-    seed: int = 1,
-    model: ModelSettings | None = None,
-    search: SearchSettings | None = None,
+    links_per_wing: int = EquivalentModel().links_per_wing,
+    seed: int = IdentifySearch().seed,
+    model: EquivalentModel | None = None,
+    search: IdentifySearch | None = None,
 ) -> IdentifyResult:
     """Identify an equivalent model from sample flights, from start to end.
 
@@ -59,8 +56,8 @@ def identify(
         Aircraft.of(aircraft),
         Flight.of(flight),
         samples,
-        model or ModelSettings(links_per_wing=links_per_wing),
-        search or SearchSettings(seed=seed),
+        model or EquivalentModel(links_per_wing=links_per_wing),
+        search_settings(search or IdentifySearch(seed=seed)),
     )
     checkpoint = b""
     for step in run.steps():
@@ -68,24 +65,35 @@ def identify(
     return run.result(checkpoint)
 
 
-def identification_from_document(document: dict[str, Any], threads: int | None = None) -> Identification:
-    """The identification that a request document (the body of ``POST /identify``) asks for.
+def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
+    """The identification that a request (the body of ``POST /identify``) asks for.
 
     Raises
     ------
-    InvalidInput : with a pointer to the field at fault.
+    InvalidInput : it refers to something by an id, which only a service knows.
     """
     if threads is not None:
         use_threads(threads)
-    fields = Fields(document, "")
-    aircraft = Aircraft.of(AircraftDocument.parse(fields.raw("aircraft"), "/aircraft"))
-    flight = Flight.of(FlightDocument.parse(fields.raw("flight"), "/flight"))
-    listed = fields.raw("samples")
-    if not isinstance(listed, list):
-        raise InvalidInput("samples is not a list", pointer="/samples", hint="give a list of samples")
-    samples = [Trajectory.of(InlineSample.parse(item, f"/samples/{i}")) for i, item in enumerate(listed)]
-    model = model_settings(fields.raw("model", {}))
-    search = search_settings(fields.raw("search", {}))
-    fields.raw("execution", None)  # how a service runs it: no number depends on that
-    fields.done()
-    return Identification(aircraft, flight, samples, model, search)
+    return Identification(*flown_inputs(request), request.model, search_settings(request.search))
+
+
+def flown_inputs(request: SamplesRequest) -> tuple[Aircraft, Flight, list[Trajectory]]:
+    """Aircraft, flight condition and samples of a request, as numbers.
+
+    Raises
+    ------
+    InvalidInput : the rows of a sample are elsewhere.
+    """
+    samples = request.inline_samples()
+    for number in range(len(request.samples)):
+        if number not in samples:
+            raise InvalidInput(
+                "only a service knows a flight by its id",
+                pointer=f"/samples/{number}/trajectory_id",
+                hint="give the flight's rows instead",
+            )
+    return (
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        [Trajectory.of(sample) for sample in samples.values()],
+    )

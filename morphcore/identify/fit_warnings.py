@@ -28,7 +28,7 @@ from morphcore.validity import (
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
-    from morphcore.identify.settings import ModelSettings
+    from morphdata.identify import EquivalentModel
 
 Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each flight
 SHOWN_NAMES = 4  # of parameters in a sentence
@@ -40,7 +40,7 @@ UNSEEN_HINT = (
 UNLIKE_WINGS = 0.02  # relative difference of stiffness or mass beyond which wings are not alike
 
 
-def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: ModelSettings) -> NotFlyable:
+def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: EquivalentModel) -> NotFlyable:
     """The error of a search whose best model does not fly what it was fitted to, with what may be why."""
     found = obstacle(model.aircraft, model.flight)
     if found is not None:
@@ -51,7 +51,7 @@ def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: ModelSet
             "the rigid aircraft does not fly them either: check masses, positions and hinges of the "
             "aircraft, and the flight condition"
         )
-    elif settings.bounds:
+    elif settings.bounds is not None and settings.bounds.given():
         pointer, hint = "/model/bounds", "the rigid aircraft flies them: widen the bounds of the search"
     else:
         pointer = "/search"

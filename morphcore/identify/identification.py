@@ -19,7 +19,7 @@ from morphcore.identify.generation import GenerationTask
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.polish import first_polish, next_polish
 from morphcore.identify.result import IdentifyResult, identify_result
-from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.settings import SearchSettings
 from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
@@ -29,6 +29,8 @@ from morphcore.steps import Step
 from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
+from morphdata.faults import refuse
+from morphdata.identify import EquivalentModel, samples_faults
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -66,30 +68,24 @@ class Identification:
         aircraft: Aircraft,
         flight: Flight,
         samples: Sequence[Trajectory],
-        model: ModelSettings | None = None,
+        model: EquivalentModel | None = None,
         search: SearchSettings | None = None,
         *,
         clock: Clock = time.perf_counter,
     ) -> None:
-        self.settings = model or ModelSettings()
+        self.settings = model or EquivalentModel()
         self.search = search or SearchSettings()
         self.samples = tuple(samples)
         self._clock = clock
         self._step_s = self.settings.step_s
-        names = [sample.name for sample in samples]
-        if len(set(names)) != len(names):
-            raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
+        refuse(samples_faults(samples))
         for number, sample in enumerate(samples):
             require_flight(sample, f"/samples/{number}")
-        if not any(sample.role == "train" for sample in samples):
-            raise InvalidInput(
-                "no sample has the role train", pointer="/samples", hint="mark at least one with role train"
-            )
         if self.settings.start == "given" and flight.start is None:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
-        sought = self.settings.aero_coefficients
+        sought: Sequence[str] | None = self.settings.aero_coefficients
         if sought is None:
             sought = corrections_told([sample for sample in samples if sample.role == "train"])
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
@@ -97,7 +93,7 @@ class Identification:
             self.model,
             separate_wings=self.settings.separate_wings,
             aero_coefficients=sought,
-            bounds=self.settings.bounds,
+            bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
         )
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess

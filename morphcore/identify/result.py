@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +13,13 @@ from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.polish import differences
 from morphcore.identify.sample_fit import ANGLES, SampleFit
-from morphcore.identify.settings import ModelSettings
 from morphcore.identify.state import SearchState
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
+from morphdata.identify import EquivalentModel
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -41,7 +41,7 @@ class IdentifyResult(Shown):
     uncertainty: Uncertainty | None
     search: dict[str, Any]
     cost: dict[str, float | None]
-    settings: ModelSettings
+    settings: EquivalentModel
     warnings: tuple[ResultWarning, ...] = ()
     at_bound: tuple[str, ...] = ()
 
@@ -150,7 +150,9 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "flexible_flight_s": None,
             "flight_duration_s": run.samples[longest].duration_s,
         },
-        settings=replace(run.settings, step_s=run.step_s, aero_coefficients=space.free_aero),
+        settings=run.settings.model_copy(
+            update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
+        ),
         warnings=fit_warnings(
             run, best, fits, at_bound, certainty.undetermined if certainty is not None else ()
         ),

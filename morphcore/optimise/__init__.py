@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.fields import Fields
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameter_batch
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
-from morphcore.optimise.settings import (
-    VERIFICATIONS,
-    FlexibleSettings,
-    Limits,
-    Morph,
-    ScheduleSearch,
-    Verify,
-    Weights,
-    flexible_settings,
-    limits_settings,
-    morph_settings,
-    schedule_search,
-    weights_settings,
-)
+from morphcore.optimise.settings import schedule_settings
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
-from morphdata.optimize import SearchedModel
+from morphdata.optimize import Limits, Morph, OptimizeRequest, ScheduleSearch, Verify, Weights
 from morphdata.parameters import flown_with
 
 __all__ = [
-    "FlexibleSettings",
     "Interrupted",
     "Limits",
     "Morph",
@@ -44,7 +27,7 @@ __all__ = [
     "ScheduleSearch",
     "Step",
     "Weights",
-    "optimisation_from_document",
+    "optimisation_from_request",
     "optimise_schedule",
 ]
 
@@ -83,7 +66,7 @@ def optimise_schedule(
         morph=morph,
         limits=limits,
         weights=weights,
-        search=search,
+        search=schedule_settings(search or ScheduleSearch()),
         verify=verify,
         lattice=lattice,
     )
@@ -93,8 +76,8 @@ def optimise_schedule(
     return run.result(checkpoint)
 
 
-def optimisation_from_document(document: dict[str, Any], threads: int | None = None) -> ScheduleOptimisation:
-    """The optimisation that a request document (the body of ``POST /optimize``) asks for.
+def optimisation_from_request(request: OptimizeRequest, threads: int | None = None) -> ScheduleOptimisation:
+    """The optimisation that a request (the body of ``POST /optimize``) asks for.
 
     Identified parameters bring their own lattice, step and start, unless others are given beside them.
 
@@ -104,31 +87,24 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
     """
     if threads is not None:
         use_threads(threads)
-    fields = Fields(document, "")
-    aircraft = Aircraft.of(AircraftDocument.parse(fields.raw("aircraft"), "/aircraft"))
-    flight = Flight.of(FlightDocument.parse(fields.raw("flight"), "/flight"))
-    given = SearchedModel.parse(fields.raw("model"), "/model")
-    if given.known is None:
+    model, flown = request.model, flown_with(request.model)
+    if model.known is None:
         raise InvalidInput(
             "only a service knows a model by its id",
             pointer="/model/model_id",
             hint="give the model's parameters instead",
         )
-    model = flown_with(given)
-    run = ScheduleOptimisation(
-        aircraft,
-        flight,
-        parameter_batch(given.known),
-        morph=morph_settings(fields.raw("morph")),
-        limits=limits_settings(fields.raw("limits", {})),
-        weights=weights_settings(fields.raw("weights", {})),
-        search=schedule_search(fields.raw("search", {})),
-        verify=fields.choice("verify", VERIFICATIONS, default="flexible"),  # type: ignore[arg-type]
-        flexible=flexible_settings(fields.raw("flexible", {})),
-        lattice=model.lattice,
-        start=model.start,
-        step_s=model.step_s,
+    return ScheduleOptimisation(
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        parameter_batch(model.known),
+        morph=request.morph,
+        limits=request.limits,
+        weights=request.weights,
+        search=schedule_settings(request.search),
+        verify=request.verify,
+        flexible=request.flexible,
+        lattice=flown.lattice,
+        start=flown.start,
+        step_s=flown.step_s,
     )
-    fields.raw("execution", None)  # how a service runs it: no number depends on that
-    fields.done()
-    return run

@@ -29,14 +29,13 @@ from morphcore.optimise.goals import (
     chosen,
     durations,
     next_task,
-    require_goal,
     warm_starts,
 )
 from morphcore.optimise.limits import MorphSpace
 from morphcore.optimise.progress import Told, best_cost, effort, shown_cost
 from morphcore.optimise.result import ScheduleResult, schedule_result
 from morphcore.optimise.search import SearchRun, SearchState
-from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState, Verified, decode, encode
 from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import STEP_S, CommonPath, common_path
@@ -47,7 +46,9 @@ from morphcore.steps import Step
 from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.threads import one_blas_thread
 from morphcore.validity import documents
+from morphdata.faults import refuse
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.optimize import Limits, Morph, Verify, VerifyingModel, Weights, goal_faults
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -80,9 +81,9 @@ class ScheduleOptimisation:
         morph: Morph,
         limits: Limits | None = None,
         weights: Weights | None = None,
-        search: ScheduleSearch | None = None,
+        search: ScheduleSettings | None = None,
         verify: Verify = "flexible",
-        flexible: FlexibleSettings | None = None,
+        flexible: VerifyingModel | None = None,
         lattice: Lattice = DEFAULT_LATTICE,
         start: StartMode = "trim",
         step_s: float | None = None,
@@ -90,8 +91,8 @@ class ScheduleOptimisation:
     ) -> None:
         self.aircraft, self.flight, self.parameters = aircraft, flight, model
         self.morph, self.limits, self.weights = morph, limits or Limits(), weights or Weights()
-        self.search, self.verify = search or ScheduleSearch(), verify
-        self.flexible = flexible or FlexibleSettings()
+        self.search, self.verify = search or ScheduleSettings(), verify
+        self.flexible = flexible or VerifyingModel()
         self.lattice, self.start, self._step_s = lattice, start, step_s
         self._clock = clock
         if model.particles != 1:
@@ -104,7 +105,7 @@ class ScheduleOptimisation:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
-        require_goal(morph, self.limits)
+        refuse(goal_faults(morph, self.limits))
         with one_blas_thread():
             longest = self.space(morph.duration_s)
             require_schedules(longest)

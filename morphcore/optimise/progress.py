@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from morphcore.optimise.goals import planned
 from morphcore.optimise.search import SearchState, search_share
-from morphcore.optimise.settings import Morph, ScheduleSearch
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState
+from morphdata.optimize import Morph
 
 # seconds that parts of the work take on the machine it was written on: their ratios make the fraction
 SEARCH_COST_S = 3.5
@@ -33,7 +34,7 @@ class Effort:
     search_s: float
     flexible_s: float
 
-    def fraction(self, state: OptimisationState, settings: ScheduleSearch, flying: float) -> float:
+    def fraction(self, state: OptimisationState, settings: ScheduleSettings, flying: float) -> float:
         """Share of the whole work that is done, 0..1; ``flying``: of a flexible flight under way."""
         if state.phase == "done":
             return 1.0
@@ -45,7 +46,7 @@ class Effort:
         return min(done / (self.search_s * self.searches + self.flexible_s * FLEXIBLE_FLIGHTS), 0.99)
 
 
-def effort(morph: Morph, choices: int, search: ScheduleSearch, *, flexible: bool) -> Effort:
+def effort(morph: Morph, choices: int, search: ScheduleSettings, *, flexible: bool) -> Effort:
     """The effort that a goal takes with so many durations to choose from."""
     swarm = search.swarm
     return Effort(

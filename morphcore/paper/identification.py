@@ -7,12 +7,13 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 from morphcore.identify.identification import Identification
-from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.settings import SearchSettings
 from morphcore.identify.study import Study
 from morphcore.paper.scenario import LINKS, aircraft, flight
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.paper.truth import samples_of
+from morphdata.identify import EquivalentModel
 
 Document = dict[str, Any]
 
@@ -70,7 +71,7 @@ def study_links(settings: PaperSettings, results: Results, checkpoint: bytes | N
         flight(),
         samples_of(results["truth"]),
         links=settings.effort.links,
-        model=ModelSettings(lattice=settings.lattice),
+        model=EquivalentModel(lattice=settings.lattice),
         search=settings.search,
     )
     last = yield from searched(study, checkpoint)
@@ -94,7 +95,7 @@ def _identified(
         aircraft(),
         flight(),
         samples_of(results["truth"]),
-        ModelSettings(links_per_wing=LINKS, lattice=settings.lattice),
+        EquivalentModel(links_per_wing=LINKS, lattice=settings.lattice),
         search,
     )
     last = yield from searched(run, checkpoint)

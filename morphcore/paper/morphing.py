@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from morphcore.frames import wrap_angle
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
-from morphcore.optimise import Limits, Morph, ScheduleOptimisation, ScheduleSearch
-from morphcore.optimise.settings import PAPER_PARTICLES, FlexibleSettings
+from morphcore.optimise import ScheduleOptimisation
+from morphcore.optimise.settings import PAPER_PARTICLES, ScheduleSettings
 from morphcore.paper.identification import searched
 from morphcore.paper.scenario import (
     FINAL_RAD,
@@ -40,39 +40,40 @@ from morphcore.paper.stages import Progress, Results, Work, part
 from morphcore.paper.truth import Resolution, flown_flexible
 from morphcore.simulate.schedule import Spline
 from morphcore.swarm import SwarmSettings
+from morphdata.optimize import Limits, Morph, VerifyingModel
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
 
 MORPH = Morph(final_rad=FINAL_RAD, duration_s=MORPH_S, knots=KNOTS, settle_s=SETTLE_S)
-FREE_MORPH = replace(MORPH, free_values=True)
-UNSETTLED_MORPH = replace(MORPH, settle_s=0.0)
-FASTEST_MORPH = replace(MORPH, goal="minimum_time")
+FREE_MORPH = MORPH.model_copy(update={"free_values": True})
+UNSETTLED_MORPH = MORPH.model_copy(update={"settle_s": 0.0})
+FASTEST_MORPH = MORPH.model_copy(update={"goal": "minimum_time"})  # under a limit found on the way
 LIMITS = Limits(max_rate_rad_s=RATE_LIMIT_RAD_S)
 WINDOW_S = MORPH_S + SETTLE_S  # from the start of any morph, over which attitudes count
 OTHER_SEARCHES = ("swarm_morph", "free_morph", "unsettled_morph", "fastest_morph")
 CHECK_POINTS = 20_001  # at which an optimised schedule's rate is looked at
 SAMPLE_S = 0.01  # between the rows whose squares make the variation
 
-Search = Callable[[PaperSettings], ScheduleSearch]
+Search = Callable[[PaperSettings], ScheduleSettings]
 
 
-def our_search(settings: PaperSettings) -> ScheduleSearch:
+def our_search(settings: PaperSettings) -> ScheduleSettings:
     """Descent from several schedules."""
-    return ScheduleSearch(seed=settings.seed)
+    return ScheduleSettings(seed=settings.seed)
 
 
-def paper_search(settings: PaperSettings) -> ScheduleSearch:
+def paper_search(settings: PaperSettings) -> ScheduleSettings:
     """The paper's swarm, for as many generations as there is time."""
     swarm = SwarmSettings(particles=PAPER_PARTICLES, generations=settings.effort.schedule_generations)
-    return ScheduleSearch(method="pso", seed=settings.seed, swarm=swarm)
+    return ScheduleSettings(method="pso", seed=settings.seed, swarm=swarm)
 
 
 def morph_inputs(settings: PaperSettings, morph: Morph, search: Search) -> Document:
     """What decides an optimisation, beside the model."""
     return {
-        "morph": asdict(morph),
-        "limits": asdict(LIMITS),
+        "morph": morph.model_dump(),
+        "limits": LIMITS.model_dump(),
         "search": asdict(search(settings)),
         "lattice": settings.lattice.to_document(),
         "elements": settings.elements,
@@ -109,7 +110,7 @@ def search_morph(
 def search_fastest(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
     """The shortest morph whose variation is at most that of the constant rate in two seconds."""
     most = results["morph"]["variation"]["constant"]["equivalent"]
-    morph = replace(FASTEST_MORPH, max_variation_rad2=most)
+    morph = FASTEST_MORPH.model_copy(update={"max_variation_rad2": most})
     return (yield from search_morph(morph, our_search, settings, results, checkpoint))
 
 
@@ -118,7 +119,8 @@ def search_front(settings: PaperSettings, results: Results, checkpoint: bytes | 
     points: list[Document] = [] if checkpoint is None else json.loads(checkpoint)
     durations = settings.effort.front_durations_s
     for duration_s in durations[len(points) :]:
-        morph = replace(MORPH, duration_s=duration_s, settle_s=WINDOW_S - duration_s)
+        times = {"duration_s": duration_s, "settle_s": WINDOW_S - duration_s}
+        morph = MORPH.model_copy(update=times)
         search = search_morph(morph, our_search, settings, results, None)
         found = yield from part(search, len(points) / len(durations), 1.0 / len(durations))
         points.append(
@@ -167,7 +169,7 @@ def departures(curves: Document, model: str, schedule: str) -> Array:
 
 
 def _optimisation(
-    settings: PaperSettings, results: Results, morph: Morph, search: ScheduleSearch, *, verify: bool
+    settings: PaperSettings, results: Results, morph: Morph, search: ScheduleSettings, *, verify: bool
 ) -> ScheduleOptimisation:
     return ScheduleOptimisation(
         aircraft(),
@@ -177,7 +179,7 @@ def _optimisation(
         limits=LIMITS,
         search=search,
         verify="flexible" if verify else "none",
-        flexible=FlexibleSettings(settings.elements),
+        flexible=VerifyingModel(elements=settings.elements),
         lattice=settings.lattice,
     )
 

@@ -14,14 +14,16 @@ import pytest
 from morphcore.errors import InvalidInput, MorphError
 from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import Fields, whole_number
-from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import flexible_model
-from morphcore.optimise import FlexibleSettings, Morph, ScheduleSearch, optimisation_from_document
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.simulate.request import simulation_from_document
 from morphcore.swarm import SwarmSettings
+from morphdata.identify import EquivalentModel
 from morphdata.lattice import Lattice
+from morphdata.optimize import OptimizeRequest
 from tests.app.request_documents import optimize_document, simulate_document
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
@@ -45,13 +47,10 @@ def test_other_things_are_no_whole_numbers(value: Any) -> None:
 
 
 SETTINGS: list[tuple[type, dict[str, Any]]] = [
-    (ModelSettings, {}),
     (SearchSettings, {}),
     (SwarmSettings, {}),
     (EvolutionSettings, {}),
-    (ScheduleSearch, {}),
-    (FlexibleSettings, {}),
-    (Morph, {"final_rad": 1.0, "duration_s": 2.0}),
+    (ScheduleSettings, {}),
 ]
 
 
@@ -77,7 +76,11 @@ def test_a_search_with_numpys_numbers_ends_in_json() -> None:
             reference_aircraft(),
             reference_flight(),
             [flight],
-            ModelSettings(whole(2), lattice=Lattice(chordwise=whole(1), spanwise=whole(4)), step_s=0.01),
+            EquivalentModel(
+                links_per_wing=whole(2),
+                lattice=Lattice(chordwise=whole(1), spanwise=whole(4)),
+                step_s=0.01,
+            ),
             SearchSettings(method="pso", seed=whole(3), swarm=SwarmSettings(whole(4), whole(1))),
         )
         *_, last = run.steps()
@@ -149,7 +152,7 @@ def with_value(document: Any, pointer: str, value: Any) -> Any:
 
 READERS = [
     (simulate_document(), simulation_from_document),
-    (optimize_document(), optimisation_from_document),
+    (optimize_document(), OptimizeRequest.parse),
 ]
 
 

@@ -9,17 +9,18 @@ from typing import Any
 
 import pytest
 
-from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.optimise import ScheduleOptimisation
 from morphcore.simulate.plan import STEP_S
 from morphcore.stopping import Deadline, Interrupted, listening, say
 from morphcore.swarm import SwarmSettings
+from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 from tests.identify.test_step import softened
 from tests.optimise.morphs import optimisation
 
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 FLIGHT = shortened(example("rate_0.8"), 90)
 NO_TIME = 1e-9
 GRACE_S = 20.0  # for what is always flown, and for a busy machine; hours would be asked for

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.evolution import Evolution, EvolutionSettings, EvolutionState, first_evolution
-from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.settings import search_settings
 from morphcore.identify.state import decode
+from morphdata.identify import Bounds, EquivalentModel, IdentifySearch
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 Array = NDArray[np.float64]
@@ -42,7 +43,7 @@ def search(settings: SearchSettings = SEARCH) -> Identification:
     """Two links, a second of one flight."""
     samples = [shortened(example("rate_0.8"), 60)]
     return Identification(
-        reference_aircraft(), reference_flight(), samples, ModelSettings(links_per_wing=2), settings
+        reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=2), settings
     )
 
 
@@ -114,9 +115,9 @@ def test_lowers_the_cost_of_the_physical_guess() -> None:
 
 def test_diverged_flights_do_not_stop_it() -> None:
     """With bounds so wide that many flights diverge every cost is finite and the best only gets better."""
-    wild = ModelSettings(
+    wild = EquivalentModel(
         links_per_wing=2,
-        bounds={"stiffness_nm_rad": (1e-1, 1e6), "lift_factor": (0.1, 30.0)},
+        bounds=Bounds(stiffness_nm_rad=[1e-1, 1e6], lift_factor=[0.1, 10.0]),
     )
     run = Identification(
         reference_aircraft(), reference_flight(), [shortened(example("rate_0.8"), 60)], wild, SEARCH
@@ -133,9 +134,11 @@ def test_diverged_flights_do_not_stop_it() -> None:
 
 def test_documents_say_how_many() -> None:
     """``particles`` and ``generations`` are the strategy's; fewer than four models are refused."""
-    settings = search_settings({"method": "cma", "particles": 24, "generations": 7, "seed": 2})
+    settings = search_settings(
+        IdentifySearch.parse({"method": "cma", "particles": 24, "generations": 7, "seed": 2})
+    )
     assert settings.evolution == EvolutionSettings(24, 7)
-    assert search_settings({"method": "cma"}).evolution == EvolutionSettings()
+    assert search_settings(IdentifySearch.parse({"method": "cma"})).evolution == EvolutionSettings()
     with pytest.raises(InvalidInput) as error:
-        search_settings({"method": "cma", "particles": 3})
+        IdentifySearch.parse({"method": "cma", "particles": 3}, "/search")
     assert error.value.pointer == "/search/particles"

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from morphcore.identify import Identification, ModelSettings, SearchSettings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.state import SearchState, decode
 from morphcore.lanes import TOGETHER
 from morphcore.swarm import SwarmSettings
+from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ def search(settings: SearchSettings = SWARM) -> Identification:
     """Two links, a second of one flight."""
     samples = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric"), 40)]
     return Identification(
-        reference_aircraft(), reference_flight(), samples, ModelSettings(links_per_wing=2), settings
+        reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=2), settings
     )
 
 

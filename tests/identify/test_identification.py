@@ -19,10 +19,9 @@ from morphcore.evolution import EvolutionSettings
 from morphcore.identify import (
     Identification,
     Interrupted,
-    ModelSettings,
     SearchSettings,
     Step,
-    identification_from_document,
+    identification_from_request,
 )
 from morphcore.identify.cost import costs, evaluate, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
@@ -31,6 +30,7 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.plan import STEP_S
 from morphcore.swarm import SwarmSettings
 from morphcore.threads import thread_count
+from morphdata.identify import EquivalentModel, IdentifyRequest
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
@@ -41,7 +41,7 @@ from tests.identify.flights import (
     synthetic,
 )
 
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 QUICK = SearchSettings(seed=3, screen=32, starts=3, iterations=6)
 SWARM = SearchSettings(method="pso", seed=3, swarm=SwarmSettings(particles=16, generations=4))
 EVOLUTION = SearchSettings(method="cma", seed=3, evolution=EvolutionSettings(particles=16, generations=4))
@@ -80,7 +80,7 @@ def test_finds_the_parameters_that_flew_the_sample() -> None:
         synthetic(batch, name="apart", left_rad=0.3, right_rad=0.5),
     ]
     # with the step that flew the samples: another would leave its own error in J
-    same_step = replace(TWO, step_s=STEP_S)
+    same_step = TWO.model_copy(update={"step_s": STEP_S})
     run = Identification(
         reference_aircraft(), reference_flight(), samples, same_step, replace(QUICK, iterations=25)
     )
@@ -116,7 +116,7 @@ def test_looks_elsewhere_only_where_the_guess_leads_to_a_poor_fit() -> None:
             reference_aircraft(),
             reference_flight(),
             [shortened(example("rate_0.8"), 120)],
-            ModelSettings(links_per_wing=1),
+            EquivalentModel(links_per_wing=1),
             replace(QUICK, method=method),  # type: ignore[arg-type]
         )
         step = last(run)
@@ -230,7 +230,7 @@ def test_one_link_has_only_corrections_to_find() -> None:
     """The rigid model can be identified too: without joints only the corrections that show are sought."""
     samples = [shortened(example("rate_0.8"), 60)]
     run = Identification(
-        reference_aircraft(), reference_flight(), samples, ModelSettings(links_per_wing=1), QUICK
+        reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=1), QUICK
     )
     document = run.result(last(run).checkpoint).to_document()
     assert run.space.names == ("lift_factor", "centre_shift_m", "lag_s")
@@ -239,9 +239,10 @@ def test_one_link_has_only_corrections_to_find() -> None:
 
 def test_request_document_runs() -> None:
     """The body of POST /identify, as the clients send it, becomes an identification."""
-    run = identification_from_document(
-        identification("train_rate_0.8", links=2, search={"method": "pso", "particles": 4, "generations": 1})
+    request = identification(
+        "train_rate_0.8", links=2, search={"method": "pso", "particles": 4, "generations": 1}
     )
+    run = identification_from_request(IdentifyRequest.parse(request))
     document = run.result(last(run).checkpoint).to_document()
     assert set(document) == {"model", "fit", "uncertainty", "search", "cost", "warnings"}
     assert document["search"]["method"] == "pso"
@@ -250,7 +251,7 @@ def test_request_document_runs() -> None:
 def test_paper_preset_is_the_papers_swarm() -> None:
     """``preset: paper`` means 2500 particles with c1 = c2 = 1."""
     request = identification("train_rate_0.8", search={"preset": "paper", "generations": 20})
-    search = identification_from_document(request).search
+    search = identification_from_request(IdentifyRequest.parse(request)).search
     assert (search.method, search.swarm.particles, search.swarm.c1, search.swarm.c2) == (
         "pso",
         2500,
@@ -281,7 +282,7 @@ def test_bad_requests_name_the_field(change: dict[str, Any], pointer: str) -> No
     """What is wrong in a request is said with a pointer to it and a hint."""
     request = identification("train_rate_0.8") | change
     with pytest.raises(InvalidInput) as caught:
-        identification_from_document(request)
+        identification_from_request(IdentifyRequest.parse(request))
     assert caught.value.pointer == pointer
     assert caught.value.hint
 
@@ -299,7 +300,7 @@ def test_bad_rows_are_named(column: str, row: int, value: float, pointer: str) -
     request = identification("train_rate_0.8")
     request["samples"][0][column][row] = value
     with pytest.raises(InvalidInput) as caught:
-        list(identification_from_document(request).steps())
+        list(identification_from_request(IdentifyRequest.parse(request)).steps())
     assert caught.value.pointer == pointer
 
 
@@ -320,9 +321,11 @@ def test_the_number_of_threads_does_not_change_the_answer() -> None:
     """One or two threads, of kernels and of linear algebra, give the same model and fit, to the bit."""
     code = (
         "import json;"
-        "from morphcore.identify import identification_from_document as begin;"
+        "from morphcore.identify import identification_from_request as begin;"
+        "from morphdata.identify import IdentifyRequest;"
         "from tests.identification_request import identification as ask;"
-        "run = begin(ask('train_rate_0.8', links=2, search={'particles': 24, 'generations': 3}), {threads});"
+        "request = ask('train_rate_0.8', links=2, search={'particles': 24, 'generations': 3});"
+        "run = begin(IdentifyRequest.parse(request), {threads});"
         "*_, step = run.steps(); found = run.result(step.checkpoint).to_document();"
         "print(json.dumps([found['model'], found['fit']]))"
     )

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput, NotFlyable
-from morphcore.identify import Identification, ModelSettings, SearchSettings, identify
+from morphcore.identify import Identification, SearchSettings, identify
 from morphcore.identify.study import Study
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
 from morphcore.swarm import SwarmSettings
+from morphdata.identify import Bounds, EquivalentModel, IdentifySearch
 from tests.geometry.test_obstacle import with_modulus
 from tests.identify.flights import (
     example,
@@ -28,7 +29,7 @@ from tests.optimise.morphs import optimisation
 
 SOFT = with_modulus(0, 2.1)  # GPa where Pa are asked for
 SWARM = SearchSettings(method="pso", seed=1, swarm=SwarmSettings(particles=4, generations=1))
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 TRAIN = shortened(example("rate_0.8"), 60)
 
 
@@ -74,9 +75,14 @@ def test_the_best_so_far_of_nothing_holds_no_model() -> None:
 
 def test_bounds_that_let_nothing_fly_are_the_cause() -> None:
     """A wing that is right and bounds that make it soft: the hint is about the bounds."""
-    soft = replace(TWO, bounds={"stiffness_nm_rad": (1e-3, 1e-2)})
+    soft = TWO.model_copy(update={"bounds": Bounds(stiffness_nm_rad=[1e-3, 1e-2])})
     with pytest.raises(NotFlyable) as caught:
-        identify(*reference_documents(), [TRAIN], model=soft, search=SWARM)
+        identify(
+            *reference_documents(),
+            [TRAIN],
+            model=soft,
+            search=IdentifySearch(method="pso", particles=4, generations=1),
+        )
     assert caught.value.pointer == "/model/bounds"
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore.identify import Identification, ModelSettings, SearchSettings, identify
+from morphcore.identify import Identification, identify
 from morphcore.identify.parameters import AERO_COEFFICIENTS
-from morphcore.identify.settings import model_settings
 from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
+from morphdata.identify import EquivalentModel, IdentifySearch
 from tests.identify.flights import (
     example,
     reference_aircraft,
@@ -26,7 +26,7 @@ LISTED = ("profile_drag", "lag_s")
 
 def sought(*samples: Trajectory, corrections: tuple[str, ...] | None = None) -> tuple[str, ...]:
     """The corrections that an identification seeks."""
-    model = ModelSettings(links_per_wing=1, aero_coefficients=corrections)
+    model = EquivalentModel(links_per_wing=1, aero_coefficients=corrections)
     return Identification(reference_aircraft(), reference_flight(), samples, model).space.free_aero
 
 
@@ -72,18 +72,10 @@ def test_the_result_names_what_was_sought() -> None:
     found = identify(
         *reference_documents(),
         [shortened(example("rate_0.8"), 40)],
-        model=ModelSettings(links_per_wing=1),
-        search=SearchSettings(iterations=2),
+        model=EquivalentModel(links_per_wing=1),
+        search=IdentifySearch(generations=2),
     )
     document = found.to_document()
     assert document["search"]["aero_coefficients"] == list(WITHOUT_DRAG)
     assert document["uncertainty"]["coordinates"] == list(WITHOUT_DRAG)
     assert document["model"]["aero"]["profile_drag"] == 0.01
-
-
-def test_the_document_may_leave_them_out() -> None:
-    """Left out or null: the library's choice. A list, even an empty one, is the caller's."""
-    assert model_settings({}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": None}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": []}).aero_coefficients == ()
-    assert model_settings({"aero_coefficients": list(LISTED)}).aero_coefficients == LISTED

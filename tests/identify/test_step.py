@@ -7,15 +7,15 @@ from dataclasses import replace
 import pytest
 
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.identify import Identification, ModelSettings, SearchSettings
-from morphcore.identify.settings import model_settings
+from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.step_choice import CANDIDATES_S
 from morphcore.stopping import Interrupted
+from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
-TWO = ModelSettings(links_per_wing=2)
+TWO = EquivalentModel(links_per_wing=2)
 FLIGHT = shortened(example("rate_0.8"), 90)
 QUICK = SearchSettings(iterations=1)
 
@@ -28,8 +28,8 @@ def softened(factor: float) -> Aircraft:
         surfaces=tuple(
             replace(
                 surface,
-                material=replace(
-                    surface.material, youngs_modulus_pa=factor * surface.material.youngs_modulus_pa
+                material=surface.material.model_copy(
+                    update={"youngs_modulus_pa": factor * surface.material.youngs_modulus_pa}
                 ),
             )
             for surface in aircraft.surfaces
@@ -37,7 +37,7 @@ def softened(factor: float) -> Aircraft:
     )
 
 
-def run(aircraft: Aircraft, model: ModelSettings = TWO, search: SearchSettings = QUICK) -> Identification:
+def run(aircraft: Aircraft, model: EquivalentModel = TWO, search: SearchSettings = QUICK) -> Identification:
     """An identification from one short flight."""
     return Identification(aircraft, reference_flight(), [FLIGHT], model, search)
 
@@ -61,7 +61,7 @@ def test_the_result_holds_the_step_used() -> None:
 @pytest.mark.parametrize("step_s", [0.01, 0.004])
 def test_a_step_asked_for_is_kept(step_s: float) -> None:
     """Whatever the choice would be."""
-    sought = run(softened(0.1), replace(TWO, step_s=step_s))
+    sought = run(softened(0.1), EquivalentModel(links_per_wing=2, step_s=step_s))
     assert sought.step_s == step_s
     *_, last = sought.steps()
     assert sought.result(last.checkpoint).to_document()["model"]["step_s"] == step_s
@@ -101,12 +101,6 @@ def test_every_number_of_links_chooses_its_own() -> None:
     study = Study(aircraft, reference_flight(), [FLIGHT], links=(1, 2), search=QUICK)
     *_, last = study.steps()
     steps = [row.model["step_s"] for row in study.result(last.checkpoint).rows]
-    assert steps == [run(aircraft, replace(TWO, links_per_wing=n)).step_s for n in (1, 2)]
+    assert steps == [run(aircraft, EquivalentModel(links_per_wing=n)).step_s for n in (1, 2)]
     assert steps[0] > steps[1], "a rigid wing needs none shorter"
     assert set(steps) <= set(CANDIDATES_S)
-
-
-def test_the_document_may_leave_it_out() -> None:
-    """Left out it is the search's choice; given, the caller's."""
-    assert model_settings({}).step_s is None
-    assert model_settings({"step_s": 0.0025}).step_s == 0.0025

@@ -1,25 +1,31 @@
 """The law of the one contract: what the service accepts the library accepts, and refuses at the same place.
 
 The requests of every operation are spoilt in one to three places; the service judges each through
-``POST /validate/...``, the library by reading it. Neither may raise anything but its refusal.
+``POST /validate/...``, the library by reading it and, where it accepts, beginning the work. Neither may raise
+anything but its refusal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 
 from app.settings import Settings
-from morphcore.simulate.request import simulation_from_document
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, EXAMPLE_MATERIAL
 from morphdata.faults import InvalidInput
+from morphdata.identify import EXAMPLE_REQUEST
+from morphdata.operations import operation_named
+from morphdata.optimize import EXAMPLE_OPTIMIZATION
 from morphdata.parameters import EXAMPLE_PARAMETERS
+from morphdata.samples import EXAMPLE_SAMPLE
 from morphdata.simulate import EXAMPLE_SIMULATION
+from morphdata.study import EXAMPLE_STUDY
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.morphdata.mutations import mutated
+from worker.operations import WorkRefused, find_operation
 
 Document = dict[str, Any]
 
@@ -51,7 +57,44 @@ TAIL = {
 BODY = {"mass_kg": 875.0, "inertia_kg_m2": [[60.0, 0.0, -1.0], [0.0, 1800.0, 0.0], [-1.0, 0.0, 1850.0]]}
 AS_IDENTIFIED = {"lattice": {"chordwise": 2, "spanwise": 6}, "step_s": 0.005, "start": "given"}
 
+RICH_IDENTIFICATION: Document = {
+    **EXAMPLE_REQUEST,
+    "samples": [EXAMPLE_SAMPLE, {**EXAMPLE_SAMPLE, "name": "other", "role": "held_out"}],
+    "model": {
+        "links_per_wing": 2,
+        "separate_wings": True,
+        "aero_coefficients": ["lift_factor", "lag_s"],
+        "bounds": {"division": [0.2, 0.7], "stiffness_nm_rad": [1e3, 1e6], "lag_s": [1e-4, 0.1]},
+        "lattice": {"chordwise": 1, "spanwise": 4},
+        "step_s": 0.005,
+    },
+    "search": {
+        "method": "cma",
+        "particles": 8,
+        "max_seconds": 60.0,
+        "warm_start": {"parameters": EXAMPLE_PARAMETERS},
+    },
+    "execution": {"mode": "distributed", "chunks": 4},
+}
+RICH_OPTIMIZATION: Document = {
+    **EXAMPLE_OPTIMIZATION,
+    "model": {"parameters": EXAMPLE_PARAMETERS, "lattice": {"chordwise": 1, "spanwise": 4}, "step_s": 0.005},
+    "morph": {
+        "final_rad": 1.0,
+        "duration_s": 2.0,
+        "knots": 5,
+        "goal": "minimum_time",
+        "max_variation_rad2": 0.5,
+        "free_values": True,
+    },
+    "limits": {"max_rate_rad_s": 1.0, "max_accel_rad_s2": 8.0, "monotonic": False},
+    "weights": {"phi": 1.0, "theta": 0.5, "psi": 0.0},
+    "search": {"method": "pso", "particles": 20, "generations": 5, "seed": 3},
+    "flexible": {"elements": 4},
+}
 EXAMPLES: dict[str, tuple[Document, ...]] = {
+    "identify": (EXAMPLE_REQUEST, RICH_IDENTIFICATION),
+    "study": (EXAMPLE_STUDY, {**RICH_IDENTIFICATION, "model": {"links_per_wing": [1, 2]}, "search": {}}),
     "simulate": (
         EXAMPLE_SIMULATION,
         EXAMPLE_SIMULATION
@@ -74,9 +117,11 @@ EXAMPLES: dict[str, tuple[Document, ...]] = {
                 "parameters": {"model": EXAMPLE_PARAMETERS, "fit": [{"role": "train", "J_identified": 0.1}]},
             }
         },
-    )
+    ),
+    "optimize": (EXAMPLE_OPTIMIZATION, RICH_OPTIMIZATION),
 }
-READERS: dict[str, Callable[[Document], object]] = {"simulate": simulation_from_document}
+# what takes more than the request to see: whether a spline keeps the limits, the library finds by computing
+COMPUTED = ("/limits/max_rate_rad_s", "/limits/max_accel_rad_s2")
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +135,14 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService
 def refused_by_library(operation: str, document: Document) -> list[str]:
     """Pointers to what the library refuses; none where it accepts."""
     try:
-        READERS[operation](document)
+        operation_named(operation).request.parse(document)
     except InvalidInput as error:
         return [fault.pointer for fault in error.faults]
+    try:
+        find_operation(operation)(document, 1)
+    except WorkRefused as error:
+        if error.code == InvalidInput.code and error.pointer not in COMPUTED:
+            return [error.pointer]
     return []
 
 

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.optimise import Limits, Morph, ScheduleOptimisation, ScheduleSearch, Step
+from morphcore.optimise import ScheduleOptimisation, Step
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.simulate.schedule import Spline
+from morphdata.optimize import Limits, Morph
 from tests.identify.flights import reference_aircraft, reference_flight
 
 Array = NDArray[np.float64]
 
-SHORT = Morph(0.4, 0.8, settle_s=0.2)  # mean rate 0.5 rad/s
-QUICK = ScheduleSearch(seed=3, screen=2, starts=2, iterations=2)
+SHORT = Morph(final_rad=0.4, duration_s=0.8, settle_s=0.2)  # mean rate 0.5 rad/s
+QUICK = ScheduleSettings(seed=3, screen=2, starts=2, iterations=2)
 
 
 def optimisation(
@@ -24,7 +26,7 @@ def optimisation(
     limits: Limits = Limits(max_rate_rad_s=0.9),  # noqa: B008 - frozen
     *,
     links: int = 1,
-    search: ScheduleSearch = QUICK,
+    search: ScheduleSettings = QUICK,
     **options: Any,
 ) -> ScheduleOptimisation:
     """An optimisation with the physical guess of the example aircraft; no flexible flights unless asked."""

@@ -21,7 +21,6 @@ from morphcore.optimise import (
     Interrupted,
     Limits,
     Morph,
-    ScheduleSearch,
     Step,
     Weights,
     optimise_schedule,
@@ -29,6 +28,7 @@ from morphcore.optimise import (
 from morphcore.optimise import optimisation as module
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import MorphFlights
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import decode
 from morphcore.simulate.flight import FlightStep
 from morphcore.simulate.schedule import Spline
@@ -38,7 +38,7 @@ from tests.identify.flights import EXAMPLES, reference_aircraft, reference_docum
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
 from tests.simulate.flights import fly
 
-SWARM = ScheduleSearch(method="pso", seed=3, swarm=SwarmSettings(particles=6, generations=3))
+SWARM = ScheduleSettings(method="pso", seed=3, swarm=SwarmSettings(particles=6, generations=3))
 TORQUE = Limits(max_rate_rad_s=0.9, max_hinge_torque_nm=560.0)  # the centre of the limits needs more
 
 
@@ -66,7 +66,10 @@ def test_the_papers_problem_is_solved_20_per_cent_below_constant_rate() -> None:
     Found by a search of three starts with two links; the limits hold in 20,000 samples of the schedule.
     """
     run = optimisation(
-        Morph(1.0, 2.0), Limits(1.0), links=2, search=ScheduleSearch(screen=2, starts=2, iterations=3)
+        Morph(final_rad=1.0, duration_s=2.0),
+        Limits(max_rate_rad_s=1.0),
+        links=2,
+        search=ScheduleSettings(screen=2, starts=2, iterations=3),
     )
     result = run.result(last(run).checkpoint)
     reduction, model = result.reduction()
@@ -81,10 +84,14 @@ def test_the_papers_problem_is_solved_20_per_cent_below_constant_rate() -> None:
 
 @pytest.mark.parametrize(
     ("search", "limits"),
-    [(QUICK, Limits(0.9, 4.0)), (SWARM, TORQUE), (QUICK, Limits(None, 5.0, monotonic=False))],
+    [
+        (QUICK, Limits(max_rate_rad_s=0.9, max_accel_rad_s2=4.0)),
+        (SWARM, TORQUE),
+        (QUICK, Limits(max_accel_rad_s2=5.0, monotonic=False)),
+    ],
 )
 def test_every_flown_candidate_keeps_the_limits(
-    search: ScheduleSearch, limits: Limits, monkeypatch: pytest.MonkeyPatch
+    search: ScheduleSettings, limits: Limits, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing is flown in a search, probes and particles alike, that breaks rate, acceleration or sign."""
     flown: list[Spline] = []
@@ -95,7 +102,9 @@ def test_every_flown_candidate_keeps_the_limits(
         return fly(self, schedules, **options)
 
     monkeypatch.setattr(MorphFlights, "fly", spy)
-    run = optimisation(replace(SHORT, free_values=limits.max_accel_rad_s2 == 5.0), limits, search=search)
+    run = optimisation(
+        SHORT.model_copy(update={"free_values": limits.max_accel_rad_s2 == 5.0}), limits, search=search
+    )
     result = run.result(last(run).checkpoint)
     assert len(flown) > 20
     for schedule in flown:
@@ -111,13 +120,13 @@ def test_every_flown_candidate_keeps_the_limits(
 @pytest.mark.parametrize(
     ("search", "limits", "cuts"),
     [
-        (QUICK, Limits(0.9), (0.0, 0.5, 0.8)),
-        (SWARM, Limits(0.9), (0.0, 0.5)),
+        (QUICK, Limits(max_rate_rad_s=0.9), (0.0, 0.5, 0.8)),
+        (SWARM, Limits(max_rate_rad_s=0.9), (0.0, 0.5)),
         pytest.param(QUICK, TORQUE, (0.15,), marks=pytest.mark.slow),
     ],
 )
 def test_resumes_from_any_step_to_the_identical_result(
-    search: ScheduleSearch, limits: Limits, cuts: tuple[float, ...]
+    search: ScheduleSettings, limits: Limits, cuts: tuple[float, ...]
 ) -> None:
     """A search cut off after any step and begun again from its bytes ends as the undisturbed one."""
     steps = list(optimisation(limits=limits, search=search).steps())
@@ -212,10 +221,10 @@ def test_time_budget_is_shared_between_the_searches() -> None:
 @pytest.mark.slow
 def test_free_values_are_no_worse_than_fixed_ones() -> None:
     """With the angles at the knots free too, the best schedule disturbs less."""
-    limits = Limits(0.9, 6.0)
-    search = ScheduleSearch(seed=1, screen=2, starts=2, iterations=5)
+    limits = Limits(max_rate_rad_s=0.9, max_accel_rad_s2=6.0)
+    search = ScheduleSettings(seed=1, screen=2, starts=2, iterations=5)
     fixed, free = (
-        last(optimisation(replace(SHORT, free_values=free), limits, search=search)).best_cost
+        last(optimisation(SHORT.model_copy(update={"free_values": free}), limits, search=search)).best_cost
         for free in (False, True)
     )
     assert free < fixed
@@ -223,7 +232,7 @@ def test_free_values_are_no_worse_than_fixed_ones() -> None:
 
 def test_a_torque_that_no_schedule_keeps_is_an_error_with_a_way_out() -> None:
     """An impossible torque limit is named with the least torque found, and what a longer morph would do."""
-    run = optimisation(limits=replace(TORQUE, max_hinge_torque_nm=430.0))
+    run = optimisation(limits=TORQUE.model_copy(update={"max_hinge_torque_nm": 430.0}))
     with pytest.raises(InvalidInput) as caught:
         last(run)
     assert caught.value.pointer == "/limits/max_hinge_torque_nm"
@@ -231,13 +240,18 @@ def test_a_torque_that_no_schedule_keeps_is_an_error_with_a_way_out() -> None:
     longer = float(caught.value.hint.split("about ")[1].split(",")[0])
     assert told > 430.0
     assert longer > SHORT.duration_s
-    last(optimisation(replace(SHORT, duration_s=longer), replace(TORQUE, max_hinge_torque_nm=430.0)))
+    last(
+        optimisation(
+            SHORT.model_copy(update={"duration_s": longer}),
+            TORQUE.model_copy(update={"max_hinge_torque_nm": 430.0}),
+        )
+    )
 
 
 def test_minimum_time_agrees_with_the_front() -> None:
     """The shortest morph below a variation of the front is that point of it, or a shorter one."""
-    limits = Limits(0.9, 6.0)
-    front_run = optimisation(replace(SHORT, goal="pareto", front_points=2), limits)
+    limits = Limits(max_rate_rad_s=0.9, max_accel_rad_s2=6.0)
+    front_run = optimisation(SHORT.model_copy(update={"goal": "pareto", "front_points": 2}), limits)
     front = front_run.result(last(front_run).checkpoint).to_document()
     times = [point["duration_s"] for point in front["searched"]]
     assert times[0] >= front_run.space(0.8).quickest[0]
@@ -253,7 +267,9 @@ def test_minimum_time_agrees_with_the_front() -> None:
         assert point["beaten"] == beaten
         assert point["constant_rad2"] > 0.0
     point = front["pareto"][-1]
-    morph = replace(SHORT, goal="minimum_time", max_variation_rad2=1.001 * point["variation_rad2"])
+    morph = SHORT.model_copy(
+        update={"goal": "minimum_time", "max_variation_rad2": 1.001 * point["variation_rad2"]}
+    )
     quickest = optimisation(morph, limits)
     document = quickest.result(last(quickest).checkpoint).to_document()
     assert document["duration_s"] <= point["duration_s"] + 1e-9
@@ -356,8 +372,9 @@ def test_the_number_of_threads_does_not_change_the_answer() -> None:
     code = (
         "import json;"
         "from tests.optimise.test_settings import request;"
-        "from morphcore.optimise import optimisation_from_document as begin;"
-        "run = begin(request(), {threads}); *_, step = run.steps();"
+        "from morphcore.optimise import optimisation_from_request as begin;"
+        "from morphdata.optimize import OptimizeRequest;"
+        "run = begin(OptimizeRequest.parse(request()), {threads}); *_, step = run.steps();"
         "found = run.result(step.checkpoint).to_document();"
         "print(json.dumps([found['schedule'], found['variation']]))"
     )
@@ -384,7 +401,9 @@ def test_the_number_of_threads_does_not_change_the_answer() -> None:
 def test_the_papers_problem_in_the_flexible_model() -> None:
     """With three links the default search ends a quarter below constant rate in the flexible model too."""
     parameters = physical_guess(chain_model(reference_aircraft(), reference_flight(), 3))
-    result = optimise_schedule(*reference_documents(), parameters, morph=Morph(1.0, 2.0), limits=Limits(1.0))
+    limits = Limits(max_rate_rad_s=1.0)
+    morph = Morph(final_rad=1.0, duration_s=2.0)
+    result = optimise_schedule(*reference_documents(), parameters, morph=morph, limits=limits)
     reduction, model = result.reduction()
     assert model == "flexible"
     assert reduction is not None
@@ -395,11 +414,11 @@ def test_the_papers_problem_in_the_flexible_model() -> None:
 @pytest.mark.slow
 def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
     """The paper's 50 particles, 20 generations of them, do not find better than the descent's few flights."""
-    morph, limits = Morph(1.0, 2.0), Limits(1.0)
-    swarm = ScheduleSearch(method="pso", swarm=SwarmSettings(particles=50, generations=20))
+    morph, limits = Morph(final_rad=1.0, duration_s=2.0), Limits(max_rate_rad_s=1.0)
+    swarm = ScheduleSettings(method="pso", swarm=SwarmSettings(particles=50, generations=20))
     steps = {
         search.method: last(optimisation(morph, limits, links=2, search=search))
-        for search in (ScheduleSearch(), swarm)
+        for search in (ScheduleSettings(), swarm)
     }
     assert steps["hybrid"].best_cost <= steps["pso"].best_cost
     assert steps["pso"].best_cost < 1.03 * steps["hybrid"].best_cost
@@ -408,7 +427,7 @@ def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
 
 def test_the_step_holds_for_both_models() -> None:
     """The step is the longest with which both models fly the constant rate well enough, or the given one."""
-    jerk, limits = Morph(1.0, 0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
+    jerk, limits = Morph(final_rad=1.0, duration_s=0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
     run = optimisation(jerk, limits, links=2)
     flight = [run.constant(jerk.duration_s)] * len(run.aircraft.surfaces), run.times_s
     alone = {}

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from app.jobs import store
-from app.optimize.checks import shortest_morph_s
 from morphdata.optimize import Limits
 from tests.app.calls import assert_named, changed, post
 from tests.app.request_documents import RESULT, optimize_document
@@ -70,7 +69,7 @@ def test_bad_field_is_named(
 )
 def test_the_shortest_morph_is_that_of_full_power(limits: Limits, expected_s: float) -> None:
     """Rest to rest over 1 rad takes no less than full acceleration, full rate and full braking."""
-    assert math.isclose(shortest_morph_s(1.0, limits), expected_s)
+    assert math.isclose(limits.shortest_morph_s(1.0), expected_s)
 
 
 def test_a_front_needs_a_limit(service: RunningService) -> None:
