@@ -11,7 +11,7 @@ from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
 from app.models.checks import known_model_faults
-from app.models.left_models import left_model
+from app.models.extraction import extracted_model
 from app.models.service import as_given
 from morphdata.faults import Fault
 from morphdata.identify import IdentifyRequest
@@ -70,7 +70,7 @@ def _of_job(session: Session, owner: str, job_id: str) -> Document:
     except JobNotFound as error:
         raise _refused("job_not_found", error.detail, "/job_id", error.hint) from None
     text = jobs.result_json(session, owner, job_id)
-    left = None if text is None else left_model(job.operation, json.loads(text))
+    left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:
         state = "has ended" if job.finished else f"is {job.status.value}"
         hint = "Wait for its end, or cancel it: what it has found by then is its result."

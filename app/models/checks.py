@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from app.models.left_models import has_flown
+from app.models.extraction import has_flown
 from morphdata.faults import Fault
 from morphdata.parameters import AXES, KnownModel, Parameters, WholeResult
 

@@ -15,7 +15,7 @@ from app.observability import tracing
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
 from tests.waiting import until
-from worker.telling import Phases, told
+from worker.spans import PhaseSpans, attempt_span
 
 pytest.importorskip("opentelemetry.sdk")
 
@@ -52,8 +52,8 @@ def test_one_trace_from_the_caller_to_the_attempt(
     claim = service.claim(answer.json()["id"])
     assert claim.traceparent is not None
     assert claim.request_id == answer.headers["x-request-id"]
-    with told(claim):
-        phases = Phases()
+    with attempt_span(claim):
+        phases = PhaseSpans()
         for phase in ("swarm", "swarm", "polish"):
             phases.note(phase)
         phases.close()
