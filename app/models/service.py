@@ -1,4 +1,4 @@
-"""Identified models as the endpoints show them, and as other requests use them."""
+"""Identified models as requests use them."""
 
 from __future__ import annotations
 
@@ -9,36 +9,10 @@ from app.documents import Document
 from app.errors import InvalidRequest, ModelNotFound
 from app.models import repository
 from app.models.checks import known_model_faults
-from app.models.schemas import IdentifiedModel, ModelPage, ModelSummary
 from morphdata.faults import Fault
 from morphdata.parameters import KnownModel, Parameters, WholeResult
 
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # a model flies as it was identified, unless told otherwise
-
-
-def _shown(model: repository.ModelSummary) -> ModelSummary:
-    return ModelSummary(
-        id=model.id,
-        name=model.name,
-        links_per_wing=model.links_per_wing,
-        job_id=model.job_id,
-        created_at=model.created_at,
-    )
-
-
-def page(session: Session, owner: str, *, cursor: str | None, limit: int) -> ModelPage:
-    """One page of the owner's models, newest first."""
-    found = repository.list_models(session, owner, before=cursor, limit=limit + 1)
-    shown = found[:limit]
-    return ModelPage(
-        models=[_shown(model) for model in shown], next_cursor=shown[-1].id if len(found) > limit else None
-    )
-
-
-def get(session: Session, owner: str, model_id: str) -> IdentifiedModel:
-    """One model with its document."""
-    summary, document = repository.get_model(session, owner, model_id)
-    return IdentifiedModel(**_shown(summary).model_dump(), **document)
 
 
 def known_model(session: Session, owner: str, model: KnownModel, pointer: str = "/model") -> Document:

@@ -14,8 +14,8 @@ from app.http.context import Caller
 from app.keys.quota import charge_bytes
 from app.parsing.pool import refusal
 from app.trajectories.checks import columns_faults, file_faults
-from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
-from app.trajectories.schemas import TrajectoryUpload
+from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.faults import Fault
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.flight import INLINE
@@ -74,7 +74,7 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
 
 def store_trajectory(
     session: Session, caller: Caller, upload: TrajectoryUpload, pointer: str
-) -> StoredTrajectory:
+) -> TrajectorySummary:
     """Check and store a flight.
 
     Raises
