@@ -52,7 +52,7 @@ def make_app(settings: Settings) -> Celery:
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
-        worker_consumer="worker.consumer:PatientConsumer",
+        worker_consumer="worker.consumer:IndependentConsumer",
         worker_pool_start_method="fork",  # children inherit the pipe of `worker.shutdown`
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,

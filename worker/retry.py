@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
 
 FIRST_PAUSE_S = 0.5  # before the job store is asked again; doubles
-LONGEST_PAUSE_S = 4.0
+MAX_PAUSE_S = 4.0
 FULL_TRIES = 4  # somebody may be making room; then the job says that there is none
 SHUTDOWN_PATIENCE_S = 5.0  # a worker that ends waits so long for the job store; then the reaper does the rest
 
@@ -115,4 +115,4 @@ class Retry:
                 if self._clock() - shutdown_at > SHUTDOWN_PATIENCE_S:
                     raise StaleClaim
             self._sleep(min(pause_s, 1.0) if shutdown_at is not None else pause_s)
-            pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
+            pause_s = min(2.0 * pause_s, MAX_PAUSE_S)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, Row, and_, func, select, update
@@ -11,7 +10,7 @@ from sqlalchemy import ColumnElement, Row, and_, func, select, update
 from app.database import Session, database_time
 from app.documents import Document
 from app.jobs.chunk_rows import CHUNKS, HANDED_OUT, OPEN, RUNNING, must_go_on
-from app.jobs.records import HELD, JobStatus
+from app.jobs.records import HELD, JobStatus, ReapReport
 from app.jobs.rows import JOBS
 from app.leases import Note
 from app.observability.counters import count
@@ -27,17 +26,8 @@ ADVANCE_WITHIN_S = 2.0  # who stores the last chunk takes the job over in the sa
 WIND_DOWN_WITHIN_S = 15.0  # a woken worker ends a cancelled job at once; if none is free, we do
 
 
-@dataclass(frozen=True, slots=True)
-class ChunkReport:
-    """What a round did to spread jobs: ids of those that ended, and ids to publish, one for each chunk."""
-
-    failed: tuple[str, ...] = ()
-    cancelled: tuple[str, ...] = ()
-    publish: tuple[str, ...] = ()
-
-
-def reap_chunks(session: Session, clock: ColumnElement[float], republish_after_s: float) -> ChunkReport:
-    """Make one round; publish after the commit."""
+def reap_chunks(session: Session, clock: ColumnElement[float], republish_after_s: float) -> ReapReport:
+    """Make one round; publish each id of ``publish``, one for each chunk, after the commit."""
     lost = _lost_chunks(session, clock)
     # jobs before chunks, as everywhere: who locks in another order waits for each other
     failed = tuple(dict.fromkeys(row.job_id for row in lost if _given_up(row) and _fail(session, row)))
@@ -47,7 +37,7 @@ def reap_chunks(session: Session, clock: ColumnElement[float], republish_after_s
     unheard = _unheard(session, clock, republish_after_s)
     again |= Counter(unheard)
     publish = tuple(again.elements())
-    return ChunkReport(failed, cancelled, publish[:PUBLISH_LIMIT])
+    return ReapReport(failed=failed, cancelled=cancelled, publish=publish[:PUBLISH_LIMIT])
 
 
 def _lost_chunks(session: Session, clock: ColumnElement[float]) -> list[Row[*tuple[Any, ...]]]:

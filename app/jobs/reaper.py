@@ -54,7 +54,7 @@ def reap(
     clock: ColumnElement[float] = database_time() if now is None else literal(now)
     done: dict[str, list[str]] = {"requeued": [], "failed": [], "cancelled": [], "expired": []}
     for row in _overdue(session, clock, deadline_grace_s):
-        kind, event, values = _verdict(row)
+        event, values = _verdict(row)
         error = {"error": values["error"]} if "error" in values else {}
         changed = JOBS.reap(
             session,
@@ -65,7 +65,7 @@ def reap(
             **values,
         )
         if changed is not None:
-            done[kind].append(row.id)
+            done[event].append(row.id)
     spread = reap_chunks(session, clock, republish_after_s)
     unheard = _unheard(session, clock, republish_after_s, set(done["requeued"]))
     return ReapReport(
@@ -107,33 +107,33 @@ def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> l
     return list(rows.all())
 
 
-def _verdict(row: Row[Any]) -> tuple[str, str, Document]:
-    """Decide what becomes of an overdue job: (report list, event type, columns to set)."""
+def _verdict(row: Row[Any]) -> tuple[str, Document]:
+    """Decide what becomes of an overdue job: event type and columns to set."""
     end: Document = {"finished_at": database_time()}
     if row.status == JobStatus.CANCELLING.value:
-        return "cancelled", "cancelled", {**end, "status": JobStatus.CANCELLED.value}
+        return "cancelled", {**end, "status": JobStatus.CANCELLED.value}
     if row.deadline_passed and row.started_at is None:
         error = {
             "code": "not_started_in_time",
             "detail": "No worker was free before the time that execution.expires_in_s set.",
             "hint": "Submit it again with a longer execution.expires_in_s, or without one.",
         }
-        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
+        return "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
     if row.deadline_passed:
         error = {
             "code": "deadline_exceeded",
             "detail": "The job did not end before its deadline.",
             "hint": "Raise search.max_seconds, or search with fewer particles, generations or links.",
         }
-        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
+        return "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
     if row.attempt >= row.max_attempts:
         error = {
             "code": "worker_lost",
             "detail": f"The worker died or stalled in each of {row.attempt} attempts.",
             "hint": "A search that does not fit in memory does this: fewer particles, or see its log.",
         }
-        return "failed", "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
-    return "requeued", "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}
+        return "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
+    return "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}
 
 
 def _unheard(

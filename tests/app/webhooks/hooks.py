@@ -18,7 +18,7 @@ from app.leases import Note
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import repository
 from app.webhooks.outbox import note_challenge, note_end
-from app.webhooks.posting import Patience
+from app.webhooks.posting import Timeouts
 from app.webhooks.schemas import EVERY_EVENT
 from app.webhooks.sender import SenderSettings, WebhookSender
 from app.webhooks.signature import new_secret
@@ -109,7 +109,7 @@ def sender(database: Database, **settings: Any) -> WebhookSender:
     """A sender to whom loopback is the internet."""
     chosen: dict[str, Any] = {
         "policy": TO_LOOPBACK,
-        "patience": Patience(2.0, 2.0, 4.0),
+        "timeouts": Timeouts(2.0, 2.0, 4.0),
         "poll_s": 0.02,
         "rng": Random(1),
         **settings,

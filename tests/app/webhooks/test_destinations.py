@@ -231,7 +231,7 @@ def test_a_success_ends_the_row_of_failures(database: Database, there: Receiver)
         answers["/a"] = code
         many_ends(database, 1)
         clock.turn(2 * DELAYS_S[-1])
-        send_due(database, clock=clock, most_at_once=1)
+        send_due(database, clock=clock, max_at_once=1)
     row = hook_row(database, hook_id)
     assert (row.failures, row.disabled_at) == (MAX_TRIES - 1, None)
 

@@ -14,7 +14,7 @@ import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
 from app.webhooks.addresses import AddressPolicy
-from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Patience, Poster
+from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Poster, Timeouts
 from app.webhooks.signature import new_secret, signed_headers
 from tests.app.webhooks.receiver import HOST, TO_LOOPBACK, Authority, Receiver, at_loopback, receiver, status
 
@@ -38,12 +38,12 @@ def post(
     url: str,
     authority: Authority | None,
     policy: AddressPolicy = TO_LOOPBACK,
-    patience: Patience | None = None,
+    timeouts: Timeouts | None = None,
 ) -> Answer:
     """Post once, believing `authority` or the usual ones."""
 
     async def once() -> Answer:
-        async with Poster(policy, authority and authority.trust(), patience) as poster:
+        async with Poster(policy, authority and authority.trust(), timeouts) as poster:
             return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
 
     return asyncio.run(once())
@@ -157,7 +157,7 @@ def test_a_slow_drip_ends_with_the_patience(server: Receiver, authority: Authori
 
     server.answer = drip
     start = time.monotonic()
-    answer = post(server.url(), authority, patience=Patience(connect_s=5.0, read_s=5.0, total_s=1.0))
+    answer = post(server.url(), authority, timeouts=Timeouts(connect_s=5.0, read_s=5.0, total_s=1.0))
     assert (answer.status, answer.error) == (None, "There was no answer in time.")
     assert time.monotonic() - start < 10.0  # the drip would last 20 s
 
