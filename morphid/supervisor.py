@@ -18,7 +18,7 @@ from typing import IO
 from app.private_files import PRIVATE_UMASK, close_to_others, make_private_folder, open_private
 
 FIRST_PAUSE_S = 0.5  # before the first restart: long enough to free a port, short enough to go unnoticed
-LONGEST_PAUSE_S = 30.0
+MAX_PAUSE_S = 30.0
 HEALTHY_AFTER_S = 60.0  # a child that lived this long starts again with the first pause
 POLL_S = 0.1
 LOG_LIMIT_BYTES = 10_000_000  # a longer log is begun anew at the next start
@@ -108,7 +108,7 @@ class Child:
         self._kill_group()  # what it leaves behind would work beside its successor
         if now - self._started_at > HEALTHY_AFTER_S:
             self._pause_s = FIRST_PAUSE_S
-        pause_s, self._pause_s = self._pause_s, min(2.0 * self._pause_s, LONGEST_PAUSE_S)
+        pause_s, self._pause_s = self._pause_s, min(2.0 * self._pause_s, MAX_PAUSE_S)
         self._start_again_at = now + pause_s
         return f"{self.spec.name} ended ({describe_exit(code)}); starting it again in {pause_s:g} s"
 

@@ -21,12 +21,13 @@ from celery.signals import (
 )
 from kombu.exceptions import OperationalError
 
+from app.jobs.queue import QUEUE
 from app.jobs.transport import celery_broker
 from app.observability.logs import configure_logging
 from app.observability.tracing import stop_tracing
 from app.settings import Settings, doubtful_variables, settings_or_exit
 from worker import numerics, shutdown
-from worker.hints import QUEUE, REAP
+from worker.hints import REAP
 from worker.presence import Presence
 from worker.row_watch import RowWatch
 
@@ -51,7 +52,7 @@ def make_app(settings: Settings) -> Celery:
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
-        worker_consumer="worker.consumer:PatientConsumer",
+        worker_consumer="worker.consumer:IndependentConsumer",
         worker_pool_start_method="fork",  # children inherit the pipe of `worker.shutdown`
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,

@@ -23,7 +23,7 @@ RETRY_EVERY_S = 1.0
 SILENT = {"without_gossip": True, "without_heartbeat": True, "without_mingle": True}
 
 
-class PatientConsumer(Consumer):  # type: ignore[misc]  # celery carries no types
+class IndependentConsumer(Consumer):  # type: ignore[misc]  # celery carries no types
     """The consumer of a worker that can do without a broker."""
 
     def __init__(

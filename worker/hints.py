@@ -16,10 +16,10 @@ from uuid import uuid4
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter
 
-QUEUE = "morphid"
-RUN_JOB = "morphid.run_job"
+from app.jobs.queue import QUEUE, RUN_JOB
+
 REAP = "morphid.reap"
-LONGEST_BYTES = 16_384  # ours have about a thousand
+MAX_BYTES = 16_384  # ours have about a thousand
 
 
 class _Headers(BaseModel):
@@ -120,7 +120,7 @@ def read_hint(message: bytes, clock: Callable[[], float] = time.time) -> Hint | 
     ------
     ValueError : it is malformed.
     """
-    if len(message) > LONGEST_BYTES:
+    if len(message) > MAX_BYTES:
         raise ValueError("too long")
     envelope = _Envelope.model_validate_json(message)
     headers, body = envelope.headers, base64.b64decode(envelope.body, validate=True)

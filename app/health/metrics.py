@@ -15,11 +15,11 @@ from app.health.records import Snapshot
 from app.observability import job_counts
 from app.observability.counters import Counted
 from app.observability.request_metrics import REGISTRY
-from app.version import VERSION
+from morphdata.version import VERSION
 
 FRESH_S = 2.0  # scrapers that come at once share one look at the rows
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-TOLD = {  # counters by the name of their rows
+COUNTERS = {  # by the name of their rows
     job_counts.ATTEMPTS: ("morphid_job_attempts", "Claims of jobs by workers.", ("operation",)),
     job_counts.FINISHED: ("morphid_jobs_finished", "Jobs that ended, and how.", ("operation", "status")),
     job_counts.FLIGHTS: ("morphid_flights", "Flights that ended jobs have flown.", ("operation",)),
@@ -106,7 +106,7 @@ def _gauge(name: str, help_text: str, label: str, values: Iterable[tuple[str, fl
 
 
 def _counters(counters: Iterable[Counted]) -> Iterator[Metric]:
-    for row_name, (name, help_text, labels) in TOLD.items():
+    for row_name, (name, help_text, labels) in COUNTERS.items():
         family = CounterMetricFamily(name, help_text, labels=labels)
         found = [each for each in counters if each.name == row_name]
         for each in found:

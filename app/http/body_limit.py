@@ -26,7 +26,7 @@ class BodyLimits:
         Largest body that is let through.
     grace_s : float
         Time to send a body of any size.
-    least_rate : float
+    min_rate : float
         Bytes per second that a larger one must arrive with on top.
     max_total_bytes : int
         All bodies together that are being received or read; beyond it requests are told to come again.
@@ -36,7 +36,7 @@ class BodyLimits:
 
     max_bytes: int
     grace_s: float = 20.0
-    least_rate: float = 16_384.0
+    min_rate: float = 16_384.0
     max_total_bytes: int = 2**30
     max_owner_bytes: int = 2**30
 
@@ -120,7 +120,7 @@ class _Body:
         start = time.monotonic()
         try:
             async with (
-                asyncio.timeout(limits.grace_s + self.counted / limits.least_rate - self.waited_s),
+                asyncio.timeout(limits.grace_s + self.counted / limits.min_rate - self.waited_s),
                 self.key.while_it_opens(),
             ):
                 message = await self.from_client()

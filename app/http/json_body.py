@@ -22,7 +22,7 @@ from app.http.context import Service, current_caller
 from app.parsing.json_text import parse_json
 
 # a process costs 50 ms; parsing this much holds up the other requests for 10
-LARGEST_HERE = 2**19
+MAX_BYTES_HERE = 2**19
 # what any route with a body may answer
 BODY_ERRORS = (MalformedBody, SlowBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, ServiceBusy)
 
@@ -68,12 +68,12 @@ async def json_document(request: Request) -> Any:
         Too many large ones are being read.
     """
     service: Service = request.app.state.service
-    spool = tempfile.SpooledTemporaryFile(max_size=LARGEST_HERE)  # noqa: SIM115 - closed with its upload
+    spool = tempfile.SpooledTemporaryFile(max_size=MAX_BYTES_HERE)  # noqa: SIM115 - closed with its upload
     file = UploadFile(spool, size=0)  # type: ignore[arg-type]  # what it makes of uploads itself
     try:
         async for piece in request.stream():
             await file.write(piece)
-        if (file.size or 0) > LARGEST_HERE:
+        if (file.size or 0) > MAX_BYTES_HERE:
             caller = await current_caller(request)
             return await service.parsers.json_document(caller.owner, file.file)
         await file.seek(0)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import logging
 import re
 import resource
@@ -24,14 +23,14 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
 from app.errors import ServiceBusy, ServiceError
-from app.http.problems import MEDIA_TYPE, problem_document
+from app.http.early_answer import closing_answer
 from app.observability.logs import configure_logging
 from app.settings import Settings, doubtful_variables, settings_or_exit
 
 MAX_HEADER_BYTES = 32 * 1024  # request line and headers
 END_OF_HEADERS = re.compile(rb"\n\r?\n")
 LINGER_S = 1.0  # to read an answer that came before the end of the request
-LEAST_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
+MIN_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
 DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
 KEEP_ALIVE_S = 5
 STOP_S = 5  # for open answers when the process is told to end
@@ -47,7 +46,7 @@ class ConnectionLimits:
 
     Attributes
     ----------
-    most : int
+    connections : int
         Connections at once.
     header_s : float
         From the first byte of a request (or the connection's beginning) to the end of its headers.
@@ -55,7 +54,7 @@ class ConnectionLimits:
         After which it is looked whether a client reads the answer that waits for it.
     """
 
-    most: int = 4096
+    connections: int = 4096
     header_s: float = 10.0
     write_s: float = 30.0
 
@@ -162,7 +161,7 @@ class GuardedProtocol(H11Protocol):
         """Take a connection, or turn it away when there are too many."""
         super().connection_made(transport)
         _notice_dead_peers(transport)
-        if len(self.connections) > self.limits.most:
+        if len(self.connections) > self.limits.connections:
             self._refuse(ServiceBusy("There are too many connections to this service."))
             self.transport.close()  # at once: each one that lingers is one more
         else:
@@ -255,7 +254,7 @@ class GuardedProtocol(H11Protocol):
 
     def _look_at_reader(self) -> None:
         unread = self.transport.get_write_buffer_size()
-        if self._unread - unread < LEAST_READ_RATE * self.limits.write_s:
+        if self._unread - unread < MIN_READ_RATE * self.limits.write_s:
             logger.info("a client that does not read was hung up on")
             self.transport.abort()
             return
@@ -271,13 +270,7 @@ class GuardedProtocol(H11Protocol):
 
 
 def _answer(error: ServiceError) -> bytes:
-    content = json.dumps(problem_document(error, "")).encode()
-    headers = {
-        "Content-Type": MEDIA_TYPE,
-        "Content-Length": str(len(content)),
-        **error.headers,
-        "Connection": "close",
-    }
+    headers, content = closing_answer(error, "")
     lines = [f"HTTP/1.1 {error.status} ", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
     return "\r\n".join(lines).encode() + content
 
@@ -293,7 +286,7 @@ def _notice_dead_peers(transport: asyncio.Transport) -> None:
             connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
-def most_connections(asked: int) -> int:
+def connection_limit(asked: int) -> int:
     """Let the process open as many files as it may, and bound connections by that."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     needed = asked + SPARE_FILES
@@ -308,7 +301,7 @@ def most_connections(asked: int) -> int:
 def guarded_config(app: Any, settings: Settings, **others: Any) -> GuardedConfig:
     """Uvicorn's configuration for `app` with the limits of `settings`; `others` as in `uvicorn.Config`."""
     limits = ConnectionLimits(
-        most=most_connections(settings.max_connections),
+        connections=connection_limit(settings.max_connections),
         header_s=settings.header_timeout_s,
         write_s=settings.write_timeout_s,
     )

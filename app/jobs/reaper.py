@@ -14,8 +14,9 @@ from app.database import Session, database_time
 from app.documents import Document
 from app.jobs.chunk_reaper import reap_chunks
 from app.jobs.records import HELD, JobStatus, ReapReport
-from app.jobs.rows import transition
+from app.jobs.rows import JOBS
 from app.jobs.waiting import idle_slots
+from app.leases import Note
 from app.tables import jobs
 
 DEADLINE_GRACE_S = (
@@ -53,21 +54,18 @@ def reap(
     clock: ColumnElement[float] = database_time() if now is None else literal(now)
     done: dict[str, list[str]] = {"requeued": [], "failed": [], "cancelled": [], "expired": []}
     for row in _overdue(session, clock, deadline_grace_s):
-        kind, event, values = _verdict(row)
-        changed = transition(
+        event, values = _verdict(row)
+        error = {"error": values["error"]} if "error" in values else {}
+        changed = JOBS.reap(
             session,
-            jobs.c.id == row.id,
-            jobs.c.fence == row.fence,
+            (row.id,),
+            row.fence,
             jobs.c.status == row.status,
-            event=event,
-            payload={"reason": row.reason, **({"error": values["error"]} if "error" in values else {})},
-            fence=jobs.c.fence + 1,  # a stalled worker that wakes up now writes in vain
-            lease_until=None,
-            worker=None,
+            note=Note(event, {"reason": row.reason, **error}),
             **values,
         )
         if changed is not None:
-            done[kind].append(row.id)
+            done[event].append(row.id)
     spread = reap_chunks(session, clock, republish_after_s)
     unheard = _unheard(session, clock, republish_after_s, set(done["requeued"]))
     return ReapReport(
@@ -88,9 +86,8 @@ def log_ends(report: ReapReport) -> None:
 
 def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> list[Row[Any]]:
     """Jobs whose lease ran out, or whose deadline has passed."""
-    held = jobs.c.status.in_(HELD)
-    lease_lost = held & (jobs.c.lease_until < clock)
-    overrun = held & (jobs.c.deadline_at + grace_s < clock)
+    lease_lost = JOBS.lost(clock)
+    overrun = jobs.c.status.in_(HELD) & (jobs.c.deadline_at + grace_s < clock)
     waited_too_long = (jobs.c.status == JobStatus.QUEUED.value) & (jobs.c.deadline_at < clock)
     rows = session.execute(
         select(
@@ -110,33 +107,33 @@ def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> l
     return list(rows.all())
 
 
-def _verdict(row: Row[Any]) -> tuple[str, str, Document]:
-    """Decide what becomes of an overdue job: (report list, event type, columns to set)."""
+def _verdict(row: Row[Any]) -> tuple[str, Document]:
+    """Decide what becomes of an overdue job: event type and columns to set."""
     end: Document = {"finished_at": database_time()}
     if row.status == JobStatus.CANCELLING.value:
-        return "cancelled", "cancelled", {**end, "status": JobStatus.CANCELLED.value}
+        return "cancelled", {**end, "status": JobStatus.CANCELLED.value}
     if row.deadline_passed and row.started_at is None:
         error = {
             "code": "not_started_in_time",
             "detail": "No worker was free before the time that execution.expires_in_s set.",
             "hint": "Submit it again with a longer execution.expires_in_s, or without one.",
         }
-        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
+        return "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
     if row.deadline_passed:
         error = {
             "code": "deadline_exceeded",
             "detail": "The job did not end before its deadline.",
             "hint": "Raise search.max_seconds, or search with fewer particles, generations or links.",
         }
-        return "expired", "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
+        return "expired", {**end, "status": JobStatus.EXPIRED.value, "error": error}
     if row.attempt >= row.max_attempts:
         error = {
             "code": "worker_lost",
             "detail": f"The worker died or stalled in each of {row.attempt} attempts.",
             "hint": "A search that does not fit in memory does this: fewer particles, or see its log.",
         }
-        return "failed", "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
-    return "requeued", "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}
+        return "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
+    return "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}
 
 
 def _unheard(

@@ -15,11 +15,11 @@ MAGIC = b"MPF1"
 HEAD = struct.Struct("<4sII")  # magic, bytes of the JSON text, count of arrays
 ARRAY = struct.Struct("<cQ")  # type code, bytes
 WIDTHS = {b"d": 8, b"q": 8}  # float64, int64
-SHORTEST_ARRAY = 64  # items; shorter lists stay in the JSON text
-MOST_EXCEPTIONS = 20  # of a list: items that are no numbers, kept beside it so that their place can be named
+MIN_ARRAY = 64  # items; shorter lists stay in the JSON text
+MAX_EXCEPTIONS = 20  # of a list: items that are no numbers, kept beside it so that their place can be named
 MARK = "\x00"  # key of a place holder; no text from outside holds this character
 MAX_TEXT_BYTES = 4 * 2**20  # of everything that is no number; our requests need some kilobytes
-LARGEST_EXACT = 2**53  # integers beyond it are no exact floats
+MAX_EXACT = 2**53  # integers beyond it are no exact floats
 
 
 class BadFrame(ValueError):
@@ -88,7 +88,7 @@ def _skeleton(value: Any, arrays: list[tuple[bytes, bytes]]) -> Any:
     if isinstance(value, dict):
         return {key: _skeleton(item, arrays) for key, item in value.items()}
     if isinstance(value, list):
-        if len(value) >= SHORTEST_ARRAY and (found := _numbers(value)) is not None:
+        if len(value) >= MIN_ARRAY and (found := _numbers(value)) is not None:
             return _placed(*found, arrays)
         return [_skeleton(item, arrays) for item in value]
     return value
@@ -107,9 +107,9 @@ def _numbers(items: list[Any]) -> tuple[array[Any], list[Any]] | None:
     exceptions: list[Any] = []
     numbers = array("d" if float in kinds else "q")
     for position, item in enumerate(items):
-        number = type(item) is float or (type(item) is int and abs(item) <= LARGEST_EXACT)
+        number = type(item) is float or (type(item) is int and abs(item) <= MAX_EXACT)
         if not number:
-            if len(exceptions) == MOST_EXCEPTIONS or isinstance(item, (dict, list)):
+            if len(exceptions) == MAX_EXCEPTIONS or isinstance(item, (dict, list)):
                 return None
             exceptions.append([position, item])
         numbers.append(item if number else 0)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from app.version import VERSION
 from app.webhooks.addresses import AddressPolicy, AddressRefused, Target
 from app.webhooks.retries import parse_retry_after
+from morphdata.version import VERSION
 
 if TYPE_CHECKING:
     import httpx
@@ -26,7 +26,7 @@ NOT_ECHOED = "The receiver did not answer with the challenge."
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class Timeouts:
     """How long one try may last, s; `total_s` counts from the look-up to the last byte."""
 
     connect_s: float = 4.0
@@ -83,11 +83,11 @@ class Poster:
     """
 
     def __init__(
-        self, policy: AddressPolicy, trust: ssl.SSLContext | None = None, patience: Patience | None = None
+        self, policy: AddressPolicy, trust: ssl.SSLContext | None = None, timeouts: Timeouts | None = None
     ) -> None:
         self._policy = policy
         self._trust = trust
-        self._patience = patience or Patience()
+        self._timeouts = timeouts or Timeouts()
         self._client: httpx.AsyncClient | None = None
 
     async def __aenter__(self) -> Self:
@@ -110,7 +110,7 @@ class Poster:
                 verify=self._trust or httpx.create_ssl_context(),
                 trust_env=False,  # a proxy would connect to an address that nobody checked
                 follow_redirects=False,
-                timeout=httpx.Timeout(self._patience.read_s, connect=self._patience.connect_s),
+                timeout=httpx.Timeout(self._timeouts.read_s, connect=self._timeouts.connect_s),
                 # no connection outlives its message: the next one is looked up and checked anew
                 limits=httpx.Limits(max_keepalive_connections=0),
             )
@@ -131,7 +131,7 @@ class Poster:
         heard = _Heard()
         failure: Exception | None = None
         try:
-            async with asyncio.timeout(self._patience.total_s):
+            async with asyncio.timeout(self._timeouts.total_s):
                 target = await self._policy.target(url)
                 await self._to_first(target, headers, body, heard)
         except (AddressRefused, OSError, ValueError, httpx.HTTPError, httpx.InvalidURL) as error:

@@ -20,7 +20,7 @@ from app.documents import json_bytes
 from app.webhooks import deliveries
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.deliveries import Clock, Dispatch
-from app.webhooks.posting import Answer, Patience, Poster
+from app.webhooks.posting import Answer, Poster, Timeouts
 from app.webhooks.signature import signed_headers
 
 STOP_S = 1.0  # what is under way may end; then it is given back and sent again by the next process
@@ -36,16 +36,16 @@ class SenderSettings:
     ----------
     poll_s : float
         Time between two looks at the table, s.
-    most_at_once, most_per_owner : int
+    max_at_once, max_per_owner : int
         Deliveries under way, in all and of one owner.
     """
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
     trust: ssl.SSLContext | None = None
-    patience: Patience = field(default_factory=Patience)
+    timeouts: Timeouts = field(default_factory=Timeouts)
     poll_s: float = 1.0
-    most_at_once: int = 16
-    most_per_owner: int = 4
+    max_at_once: int = 16
+    max_per_owner: int = 4
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
@@ -89,7 +89,7 @@ class WebhookSender:
     async def run(self) -> None:
         """Send until `stop` is called."""
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.patience) as poster:
+        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
             waiting = asyncio.create_task(self._wake.wait())
             try:
                 while not self._stopping.is_set():
@@ -105,7 +105,7 @@ class WebhookSender:
 
     async def send_due(self) -> int:
         """Send what is due now, once each, and return how many tries were made."""
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.patience) as poster:
+        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
             tries = 0
             while begun := await self._begin(poster):
                 tries += begun
@@ -114,7 +114,7 @@ class WebhookSender:
 
     async def _begin(self, poster: Poster) -> int:
         """Claim as many deliveries as may be under way beside those that are, and begin to send them."""
-        room = self._settings.most_at_once - len(self._under_way)
+        room = self._settings.max_at_once - len(self._under_way)
         if room <= 0:
             return 0
         owners = Counter(dispatch.owner for dispatch in self._under_way.values())
@@ -138,7 +138,7 @@ class WebhookSender:
         """Look, and only when there is something to send, write."""
         chosen = self._settings
         with self._database.read() as session:
-            found = deliveries.due(session, room, chosen.most_per_owner, under_way, chosen.clock)
+            found = deliveries.due(session, room, chosen.max_per_owner, under_way, chosen.clock)
         if not found:
             return []
         with self._database.write() as session:

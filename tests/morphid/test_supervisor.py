@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from morphid.supervisor import FIRST_PAUSE_S, LONGEST_PAUSE_S, Child, ChildSpec, Supervisor, describe_exit
+from morphid.supervisor import FIRST_PAUSE_S, MAX_PAUSE_S, Child, ChildSpec, Supervisor, describe_exit
 
 SLEEPER = [sys.executable, "-c", "import time; time.sleep(60)"]
 QUITTER = [sys.executable, "-c", "print('no such luck'); raise SystemExit(3)"]
@@ -54,7 +54,7 @@ def test_a_dead_child_is_started_again_with_growing_pauses(tmp_path: Path) -> No
     pause_s = FIRST_PAUSE_S
     for _ in range(8):
         tend_until_restart(child, clock, pause_s)
-        pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
+        pause_s = min(2.0 * pause_s, MAX_PAUSE_S)
     assert child.restarts == 8
     child.stop()
 
@@ -63,7 +63,7 @@ def test_a_long_life_forgives_the_past(tmp_path: Path) -> None:
     """A child that lived for a minute is started again without delay."""
     clock = Clock()
     child = Child(ChildSpec("sleeper", SLEEPER), tmp_path / "log", clock=clock)
-    child._pause_s = LONGEST_PAUSE_S
+    child._pause_s = MAX_PAUSE_S
     child.start()
     clock.now += 61.0
     assert child.pid is not None

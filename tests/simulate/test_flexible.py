@@ -340,7 +340,7 @@ def test_a_trim_that_stalls_in_its_last_digits_is_taken(monkeypatch: pytest.Monk
 
     def pitch() -> Array:
         held = {"left": Hold(), "right": Hold()}
-        return simulate(
+        return fly(
             example_aircraft(), example_flight(), held, model="flexible", elements=2, duration_s=0.02
         ).trajectory.theta
 

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from celery import Celery
 
+from app.jobs.queue import QUEUE, RUN_JOB
 from tests.faults.malformed import HARMFUL, MALFORMED, envelope
-from worker.hints import LONGEST_BYTES, QUEUE, REAP, RUN_JOB, Hint, read_hint
+from worker.hints import MAX_BYTES, REAP, Hint, read_hint
 from worker.transport import Dropped
 
 
@@ -98,4 +99,4 @@ def test_a_flood_is_one_line_of_the_log(caplog: pytest.LogCaptureFixture) -> Non
 
 def test_hints_have_room() -> None:
     """A hint of ours is far from the limit."""
-    assert 8 * len(Hint(RUN_JOB, ["job_" + "x" * 26]).packed()) < LONGEST_BYTES
+    assert 8 * len(Hint(RUN_JOB, ["job_" + "x" * 26]).packed()) < MAX_BYTES

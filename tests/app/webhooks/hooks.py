@@ -14,10 +14,11 @@ from sqlalchemy import ColumnElement, literal, select, update
 from app.database import Database, database_time
 from app.identifiers import new_identifier
 from app.jobs import store
+from app.leases import Note
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import repository
 from app.webhooks.outbox import note_challenge, note_end
-from app.webhooks.posting import Patience
+from app.webhooks.posting import Timeouts
 from app.webhooks.schemas import EVERY_EVENT
 from app.webhooks.sender import SenderSettings, WebhookSender
 from app.webhooks.signature import new_secret
@@ -86,7 +87,7 @@ def many_ends(database: Database, count: int, owner: str = OWNER) -> None:
                 error=None,
                 model_id=None,
             )
-            note_end(session, row)
+            note_end(session, row, Note("succeeded"))
 
 
 def deliveries(database: Database, **equal: Any) -> list[Any]:
@@ -108,7 +109,7 @@ def sender(database: Database, **settings: Any) -> WebhookSender:
     """A sender to whom loopback is the internet."""
     chosen: dict[str, Any] = {
         "policy": TO_LOOPBACK,
-        "patience": Patience(2.0, 2.0, 4.0),
+        "timeouts": Timeouts(2.0, 2.0, 4.0),
         "poll_s": 0.02,
         "rng": Random(1),
         **settings,

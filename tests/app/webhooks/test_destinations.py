@@ -231,7 +231,7 @@ def test_a_success_ends_the_row_of_failures(database: Database, there: Receiver)
         answers["/a"] = code
         many_ends(database, 1)
         clock.turn(2 * DELAYS_S[-1])
-        send_due(database, clock=clock, most_at_once=1)
+        send_due(database, clock=clock, max_at_once=1)
     row = hook_row(database, hook_id)
     assert (row.failures, row.disabled_at) == (MAX_TRIES - 1, None)
 
@@ -252,7 +252,7 @@ def test_a_receiver_that_does_not_answer_the_challenge(database: Database, there
     there.answers_challenges = True
     with database.write() as session:
         shown = reopen_webhook(session, OWNER, hook_id)
-    assert (shown.failures, shown.verified_at, shown.disabled_at) == (0, None, None)
+    assert (shown.failures, shown.status, shown.disabled_at) == (0, "pending", None)
 
 
 def test_reopening_waits_for_nothing(database: Database, there: Receiver) -> None:

@@ -76,8 +76,8 @@ def test_the_figures_are_the_codes(text: str) -> None:
     assert MAX_RETRY_AFTER_S == 600.0
     assert f"An owner may have {MAX_WEBHOOKS}." in text
     settings = SenderSettings()
-    assert (settings.most_at_once, settings.most_per_owner) == (16, 4)
-    assert settings.patience.total_s == 10.0
+    assert (settings.max_at_once, settings.max_per_owner) == (16, 4)
+    assert settings.timeouts.total_s == 10.0
     for words in (
         "after the sixth try",
         "up to 10 min",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import hmac
 import json
 import time
 from collections.abc import Iterator
@@ -12,7 +14,7 @@ import pytest
 from standardwebhooks import Webhook, WebhookVerificationError
 
 from app.webhooks.addresses import AddressPolicy
-from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Patience, Poster
+from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Poster, Timeouts
 from app.webhooks.signature import new_secret, signed_headers
 from tests.app.webhooks.receiver import HOST, TO_LOOPBACK, Authority, Receiver, at_loopback, receiver, status
 
@@ -36,12 +38,12 @@ def post(
     url: str,
     authority: Authority | None,
     policy: AddressPolicy = TO_LOOPBACK,
-    patience: Patience | None = None,
+    timeouts: Timeouts | None = None,
 ) -> Answer:
     """Post once, believing `authority` or the usual ones."""
 
     async def once() -> Answer:
-        async with Poster(policy, authority and authority.trust(), patience) as poster:
+        async with Poster(policy, authority and authority.trust(), timeouts) as poster:
             return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
 
     return asyncio.run(once())
@@ -58,9 +60,13 @@ def test_a_message_arrives_as_it_is(server: Receiver, authority: Authority) -> N
 
 
 def test_signature_is_that_of_the_standard() -> None:
-    """The standard's own library accepts the headers, and refuses them for any other body, id or secret."""
+    """HMAC-SHA-256 of id, second and body as the standard's text says; refused for any other of these."""
     secret = new_secret()
     headers = signed_headers(secret, "msg_1", time.time(), BODY)
+    signed = b"msg_1." + headers["webhook-timestamp"].encode() + b"." + BODY
+    key = base64.b64decode(secret.removeprefix("whsec_"))
+    mac = base64.b64encode(hmac.digest(key, signed, "sha256")).decode()
+    assert headers["webhook-signature"] == f"v1,{mac}"
     assert Webhook(secret).verify(BODY, headers) == json.loads(BODY)
     for other_secret, body, other_headers in (
         (new_secret(), BODY, headers),
@@ -151,7 +157,7 @@ def test_a_slow_drip_ends_with_the_patience(server: Receiver, authority: Authori
 
     server.answer = drip
     start = time.monotonic()
-    answer = post(server.url(), authority, patience=Patience(connect_s=5.0, read_s=5.0, total_s=1.0))
+    answer = post(server.url(), authority, timeouts=Timeouts(connect_s=5.0, read_s=5.0, total_s=1.0))
     assert (answer.status, answer.error) == (None, "There was no answer in time.")
     assert time.monotonic() - start < 10.0  # the drip would last 20 s
 

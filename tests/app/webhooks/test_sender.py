@@ -110,7 +110,7 @@ def test_gone_disables_at_once(database: Database, there: Receiver) -> None:
     hook_id = new_hook(database, there.url())
     for _ in range(3):
         ended_job(database)
-    send_due(database, most_at_once=1)
+    send_due(database, max_at_once=1)
     ended_job(database)
     assert [row.status for row in deliveries(database)] == ["given_up"] * 3
     assert len(there.received) == 1
@@ -125,7 +125,7 @@ def test_two_senders_share_one_table(database: Database, there: Receiver) -> Non
     hooks = [new_hook(database, there.url(f"/{number}"), owner=f"owner{number % 3}") for number in range(6)]
     for number in range(count // 2):
         ended_job(database, owner=f"owner{number % 3}")
-    both = [sender(database, most_at_once=8) for _ in range(2)]
+    both = [sender(database, max_at_once=8) for _ in range(2)]
     for one in both:
         one.start()
     there.wait_for(count, within_s=60.0)
@@ -211,7 +211,7 @@ def test_a_slow_receiver_does_not_hold_up_other_owners(database: Database, there
         for _ in range(20):
             ended_job(database, owner="slow")
         ended_job(database, owner="quick")
-        running = sender(database, most_at_once=6, most_per_owner=3)
+        running = sender(database, max_at_once=6, max_per_owner=3)
         running.start()
         stuck.wait_for(1)
         there.wait_for(1)

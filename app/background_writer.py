@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database, Session
 
-MOST_WAITING = 1000  # more are dropped: what goes through here is worth less than memory
+MAX_WAITING = 1000  # more are dropped: what goes through here is worth less than memory
 STOP_S = 2.0
 
 Write = Callable[[Session], object]
@@ -19,7 +19,7 @@ Write = Callable[[Session], object]
 logger = logging.getLogger(__name__)
 
 
-class Afterwards:
+class BackgroundWriter:
     """One thread that writes in the order of asking; a write that fails is logged and forgotten.
 
     Parameters
@@ -29,8 +29,8 @@ class Afterwards:
 
     def __init__(self, database: Database) -> None:
         self._database = database
-        self._waiting: queue.Queue[Write | None] = queue.Queue(MOST_WAITING)
-        self._thread = threading.Thread(target=self._run, name="afterwards", daemon=True)
+        self._waiting: queue.Queue[Write | None] = queue.Queue(MAX_WAITING)
+        self._thread = threading.Thread(target=self._run, name="background-writer", daemon=True)
 
     def start(self) -> None:
         """Begin to write."""
@@ -49,7 +49,7 @@ class Afterwards:
         try:
             self._waiting.put_nowait(write)
         except queue.Full:
-            logger.warning("a note was dropped: %d others wait for the database", MOST_WAITING)
+            logger.warning("a note was dropped: %d others wait for the database", MAX_WAITING)
 
     def _run(self) -> None:
         while (write := self._waiting.get()) is not None:
