@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.polar import steady_edges
 from morphcore.aero.vlm import RingTable, ring_table
 from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
 from morphcore.geometry.lattice import DEFAULT_CORE, VortexCore, surface_lattice
+from tests.oracles.polar import steady_edges
 
 Array = NDArray[np.float64]
 Warp = Callable[[Array], Array]

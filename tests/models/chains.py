@@ -13,10 +13,10 @@ from morphcore.frames import quaternion_from_euler
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, load_aircraft, load_flight
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
-from morphcore.multibody.dynamics import Motion
 from morphcore.simulate.batch import initial_state
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
 from morphcore.simulate.schedule import HingeMotion
+from tests.oracles.dynamics import Motion
 
 Array = NDArray[np.float64]
 

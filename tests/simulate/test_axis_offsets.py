@@ -17,7 +17,6 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.flexible import flexible_model
-from morphcore.models.tree import chain_tree
 from morphcore.simulate.flexible import FlexibleFlight, hinge_path
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.flight import simulate
@@ -27,6 +26,7 @@ from morphcore.simulate.trim import trim
 from tests.aero.link_loads import edge_loads
 from tests.models.chains import SMALL_LATTICE, airless, example_aircraft, example_flight, instant
 from tests.multibody.mujoco_flight import MujocoTree
+from tests.oracles.chain_tree import chain_tree
 
 Array = NDArray[np.float64]
 
