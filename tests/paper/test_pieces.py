@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from morphcore.paper.report.html import (
-    Column,
+from morphcore.paper.report.numbers import (
     inline_svg,
     minutes,
     mrad,
@@ -13,9 +12,8 @@ from morphcore.paper.report.html import (
     percent,
     prettified,
     signed_percent,
-    table,
-    words,
 )
+from morphcore.paper.report.report import templates
 
 
 @pytest.mark.parametrize(
@@ -54,8 +52,14 @@ def test_sentences_of_the_library_get_readable_numbers() -> None:
 
 def test_a_table_aligns_by_kind() -> None:
     """Texts are marked to stand left, verdicts by what they say; everything is escaped."""
-    made = table(
-        "Table 9", "a < b", [words("name"), Column("x"), Column("", "verdict")], [("<i>", "1", "met")]
+    made = (
+        templates()
+        .from_string(
+            '{% from "pieces.html" import row, table %}'
+            '{% call table("a < b", ["name", "x", ""], name="Table 9") %}'
+            '{{ row(["<i>", "1", "met"], verdict=2) }}{% endcall %}'
+        )
+        .render()
     )
     assert "<b>Table 9.</b> a &lt; b" in made
     assert '<td class="text">&lt;i&gt;</td><td>1</td><td class="met">met</td>' in made
