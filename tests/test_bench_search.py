@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.bench import benchmark_table, run_benchmarks, search
-from morphcore.bench.search import search_figures, search_table
-from morphcore.bench.setting import QUICK, Figures
+from benchmarks import search
+from benchmarks.run import run_benchmarks
+from benchmarks.search import search_figures, search_table
+from benchmarks.setting import QUICK, Figures
+from benchmarks.table import benchmark_table
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from morphcore.bench.stage import Course, Stages
-from morphcore.bench.steppers import FORMER, SHIPPED, STEPPERS
-from morphcore.bench.work_precision import work_precision, work_precision_plot, work_precision_table
+from benchmarks.stage import Course, Stages
+from benchmarks.steppers import FORMER, SHIPPED, STEPPERS
+from benchmarks.work_precision import work_precision, work_precision_plot, work_precision_table
 from morphcore.frames import euler_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import physical_guess

@@ -15,9 +15,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from morphcore.bench import benchmark_swarm
+import numpy as np
+
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
-from morphcore.models.equivalent import ParameterBatch, chain_model
+from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.paper.scenario import LINKS, PaperFlight, aircraft, flight, paper_flights, two_second_flight
 from morphcore.paper.settings import PaperSettings
@@ -33,6 +34,20 @@ Document = dict[str, Any]
 MODELS = ("rigid", "equivalent", "flexible")
 BATCH_ROUNDS = 3
 TIMES = ("prepare_s", "fly_s", "total_s", "wall_s")
+SWARM_SEED = 1
+# spread of the benchmark's swarm around the physical guess: as wide as an identification's candidates
+STIFFNESS_SPREAD = 0.3  # standard deviation of the logarithm
+DIVISION_CONCENTRATION = 20.0  # of the Dirichlet distribution of the links' shares
+
+
+def benchmark_swarm(model: ChainModel, particles: int, seed: int = SWARM_SEED) -> ParameterBatch:
+    """Parameter sets around the physical guess, as a search has them."""
+    rng = np.random.default_rng(seed)
+    n = model.links_per_wing
+    division = rng.dirichlet(np.full(n, DIVISION_CONCENTRATION), (particles, 1))
+    batch = physical_guess(model, division)
+    factor = np.exp(rng.normal(0.0, STIFFNESS_SPREAD, batch.stiffness.shape))
+    return ParameterBatch(**{**vars(batch), "stiffness": batch.stiffness * factor})
 
 
 def computation_inputs(settings: PaperSettings) -> Document:

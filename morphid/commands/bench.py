@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,8 +28,10 @@ def bench(
     """Measure this machine: speed, operations, memory and start, each beside what it must be."""
     from worker import numerics
 
+    _require_checkout()
     numerics.prepare_environment(numerics.usable_cores())
-    from morphcore.bench import benchmark_table, run_benchmarks
+    from benchmarks.run import run_benchmarks
+    from benchmarks.table import benchmark_table
     from morphcore.errors import MorphError
     from morphcore.stopping import Interrupted, stoppable
 
@@ -46,3 +49,16 @@ def bench(
         return
     for what, value, must in benchmark_table(figures):
         stdout().print(f"{what:<78} {value:<26} {must}".rstrip(), markup=False, soft_wrap=True)
+
+
+def _require_checkout() -> None:
+    """Make the folder `benchmarks` of a checkout importable; the installed package has none."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "benchmarks" / "run.py").is_file():
+        raise CommandError(
+            "the benchmarks are not part of the installed package",
+            code=Exit.ENVIRONMENT,
+            hint="run `make bench` in a checkout of MorphID's source",
+        )
+    if str(root) not in sys.path:
+        sys.path.append(str(root))

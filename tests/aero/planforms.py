@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.polar import steady_edges
 from morphcore.aero.vlm import RingTable, ring_table
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_lattice
 from morphdata.lattice import DEFAULT_CORE, VortexCore
 from tests.models.chains import aircraft_of
+from tests.oracles.polar import steady_edges
 
 Array = NDArray[np.float64]
 Warp = Callable[[Array], Array]

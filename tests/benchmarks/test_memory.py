@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from morphcore.bench.memory import stretched, swarm_memory
-from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
+from benchmarks.memory import stretched, swarm_memory
+from benchmarks.setting import EXAMPLES, QUICK, bench_of
 
 ALLOWED_MB = 200.0
 
@@ -30,7 +30,7 @@ def test_a_swarm_of_2500_stays_under_200_mb_however_long_it_flies() -> None:
     that the swarm shares grows with the flight (about 2 % a length), and the peak of a process differs by a
     tenth from run to run. A single number kept for every model and step would add 60 %.
     """
-    found = swarm_memory(example_samples_dir(), 2500)
+    found = swarm_memory(EXAMPLES, 2500)
     print(found)
     if "skipped" in found:
         pytest.skip(found["skipped"])

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks import operations
+from benchmarks.counted import Counted, CountedMath, counted_array
+from benchmarks.operations import flight_operations, structural_growth
+from benchmarks.setting import QUICK, bench_of
 from morphcore.aero.kernels import loads
-from morphcore.bench import operations
-from morphcore.bench.counted import Counted, CountedMath, counted_array
-from morphcore.bench.operations import flight_operations, structural_growth
-from morphcore.bench.setting import QUICK, bench_of
 from morphcore.multibody.kernels import articulated
 from morphcore.simulate.kernels import step
 from tests.benchmarks.operations_baseline import BASELINE, RENEW, counts, grown

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from morphcore.bench.search import search_figures, search_table
+from benchmarks.search import search_figures, search_table
 from tests.identify.flights import example, reference_aircraft, reference_flight
 
 RATES = ("rate_0.2", "rate_0.5", "rate_0.8")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from morphcore.bench import Effort, run_benchmarks
+from benchmarks.run import run_benchmarks
+from benchmarks.setting import Effort
 
 PROMISED = 3000.0  # times real time per core
 SWARM = Effort(particles=2500, rounds=1, singles=3, links=(3,), refinement=50)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from morphcore.bench.fresh_process import in_fresh_process
-from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
-from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, import_times, request_of
+from benchmarks.fresh_process import in_fresh_process
+from benchmarks.setting import EXAMPLES, QUICK, bench_of
+from benchmarks.start_up import COMPILING, CompileTimes, first_generation, import_times, request_of
 from morphcore.identify import identification_from_request
 from morphcore.jit import compiled, kernel
 from morphdata.identify import IdentifyRequest
@@ -52,7 +52,7 @@ def test_compilations_are_written_down_once_each() -> None:
 def test_a_process_that_fails_says_why() -> None:
     """The end of its error is in the exception."""
     with pytest.raises(RuntimeError, match="no_such_function"):
-        in_fresh_process("morphcore.bench.start_up:no_such_function")
+        in_fresh_process("benchmarks.start_up:no_such_function")
 
 
 @pytest.mark.slow
@@ -66,7 +66,7 @@ def test_importing_the_library_takes_little_more_than_what_it_computes_with() ->
 @pytest.mark.slow
 def test_a_warm_process_begins_its_first_generation_in_half_a_second() -> None:
     """From the document of a request, three flights, to the first step told: seconds of computing."""
-    first_generation(example_samples_dir())  # compiles, should that be needed
-    found = first_generation(example_samples_dir())
+    first_generation(EXAMPLES)  # compiles, should that be needed
+    found = first_generation(EXAMPLES)
     print(found)
     assert found["job"]["computing_s"] < ALLOWED_S

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore.errors import InvalidInput
-from morphcore.export.mjcf import mjcf
-from morphcore.multibody.dynamics import body_poses
 from tests.multibody.trees import massive_bodies, random_motion, random_tree, reference_tree
+from tests.oracles.dynamics import body_poses
+from tests.oracles.mjcf import mjcf
 
 LAWS = settings(max_examples=25, deadline=None)  # no deadline: the first example compiles
 SEEDS = st.integers(0, 2**32 - 1)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from morphcore.frames import quaternion_from_euler
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
-from morphcore.multibody.dynamics import Motion
 from morphcore.simulate.batch import initial_state
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
 from morphcore.simulate.schedule import HingeMotion
@@ -21,6 +20,7 @@ from morphdata.aircraft import load_aircraft
 from morphdata.flight import Flight as FlightDocument
 from morphdata.flight import load_flight
 from morphdata.lattice import Lattice
+from tests.oracles.dynamics import Motion
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,6 @@ import pytest
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import lane_constants
 from morphcore.models.kernels.layout import JOINTS
-from morphcore.models.tree import chain_tree, link_bodies, link_ends
-from morphcore.multibody.dynamics import body_poses, body_twists, forward_dynamics_crba
 from morphcore.simulate.batch import state_rates
 from morphcore.threads import thread_count, use_threads
 from tests.models.chains import (
@@ -30,6 +28,8 @@ from tests.models.chains import (
     random_state,
     small_model,
 )
+from tests.oracles.chain_tree import chain_tree, link_bodies, link_ends
+from tests.oracles.dynamics import body_poses, body_twists, forward_dynamics_crba
 
 WIND_N = np.array([3.0, -7.0, 2.0])
 

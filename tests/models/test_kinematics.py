@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from morphcore.models.kinematics import gimbal_rotation, link_poses, tip_positions
-from morphcore.models.tree import chain_tree, link_bodies
-from morphcore.multibody.dynamics import body_poses
 from tests.models.chains import (
     example_flight,
     instant,
@@ -18,6 +16,8 @@ from tests.models.chains import (
     random_state,
     small_model,
 )
+from tests.oracles.chain_tree import chain_tree, link_bodies
+from tests.oracles.dynamics import body_poses
 
 
 @pytest.mark.parametrize("links", [1, 2, 5])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from morphcore.geometry.lattice import surface_lattice
 from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
-from morphcore.models.tree import slice_inertia
 from tests.models.chains import example_aircraft, odd_aircraft
+from tests.oracles.chain_tree import slice_inertia
 
 LAWS = settings(max_examples=30, deadline=None)
 DIVISIONS = st.integers(1, 8).flatmap(lambda n: st.lists(st.floats(0.05, 1.0), min_size=n, max_size=n))

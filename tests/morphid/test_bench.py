@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
-import morphcore.bench
-from morphcore.bench import fresh_process, run
+from benchmarks import fresh_process, run
 from morphcore.stopping import Interrupted, heed, stoppable
 from morphid.exits import Exit
 from morphid.main import app
@@ -35,7 +36,7 @@ def test_ctrl_c_ends_it(interrupts: int, monkeypatch: pytest.MonkeyPatch) -> Non
         reached.append("worked on")
         return {}
 
-    monkeypatch.setattr(morphcore.bench, "run_benchmarks", measure)
+    monkeypatch.setattr(run, "run_benchmarks", measure)
     before = signal.getsignal(signal.SIGINT)
     ended = RUNNER.invoke(app, ["bench", "--quick"])
     assert (ended.exit_code, reached) == (Exit.INTERRUPTED, ["loaded"])
@@ -59,3 +60,16 @@ def test_measurements_ask_whether_to_go_on(monkeypatch: pytest.MonkeyPatch) -> N
         fresh_process.in_fresh_process("os:abort")
     with pytest.raises(RuntimeError, match="os:abort"):
         fresh_process.in_fresh_process("os:abort")
+
+
+def test_an_installed_command_says_where_the_benchmarks_are(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The wheel ships no benchmarks; the command names what has them."""
+    command = import_module("morphid.commands.bench")
+    monkeypatch.setattr(
+        command, "__file__", str(tmp_path / "site-packages" / "morphid" / "commands" / "bench.py")
+    )
+    ended = RUNNER.invoke(app, ["bench"])
+    assert ended.exit_code == Exit.ENVIRONMENT
+    assert "make bench" in ended.stderr

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from morphcore.multibody.dynamics import Motion, forward_dynamics_crba
-from morphcore.multibody.tree import Tree
+from tests.oracles.dynamics import Motion, forward_dynamics_crba
+from tests.oracles.tree import Tree
 
 Array = NDArray[np.float64]
 HingeSchedule = Callable[[float], tuple[Array, Array, Array]]

@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from morphcore.export.mjcf import mjcf
 from morphcore.frames import rotation_from_quaternion
-from morphcore.multibody.dynamics import Motion
-from morphcore.multibody.tree import Tree
+from tests.oracles.dynamics import Motion
+from tests.oracles.mjcf import mjcf
+from tests.oracles.tree import Tree
 
 Array = NDArray[np.float64]
 HingeSchedule = Callable[[float], tuple[Array, Array, Array]]

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 
 from morphcore.errors import InvalidInput
 from morphcore.frames import rotation_from_quaternion, skew
-from morphcore.multibody.dynamics import (
+from tests.multibody.crba_flight import fly_crba, quadratic_schedule, runge_kutta_step
+from tests.multibody.trees import random_motion, random_tree, random_wrench, reference_tree, undamped
+from tests.oracles.dynamics import (
     Acceleration,
     Motion,
     bias,
@@ -27,9 +29,7 @@ from morphcore.multibody.dynamics import (
     mass_matrix,
     momentum,
 )
-from morphcore.multibody.tree import Tree
-from tests.multibody.crba_flight import fly_crba, quadratic_schedule, runge_kutta_step
-from tests.multibody.trees import random_motion, random_tree, random_wrench, reference_tree, undamped
+from tests.oracles.tree import Tree
 
 SEEDS = st.integers(0, 2**32 - 1)
 LAWS = settings(max_examples=25, deadline=None)  # no deadline: the first example compiles
@@ -344,7 +344,7 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
 
 SAY_ACCELERATIONS = """
 import numpy as np
-from morphcore.multibody.dynamics import forward_dynamics_crba, momentum, energy, mass_matrix
+from tests.oracles.dynamics import forward_dynamics_crba, momentum, energy, mass_matrix
 from tests.multibody.trees import random_motion, random_tree, random_wrench
 rng = np.random.default_rng(11)
 tree = random_tree(rng)

@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from morphcore.multibody.dynamics import Motion, bias, forward_dynamics_crba, mass_matrix
-from morphcore.multibody.tree import Tree
 from tests.multibody.crba_flight import fly_crba
 from tests.multibody.mujoco_flight import MujocoTree, fly_mujoco
 from tests.multibody.trees import (
@@ -22,6 +20,8 @@ from tests.multibody.trees import (
     reference_tree,
     undamped,
 )
+from tests.oracles.dynamics import Motion, bias, forward_dynamics_crba, mass_matrix
+from tests.oracles.tree import Tree
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore import frames
-from morphcore.multibody.kernels import spatial as spatial_kernels
 from tests.kernels import doors
 from tests.multibody.trees import random_inertia
+from tests.oracles.kernels import spatial as spatial_kernels
 
 spatial = doors(spatial_kernels)
 

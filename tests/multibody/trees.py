@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import quaternion_from_euler
-from morphcore.multibody.dynamics import Motion
-from morphcore.multibody.tree import Tree, spatial_inertia
+from tests.oracles.dynamics import Motion
+from tests.oracles.tree import Tree, spatial_inertia
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.frames import rotation_from_quaternion
-from morphcore.multibody.tree import Tree
 from morphcore.simulate.schedule import Schedule
 from tests.multibody.mujoco_flight import MujocoTree
+from tests.oracles.tree import Tree
 
 Array = NDArray[np.float64]
 

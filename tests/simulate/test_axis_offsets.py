@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.flexible import flexible_model
-from morphcore.models.tree import chain_tree
 from morphcore.simulate.flexible import FlexibleFlight, hinge_path
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.plan import TimeGrid
@@ -26,6 +25,7 @@ from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from tests.aero.link_loads import edge_loads
 from tests.models.chains import SMALL_LATTICE, airless, example_aircraft, example_flight, instant
 from tests.multibody.mujoco_flight import MujocoTree
+from tests.oracles.chain_tree import chain_tree
 from tests.simulate.flights import fly
 
 Array = NDArray[np.float64]

@@ -9,13 +9,13 @@ import pytest
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.multibody.dynamics import forward_dynamics_crba
-from morphcore.simulate.fresh import FreshModel, fly_fresh
 from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.trim import trim
 from morphdata.lattice import CORE_LAWS, Lattice, VortexCore
 from tests.models.chains import example_aircraft, example_flight, instant, random_batch
+from tests.oracles.dynamics import forward_dynamics_crba
+from tests.oracles.fresh import FreshModel, fly_fresh
 from tests.simulate.flights import (
     SAMPLES,
     example_model,

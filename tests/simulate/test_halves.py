@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from morphcore.aero.operator import lattice_operator
-from morphcore.bench import benchmark_swarm
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.mirror import mirror_of
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import whole_joints
+from morphcore.paper.computation import benchmark_swarm
 from morphcore.simulate.plan import common_path, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trim import trim

@@ -9,8 +9,6 @@ import pytest
 
 from morphcore.frames import quaternion_from_euler, wrap_angle
 from morphcore.models.equivalent import lane_constants, physical_guess
-from morphcore.models.tree import chain_tree, link_bodies
-from morphcore.multibody.dynamics import Acceleration, energy, inverse_dynamics, momentum
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import BEFORE, GAMMA, LAST
 from morphcore.simulate.plan import STEP_S
@@ -28,6 +26,8 @@ from tests.models.chains import (
     random_state,
     small_model,
 )
+from tests.oracles.chain_tree import chain_tree, link_bodies
+from tests.oracles.dynamics import Acceleration, energy, inverse_dynamics, momentum
 from tests.simulate.dragged_mujoco import Drag, DraggedMujoco, fly_dragged
 from tests.simulate.flights import SAMPLES, example_model, fly_free, fly_trimmed, plan_of, sample_plan
 

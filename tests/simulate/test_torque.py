@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from morphcore.models.equivalent import lane_constants, physical_guess
-from morphcore.models.tree import chain_tree
-from morphcore.multibody.dynamics import energy, hinge_torque
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate, Spline
 from morphcore.simulate.torque import hinge_torques
@@ -25,6 +23,8 @@ from tests.models.chains import (
     small_model,
 )
 from tests.models.test_chain import WIND_N, drag_wrenches
+from tests.oracles.chain_tree import chain_tree
+from tests.oracles.dynamics import energy, hinge_torque
 from tests.simulate.flights import example_model, fly_free, fly_trimmed
 
 

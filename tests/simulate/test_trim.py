@@ -11,8 +11,6 @@ from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import tip_positions
-from morphcore.models.tree import chain_tree
-from morphcore.multibody.dynamics import Acceleration, inverse_dynamics
 from morphcore.simulate.batch import state_rates
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import SLAB, trim, trimmed_state
@@ -26,6 +24,8 @@ from tests.models.chains import (
     random_batch,
     small_model,
 )
+from tests.oracles.chain_tree import chain_tree
+from tests.oracles.dynamics import Acceleration, inverse_dynamics
 from tests.simulate.flights import example_model
 
 SWEPT = np.array([[0.3, 0.0, 0.0], [0.5, 0.0, 0.0]])

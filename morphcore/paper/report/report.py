@@ -3,33 +3,106 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from morphcore.paper.asked import Asked, asked_figures
-from morphcore.paper.report.html import minutes
-from morphcore.paper.report.model_sections import computation_section, study_section, verification_section
-from morphcore.paper.report.morph_section import morph_section
-from morphcore.paper.report.page import page
-from morphcore.paper.report.scenario_section import scenario_section
-from morphcore.paper.report.summary_sections import (
-    differences_section,
-    provenance_section,
-    summary_section,
-    total_s,
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from morphcore.export.figure import rendered
+from morphcore.export.paper_plots import (
+    front_figure,
+    independent_figure,
+    search_figure,
+    truth_figure,
+    verification_figure,
 )
-from morphcore.paper.report.truth_section import truth_section
-from morphcore.paper.scenario import DOI, TITLE
+from morphcore.export.schedule_plots import departure_figure, schedule_figure
+from morphcore.export.study_plots import study_figure
+from morphcore.paper import asked, scenario
+from morphcore.paper.asked import Asked, asked_figures, held_out_ratios, ratio
+from morphcore.paper.report import facts, numbers
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Finished
 from morphcore.paper.truth import samples_of
 from morphcore.simulate.flight import write_trajectory_csv
+from morphcore.simulate.plan import STEP_S
 
 Document = dict[str, Any]
 
 REPORT, SUMMARY, FLIGHTS = "report.html", "summary.json", "flights"
 HEADLINE = "Equivalent modelling of a sweep-morphing aircraft, reproduced"
+COMMON_FLIGHT = "rate_0.5"  # also among the independent program's
+SECTIONS = {  # templates and their headings
+    "summary": "What came out",
+    "setup": "Set-up",
+    "truth": "The truth: flexible flights",
+    "links": "Table 1: the number of links",
+    "verification": "Figures 4 to 9: the equivalent model against the flexible one",
+    "computation": "Table 2: computation",
+    "morph": "Table 3, figures 10 and 11: the optimised morph",
+    "differences": "What differs from the paper, and why",
+    "provenance": "What made this report",
+}
+PLOTS = SimpleNamespace(
+    departure_figure=departure_figure,
+    front_figure=front_figure,
+    independent_figure=independent_figure,
+    schedule_figure=schedule_figure,
+    search_figure=search_figure,
+    study_figure=study_figure,
+    truth_figure=truth_figure,
+    verification_figure=verification_figure,
+)
+
+
+def templates() -> Environment:
+    """The templates, with what they format and compute by."""
+    found = Environment(
+        loader=PackageLoader("morphcore.paper.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    labels = {each.name: each.label for each in scenario.paper_flights()}
+    found.filters |= {
+        "flight_label": lambda name: labels.get(name, name),
+        "fmt": format,
+        "max_or_none": _max_or_none,
+        "milliseconds": numbers.milliseconds,
+        "minutes": numbers.minutes,
+        "mrad": numbers.mrad,
+        "negated": lambda value: None if value is None else -value,
+        "number": numbers.number,
+        "percent": numbers.percent,
+        "prettified": numbers.prettified,
+        "ratio": ratio,
+        "signed_percent": numbers.signed_percent,
+    }
+    found.globals |= {
+        "COMMON_FLIGHT": COMMON_FLIGHT,
+        "STEP_S": STEP_S,
+        "asked": asked,
+        "facts": facts,
+        "nothing": numbers.NOTHING,
+        "picture": _picture,
+        "plots": PLOTS,
+        "scenario": scenario,
+    }
+    return found
+
+
+def _max_or_none(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _picture(anchor: str, caption: str, drawn: Figure) -> Markup:
+    svg = rendered(anchor, drawn, ("svg",))[f"{anchor}.svg"]
+    return Markup(numbers.inline_svg(svg, anchor, caption))  # noqa: S704 - drawn here, its texts escaped
 
 
 def report_page(settings: PaperSettings, finished: Mapping[str, Finished]) -> str:
@@ -40,25 +113,25 @@ def report_page(settings: PaperSettings, finished: Mapping[str, Finished]) -> st
     finished : every stage's result.
     """
     results = {name: done.result for name, done in finished.items()}
-    sections = [
-        summary_section(results, asked_of(settings, finished)),
-        scenario_section(settings, results),
-        truth_section(results),
-        study_section(results),
-        verification_section(results),
-        computation_section(results),
-        morph_section(results),
-        differences_section(settings, results),
-        provenance_section(settings, finished),
-    ]
-    last = max(done.finished_at for done in finished.values())
-    form = "quick form" if settings.quick else "full form"
-    subtitle = (
-        f"Every table and figure of “{TITLE}” (Science Progress 2021, doi {DOI}), with our own flexible "
-        f"model as the truth. {form.capitalize()}, seed {settings.seed}, {minutes(total_s(finished))} of "
-        f"computation, finished {last[:10]}."
+    return (
+        templates()
+        .get_template("page.html")
+        .render(
+            title=HEADLINE,
+            sections=SECTIONS,
+            settings=settings,
+            finished=finished,
+            results=results,
+            total_s=total_s(finished),
+            asked_figures=asked_of(settings, finished),
+            held_out=held_out_ratios(results["identification"]).values(),
+        )
     )
-    return page(HEADLINE, subtitle, sections)
+
+
+def total_s(finished: Mapping[str, Finished]) -> float:
+    """Wall time of all stages, s."""
+    return sum(done.wall_s for done in finished.values())
 
 
 def asked_of(settings: PaperSettings, finished: Mapping[str, Finished]) -> list[Asked]:

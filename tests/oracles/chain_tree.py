@@ -1,0 +1,142 @@
+"""The equivalent model as a multibody tree, for the textbook dynamics, MuJoCo and the fresh lattice.
+
+Built from the aircraft and the parameters alone, by routes of its own where there is a choice: masses by
+fine slices and the parallel-axis theorem instead of closed moments, a hinged surface's first body at its
+hinge instead of at the link's root. Whatever the lane kernels and this tree agree on has thus been derived
+twice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.geometry.surface import Surface
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from tests.oracles.tree import FLAP, LAG, TORSION, Tree, spatial_inertia
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SLICES = 12  # Gauss points a link: exact to degree 23 in the span, tapered solid wings need 6
+
+
+def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> Tree:
+    """The tree of one parameter set.
+
+    Bodies: the fuselage with all fixed first links; then surface by surface a hinged first link, its origin
+    on the hinge, and three bodies for each gimbal, of which the last is the link. Hinges are numbered over
+    the hinged surfaces, free coordinates as in the lanes' state.
+    """
+    fuselage = model.aircraft.fuselage
+    base = spatial_inertia(fuselage.mass_kg, fuselage.centre_of_mass_B, fuselage.inertia_B)
+    parent, axis, sign, offset, inertia = [-1], [-1], [1.0], [np.zeros(3)], [base]
+    coordinate, hinge = [-1], [-1]
+    stiffness: list[float] = []
+    damping: list[float] = []
+
+    def add(on: int, about: int, turn: float, where: Array, mass: Array, free: int, prescribed: int) -> int:
+        for column, value in zip(
+            (parent, axis, sign, offset, inertia, coordinate, hinge),
+            (on, about, turn, where, mass, free, prescribed),
+            strict=True,
+        ):
+            column.append(value)  # type: ignore[attr-defined]
+        return len(parent) - 1
+
+    wing = 0
+    for s, surface in enumerate(model.aircraft.surfaces):
+        ends = link_ends(model, batch, s, particle)
+        root, pivot = _root(surface), _pivot(surface)
+        first = slice_inertia(surface, ends[0], ends[1], root - pivot)
+        if surface.hinge is None:
+            inertia[0] = inertia[0] + first
+            body = 0
+        else:
+            about, count = surface.hinge.axis_index, max(hinge) + 1
+            body = add(0, about, surface.rotation_sign, pivot, first, -1, count)
+        chosen = min(wing, batch.division.shape[1] - 1)
+        wing += surface.flexible
+        where = root - pivot
+        for k in range(1, ends.size - 1):
+            where = where + np.array([0.0, surface.span_sign * (ends[k] - ends[k - 1]), 0.0])
+            link = slice_inertia(surface, ends[k], ends[k + 1], np.zeros(3))
+            for about in (FLAP, TORSION, LAG):
+                mass = link if about == LAG else np.zeros((6, 6))
+                body = add(body, about, 1.0, where, mass, len(stiffness), -1)
+                where = np.zeros(3)
+                stiffness.append(float(batch.stiffness[particle, chosen, k - 1, about]))
+                damping.append(float(batch.damping[particle, chosen, k - 1, about]))
+    return Tree(
+        parent=np.array(parent, dtype=np.int64),
+        axis=np.array(axis, dtype=np.int64),
+        sign=np.array(sign),
+        offset_P=np.array(offset),
+        inertia=np.array(inertia),
+        coordinate=np.array(coordinate, dtype=np.int64),
+        hinge=np.array(hinge, dtype=np.int64),
+        stiffness=np.array(stiffness),
+        damping=np.array(damping),
+    )
+
+
+def link_bodies(model: ChainModel) -> tuple[IntArray, Array]:
+    """Where the links are in the tree: body and origin of each.
+
+    Returns ------- bodies : (links,), whose axes are the link's. origins : (links, 3) of the links from
+    their bodies' origins, m.
+    """
+    bodies, origins, body = [], [], 0
+    for surface, row in zip(model.aircraft.surfaces, model.surfaces, strict=True):
+        if surface.hinge is None:
+            bodies.append(0)
+        else:
+            body += 1
+            bodies.append(body)
+        origins.append(_root(surface) - _pivot(surface))
+        for _ in range(int(row[1]) - 1):
+            body += 3
+            bodies.append(body)
+            origins.append(np.zeros(3))
+    return np.array(bodies, dtype=np.int64), np.array(origins)
+
+
+def link_ends(model: ChainModel, batch: ParameterBatch, surface: int, particle: int = 0) -> Array:
+    """Ends of one surface's links, (n + 1,) distances from its root in m."""
+    of = model.aircraft.surfaces[surface]
+    if not of.flexible:
+        return np.array([0.0, of.span_m])
+    before = sum(other.flexible for other in model.aircraft.surfaces[:surface])
+    division = batch.division[particle, min(before, batch.division.shape[1] - 1)]
+    inboard: Array = of.span_m * (np.cumsum(division) - division)
+    return np.append(inboard, of.span_m)
+
+
+def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Array) -> Array:
+    """Spatial inertia (6, 6) of the surface between two distances from its root, in its axes.
+
+    ``origin_W`` (3,) is where the elastic axis at ``start_m`` lies from the point to which the inertia
+    refers, m.
+    """
+    points, weights = np.polynomial.legendre.leggauss(SLICES)
+    stations = start_m + 0.5 * (end_m - start_m) * (points + 1.0)
+    lengths = 0.5 * (end_m - start_m) * weights
+    section = surface.section_at(stations)
+    from_axis = surface.mass_axis_x_m - surface.elastic_axis_x_m
+    about_centres = np.stack([section.inertia_x, section.inertia_y, section.inertia_z], axis=1)
+    total: Array = np.zeros((6, 6))
+    for i in range(SLICES):
+        centre = origin_W + np.array([from_axis, surface.span_sign * (stations[i] - start_m), 0.0])
+        total += lengths[i] * spatial_inertia(float(section.mass[i]), centre, np.diag(about_centres[i]))
+    return np.asarray(total)
+
+
+def _root(surface: Surface) -> Array:
+    """The elastic axis at the undeflected surface's root, (3,) in B, m."""
+    x, y, z = surface.position_m
+    return np.array([x + surface.elastic_axis_x_m, y, z])
+
+
+def _pivot(surface: Surface) -> Array:
+    """The origin of the first link's body: the hinge, or the fuselage reference point of a fixed surface."""
+    return np.zeros(3) if surface.hinge is None else np.array(surface.hinge.position_m)
