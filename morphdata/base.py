@@ -169,7 +169,8 @@ def _whole(value: Any) -> Any:
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
-Angle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+HALF_TURN_RAD = math.pi + 1e-9  # an angle written in degrees is rounded
+Angle = Annotated[float, Field(ge=-HALF_TURN_RAD, le=HALF_TURN_RAD)]
 Vector3 = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
 Position = Annotated[list[Annotated[float, Field(ge=-1000.0, le=1000.0)]], Field(min_length=3, max_length=3)]
 SampleName = Annotated[str, Field(pattern=SAMPLE_NAME_PATTERN)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
@@ -11,6 +12,7 @@ from morphdata.base import AngleSeries, Document, Identifier, SampleName, TimeSe
 from morphdata.faults import Fault
 from morphdata.samplefiles.fault import as_sentence
 from morphdata.samplefiles.flight import INLINE, flight_faults
+from morphdata.samplefiles.reading import read_flight
 
 Role = Literal["train", "held_out"]
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
@@ -72,6 +74,31 @@ class UploadedSample(Document):
         default="train", description="`held_out` samples are flown and reported, never fitted."
     )
     weight: Weight = 1.0
+
+
+def sample_name(stem: str) -> str:
+    """Make a sample's name of a file's: ``my flight (1)`` becomes ``my-flight--1-``."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)[:64]
+    return plain.lstrip("._-") or "trajectory"
+
+
+def load_sample(path: str | Path, role: Role = "train") -> InlineSample:
+    """Read a sample flight from its CSV, JSON, Parquet or MATLAB file, as it stands inline in a request.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read, or holds no flight; the sentence names the file and the line.
+    """
+    path = Path(path)
+    columns = read_flight(path).values
+    return InlineSample.parse(
+        {
+            "name": sample_name(path.stem),
+            "role": role,
+            **{field: list(columns[name]) for name, field in INLINE.items()},
+        }
+    )
 
 
 def _form(value: Any) -> str:

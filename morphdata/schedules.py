@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, pairwise
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, FailFast, Field
 
-from morphdata.base import MAX_ROWS, Angle, Document
-from morphdata.faults import Fault
+from morphdata.base import MAX_ROWS, MIN_ROWS, Angle, Document
+from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
+from morphdata.samplefiles.reading import place_in, read_file
 from morphdata.vehicle import HingeRange
 
 MAX_DURATION_S = LONGEST_FLIGHT_S
 MAX_KNOTS = 1000
 SIDES = ("left", "right")
+SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
 
 EXAMPLE_SCHEDULE: dict[str, Any] = {
     "kind": "constant_rate",
@@ -215,3 +218,34 @@ def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
         yield from ((angle, f"knot_angle_rad/{row}") for row, angle in enumerate(schedule.knot_angle_rad))
     else:
         yield from ((angle, f"angle_rad/{row}") for row, angle in enumerate(schedule.angle_rad))
+
+
+def load_schedules(path: str | Path) -> Schedules:
+    """Read a morph schedule from a file with the columns t, sweep_left, sweep_right.
+
+    Units in the names are accepted (``t_ms``, ``sweep_left_deg``); other columns are not looked at, so that a
+    sample flight is a schedule too.
+
+    Raises
+    ------
+    InvalidInput
+        A column is missing or holds something that is not a finite number, there are too few rows, or time
+        does not rise.
+    """
+    path = Path(path)
+    table = read_file(path, SCHEDULE_COLUMNS)
+    times = list(table.values["t"])
+    if len(times) < MIN_ROWS:
+        raise InvalidInput(f"{path} holds {len(times)} rows", hint=f"give {MIN_ROWS} to {MAX_ROWS} rows")
+    for row, (before, after) in enumerate(pairwise(times), start=1):
+        if after <= before:
+            raise InvalidInput(
+                f"{place_in(path, table, row)}: time does not rise",
+                hint="sort the rows by time and drop repeated ones",
+            )
+    return Schedules.parse(
+        {
+            side: {"kind": "tabulated", "time_s": times, "angle_rad": list(table.values[f"sweep_{side}"])}
+            for side in SIDES
+        }
+    )

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from morphdata.samples import Role
 from morphid.exits import CommandError, Exit
 from morphid.files import read_json
 
 Document = dict[str, Any]
-SampleForm = Callable[[Path, str], Document]
+SampleForm = Callable[[Path, Role], Document]
 
 
 class Request:
@@ -26,7 +27,7 @@ class Request:
     def __init__(self, operation: str) -> None:
         self.operation = operation
         self.document: Document = {}
-        self._samples: list[tuple[Path, str]] = []
+        self._samples: list[tuple[Path, Role]] = []
         self._given_by: dict[str, str] = {}
 
     def put(self, pointer: str, value: Any, option: str) -> None:
@@ -50,7 +51,7 @@ class Request:
         """Fill in the content of a JSON file."""
         self.put(pointer, read_json(path), f"{option} {path}")
 
-    def add_samples(self, paths: Sequence[Path], role: str, option: str) -> None:
+    def add_samples(self, paths: Sequence[Path], role: Role, option: str) -> None:
         """Add sample files; how they go into the request depends on where it goes (see `body`)."""
         for path in paths:
             self._given_by[f"/samples/{len(self._samples)}"] = f"{option} {path}"

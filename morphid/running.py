@@ -16,6 +16,7 @@ import typer
 
 from morphdata.faults import InvalidInput
 from morphdata.operations import operation_named
+from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
 from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
@@ -71,8 +72,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
-    # what is wrong outside the samples is said before the library is loaded, which reads them
-    require_valid(request.operation, request.document, beside="/samples")
+    body = request.body(sample_document)
+    require_valid(request.operation, body)  # before the library is loaded, which takes seconds
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
@@ -83,8 +84,6 @@ def run_here(request: Request, bar: Meter) -> Answer:
     checkpoint: bytes | None = None
     pace = Pace(time.monotonic)
     try:
-        body = request.body(sample_document)
-        require_valid(request.operation, body)
         work = find_operation(request.operation)(body, threads)
         with first_interrupt() as interrupted, listening(bar.note):
             try:
@@ -107,12 +106,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
         ) from None
 
 
-def require_valid(operation: str, body: Document, *, beside: str = "") -> None:
+def require_valid(operation: str, body: Document) -> None:
     """Refuse a request that the operation's document refuses.
-
-    Parameters
-    ----------
-    beside : part that is not there yet, a JSON pointer: what is missing there is not looked at.
 
     Raises
     ------
@@ -121,19 +116,17 @@ def require_valid(operation: str, body: Document, *, beside: str = "") -> None:
     try:
         operation_named(operation).request.parse(body)
     except InvalidInput as error:
-        faults = [fault for fault in error.faults if not beside or not fault.pointer.startswith(beside)]
-    else:
-        return
-    if faults:
-        first, *others = faults
+        first, *others = error.faults
         hint = "\n".join([first.hint, *(f"{f.pointer}: {f.detail} ({f.hint})" for f in others)])
-        raise CommandError(first.detail, code=Exit.INVALID_INPUT, hint=hint.strip(), pointer=first.pointer)
+        raise CommandError(
+            first.detail, code=Exit.INVALID_INPUT, hint=hint.strip(), pointer=first.pointer
+        ) from None
 
 
 def run_there(request: Request, service: Service, bar: Meter) -> Answer:
     """Run at a service: upload the samples, post the job, watch it; Ctrl-C cancels it."""
 
-    def uploaded(path: Path, role: str) -> Document:
+    def uploaded(path: Path, role: Role) -> Document:
         require_file(path)
         try:
             flight = service.upload(path)
@@ -193,23 +186,10 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: str) -> Document:
+def sample_document(path: Path, role: Role) -> Document:
     """Read a sample file and give it as it stands inline in a request."""
-    from morphcore import load_trajectory
-    from morphcore.errors import MorphError
-
     require_file(path)
     try:
-        trajectory = load_trajectory(path)
-    except MorphError as error:
+        return load_sample(path, role).model_dump(exclude_defaults=True) | {"role": role}
+    except InvalidInput as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None
-    return {
-        "name": path.stem,
-        "role": role,
-        "time_s": trajectory.time_s.tolist(),
-        "sweep_left_rad": trajectory.sweep_left.tolist(),
-        "sweep_right_rad": trajectory.sweep_right.tolist(),
-        "phi_rad": trajectory.phi.tolist(),
-        "theta_rad": trajectory.theta.tolist(),
-        "psi_rad": trajectory.psi.tolist(),
-    }

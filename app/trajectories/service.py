@@ -17,6 +17,7 @@ from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.fault import FileFault, as_sentence
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import kind_of
+from morphdata.samples import sample_name
 
 
 def file_kind(filename: str) -> str:
@@ -31,15 +32,6 @@ def file_kind(filename: str) -> str:
         return kind_of(PurePosixPath(filename).suffix)
     except FileFault as fault:
         raise refusal(fault, "/file") from None
-
-
-def name_from_file(filename: str) -> str:
-    """Make a sample name of a file name: ``my flight (1).csv`` becomes ``my-flight--1-``."""
-    stem = PurePosixPath(filename.replace("\\", "/")).stem
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)[:64].lstrip(
-        "._-"
-    )
-    return plain or "trajectory"
 
 
 def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) -> TrajectoryUpload:
@@ -58,7 +50,10 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
         raise InvalidRequest.of(faults)
     named = {INLINE[key]: values for key, values in columns.items()}
     try:
-        return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **named)
+        return TrajectoryUpload(
+            name=sample_name(PurePosixPath(filename.replace("\\", "/")).stem) if name is None else name,
+            **named,
+        )
     except InvalidInput as error:
         raise InvalidRequest.of(
             [fault if fault.pointer == "/name" else fault.under("/file") for fault in error.faults]

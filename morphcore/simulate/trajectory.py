@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
-from morphcore.simulate.file_columns import read_file_columns
 from morphdata.samplefiles.flight import INLINE, flight_faults
+from morphdata.samplefiles.reading import read_flight
 from morphdata.samplefiles.titles import FLIGHT
 from morphdata.samples import InlineSample
 
@@ -78,17 +79,14 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     InvalidInput : the file cannot be read, a column is missing or holds something that is not a finite
         number, time does not rise, the flight is longer than 600 s, or an angle is no angle in rad.
     """
-    columns = read_file_columns(path, FLIGHT)
-    fault = next(flight_faults({name: values.tolist() for name, values in columns.values.items()}), None)
-    if fault is not None:
-        place = columns.path if fault.row is None else columns.place(fault.row)
-        raise InvalidInput(f"{place}: {fault.detail}", hint=fault.hint)
+    path = Path(path)
+    columns = read_flight(path)
     return Trajectory(
-        name=columns.path.stem,
-        time_s=columns.values["t"],
-        **{name: columns.values[name] for name in FLIGHT if name != "t"},  # type: ignore[arg-type]
+        name=path.stem,
+        time_s=_column(columns.values["t"]),
+        **{name: _column(columns.values[name]) for name in FLIGHT if name != "t"},  # type: ignore[arg-type]
         role=role,
-        extra=columns.others,
+        extra={title: _column(values) for title, values in columns.others.items()},
     )
 
 
@@ -102,7 +100,7 @@ def require_flight(trajectory: Trajectory, pointer: str) -> None:
         )
 
 
-def _column(values: list[float]) -> Array:
+def _column(values: Sequence[float]) -> Array:
     column = np.array(values, dtype=np.float64)
     column.setflags(write=False)
     return column

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, BinaryIO
 
+from morphdata.faults import InvalidInput
 from morphdata.samplefiles.columns import FlightColumns, Wanted
 from morphdata.samplefiles.fault import FileFault, shown
+from morphdata.samplefiles.flight import flight_faults
+from morphdata.samplefiles.titles import FLIGHT
 
 ENDINGS = {
     "": "csv",
@@ -46,4 +51,46 @@ def read_columns(stream: BinaryIO, kind: str, wanted: Wanted | None = None) -> F
     """
     module: Any = importlib.import_module(f"morphdata.samplefiles.{READERS[kind]}")
     columns: FlightColumns = getattr(module, f"read_{kind}")(stream, wanted or Wanted())
+    return columns
+
+
+def read_file(path: Path, names: Sequence[str] = FLIGHT) -> FlightColumns:
+    """Read the named columns of a file, and its further columns of numbers.
+
+    Raises
+    ------
+    InvalidInput
+        The file is missing, is of another kind or broken, a column is missing or holds something that is not
+        a finite number.
+    """
+    try:
+        kind = kind_of(path.suffix)
+        with path.open("rb") as stream:
+            return read_columns(stream, kind, Wanted(names=tuple(names), others=True))
+    except FileNotFoundError:
+        raise InvalidInput(f"{path} does not exist", hint="check the path") from None
+    except OSError as error:
+        raise InvalidInput(f"{path} cannot be read: {error}", hint=f"give {FORMATS}") from None
+    except FileFault as fault:
+        where = f"{path}, {fault.place}" if fault.place else f"{path}"
+        raise InvalidInput(f"{where}: {fault.detail}", hint=fault.hint) from None
+
+
+def place_in(path: Path, columns: FlightColumns, row: int) -> str:
+    """Where a row stands, for people."""
+    return f"{path}, line {columns.lines[row]}" if len(columns.lines) else f"{path}, row {row}"
+
+
+def read_flight(path: Path) -> FlightColumns:
+    """Read a file that holds one flight, and its further columns of numbers.
+
+    Raises
+    ------
+    InvalidInput
+        As of `read_file`; or time does not rise, the flight is longer than 600 s, an angle is none in rad.
+    """
+    columns = read_file(path)
+    for fault in flight_faults(columns.values):
+        place = str(path) if fault.row is None else place_in(path, columns, fault.row)
+        raise InvalidInput(f"{place}: {fault.detail}", hint=fault.hint)
     return columns

@@ -88,8 +88,9 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
             require_place(values.get(name), flag)
         request = Request(operation.name)
         if has_samples:
-            for name, role, flag in (("sample", "train", "--sample"), ("held_out", "held_out", "--held-out")):
-                request.add_samples(matching_files(values[name] or [], flag), role, flag)
+            request.add_samples(matching_files(values["sample"], "--sample"), "train", "--sample")
+            held_out = matching_files(values["held_out"] or [], "--held-out")
+            request.add_samples(held_out, "held_out", "--held-out")
         own.fill(request, values)
         for option in (option for option in fields if option.flag not in own.fills):
             _fill_field(request, option, values[option.parameter.name])

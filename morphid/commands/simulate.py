@@ -12,7 +12,9 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from morphdata.faults import InvalidInput
 from morphdata.options import SCHEDULE
+from morphdata.schedules import load_schedules
 from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.exits import CommandError, Exit
@@ -78,24 +80,16 @@ def _put_schedules(
 
 
 def _put_table(request: Request, path: Path) -> float:
-    from morphcore.errors import MorphError
-    from morphcore.simulate.schedule_table import load_schedule_csv
-
     require_file(path)
     try:
-        schedules = load_schedule_csv(path)
-    except MorphError as error:
+        schedules = load_schedules(path).model_dump(exclude_none=True)
+    except InvalidInput as error:
         raise CommandError(
             error.message, code=Exit.INVALID_INPUT, hint=error.hint, given_by=f"--schedule {path}"
         ) from None
     for side, history in schedules.items():
-        document = {
-            "kind": "tabulated",
-            "time_s": history.time_s.tolist(),
-            "angle_rad": history.angle_rad.tolist(),
-        }
-        request.put(f"/schedules/{side}", document, f"--schedule {path}")
-    return float(schedules["left"].time_s[-1])
+        request.put(f"/schedules/{side}", history, f"--schedule {path}")
+    return float(schedules["left"]["time_s"][-1])
 
 
 def _put_rate(request: Request, rate: float, final: float) -> float:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from morphcore import load_trajectory
 from morphcore.simulate.schedule import Spline
-from morphcore.simulate.schedule_table import load_schedule_csv
+from morphdata.schedules import load_schedules
 from morphid.exits import Exit
 from morphid.main import app
 from tests.live import LiveService
@@ -104,12 +104,12 @@ def test_the_written_schedule_is_the_spline(tmp_path: Path, play: Play) -> None:
     words = (*MORPH, "--parameters", parameters_file(tmp_path), "--out", out)
     ended = RUNNER.invoke(app, command("optimize", *words, "--url", "http://there"))
     assert ended.exit_code == Exit.OK, ended.output
-    written = load_schedule_csv(out)
-    time_s = written["left"].time_s
+    written = load_schedules(out).model_dump()
+    time_s = np.array(written["left"]["time_s"])
     np.testing.assert_allclose(time_s, np.linspace(0.0, 2.5, 251), atol=1e-12)
     spline = Spline(np.array([0.0, 0.9, 2.0]), np.array([0.0, 0.4, 1.0])).motion(time_s)
     for side in ("left", "right"):
-        np.testing.assert_allclose(written[side].angle_rad, spline.angle, rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(written[side]["angle_rad"], spline.angle, rtol=0.0, atol=1e-11)
 
 
 def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:

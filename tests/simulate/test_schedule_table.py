@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput
-from morphcore.simulate.schedule import Hold, Spline
-from morphcore.simulate.schedule_table import load_schedule_csv, write_schedule_csv
+from morphcore.simulate.schedule import Hold, Spline, scheduled
+from morphcore.simulate.schedule_table import write_schedule_csv
 from morphcore.simulate.trajectory import load_trajectory
+from morphdata.schedules import SIDES, load_schedules
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The motion of each side's hinge."""
+    given = load_schedules(path)
+    return {side: scheduled(found[1]) for side in SIDES if (found := given.of_side(side))}
 
 
 def test_a_sample_flight_is_a_schedule(examples: Path) -> None:
     """The schedule of a sample flight is that flight's sweep; its other columns are not looked at."""
     path = examples / "train_asymmetric.csv"
-    schedule, flight = load_schedule_csv(path), load_trajectory(path)
+    schedule, flight = read(path), load_trajectory(path)
     for side in ("left", "right"):
         np.testing.assert_array_equal(schedule[side].time_s, flight.time_s)
         np.testing.assert_array_equal(schedule[side].angle_rad, flight.sweep(side))
@@ -29,7 +37,7 @@ def test_units_stand_in_the_names(tmp_path: Path) -> None:
         "time_ms,note,sweep_left_deg,sweep_right_deg\n0,a,0,0\n500,b,90,-90\n1000,,180,0\n",
         encoding="utf-8-sig",
     )
-    schedule = load_schedule_csv(path)
+    schedule = read(path)
     np.testing.assert_allclose(schedule["left"].time_s, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(schedule["left"].angle_rad, [0.0, np.pi / 2, np.pi])
     np.testing.assert_allclose(schedule["right"].angle_rad, [0.0, -np.pi / 2, 0.0])
@@ -44,7 +52,7 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     spline = Spline(np.array([0.0, 0.7, 1.4, 2.0]), np.array([0.0, 0.2, 0.9, 1.0]))
     path = tmp_path / "s.csv"
     write_schedule_csv({"left": Hold(0.1), "right": spline}, 0.01 * np.arange(251), path)
-    schedule = load_schedule_csv(path)
+    schedule = read(path)
     times = np.linspace(0.0, 2.5, 1717)
     np.testing.assert_allclose(
         schedule["right"].motion(times).angle, spline.motion(times).angle, rtol=0.0, atol=5e-6
@@ -70,7 +78,7 @@ def test_a_bad_schedule_is_refused_with_its_line(tmp_path: Path, text: str, word
     path = tmp_path / "s.csv"
     path.write_text(text)
     with pytest.raises(InvalidInput, match=words) as caught:
-        load_schedule_csv(path)
+        load_schedules(path)
     assert str(path) in caught.value.message
     assert caught.value.hint
 
@@ -78,7 +86,7 @@ def test_a_bad_schedule_is_refused_with_its_line(tmp_path: Path, text: str, word
 def test_a_missing_schedule_is_named(tmp_path: Path) -> None:
     """A file that is not there, or is not text, is named."""
     with pytest.raises(InvalidInput, match=r"nowhere\.csv does not exist"):
-        load_schedule_csv(tmp_path / "nowhere.csv")
+        load_schedules(tmp_path / "nowhere.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00t")
     with pytest.raises(InvalidInput, match=r"binary\.csv: this is not CSV text"):
-        load_schedule_csv(tmp_path / "binary.csv")
+        load_schedules(tmp_path / "binary.csv")

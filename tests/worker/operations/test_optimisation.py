@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.simulate.schedule_table import load_schedule_csv
+from morphcore.simulate.schedule import scheduled
 from morphdata.optimize import OptimizeResult
+from morphdata.schedules import load_schedules
 from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation
 from tests.worker.operations.test_study import timeless
 from worker.attempt import Ending
@@ -35,7 +36,9 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
     assert set(files) == {"result.json", *TABLES, *PICTURES}
     path = tmp_path / "schedule.csv"
     path.write_bytes(files["schedule.csv"])
-    left = load_schedule_csv(path)["left"]
+    given = load_schedules(path).left
+    assert given is not None
+    left = scheduled(given)
     assert np.allclose(left.motion([0.0, 0.8, 1.0]).angle, [0.0, 0.5, 0.5])
     rates = left.motion(np.linspace(0.0, 1.0, 501)).rate
     # the table is interpolated where the spline was exact: 2 per cent where the rate changes
