@@ -41,7 +41,7 @@ class Document(BaseModel):
     is parsed or constructed in Python.
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     def __init__(self, /, **fields: Any) -> None:
         try:

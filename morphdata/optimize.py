@@ -17,7 +17,7 @@ from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
-from morphdata.simulate import MAX_ELEMENTS
+from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
 from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
 from morphdata.warnings import Warnings
 
@@ -192,7 +192,10 @@ class VerifyingModel(Document):
     """The flexible model in which the schedules are flown again."""
 
     elements: Annotated[int, Option("--elements", MODEL)] = Field(
-        default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing of the flexible model."
+        default=DEFAULT_ELEMENTS,
+        ge=1,
+        le=MAX_ELEMENTS,
+        description="Beam elements of each wing of the flexible model.",
     )
     lattice: Lattice | None = Field(default=None, description="As the equivalent model's when left out.")
 

@@ -17,6 +17,7 @@ from morphdata.vehicle import HingeRange
 
 MAX_DURATION_S = LONGEST_FLIGHT_S
 MAX_KNOTS = 1000
+DEFAULT_RAMP_S = 0.1
 SIDES = ("left", "right")
 SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
 
@@ -54,7 +55,9 @@ class ConstantRate(Document):
         default=None, description="Instead of `duration_s`: mean rate, without its sign."
     )
     start_s: Moment = 0.0
-    ramp_s: Moment = Field(default=0.1, description="The rate rises and falls linearly in this time.")
+    ramp_s: Moment = Field(
+        default=DEFAULT_RAMP_S, description="The rate rises and falls linearly in this time."
+    )
 
     @property
     def morph_s(self) -> float:

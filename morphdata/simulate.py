@@ -21,7 +21,9 @@ from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Sche
 from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
 from morphdata.warnings import Warnings
 
+DEFAULT_ELEMENTS = 10
 MAX_ELEMENTS = 100
+OUTPUT_STEP_S = 0.01  # as the example flights
 MAX_STEPS = {
     "rigid": 1_200_000,
     "equivalent": 1_200_000,
@@ -53,7 +55,10 @@ class FlexibleModel(Document):
 
     kind: Literal["flexible"]
     elements: Annotated[int, Option("--elements", MODEL)] = Field(
-        default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing of the flexible model."
+        default=DEFAULT_ELEMENTS,
+        ge=1,
+        le=MAX_ELEMENTS,
+        description="Beam elements of each wing of the flexible model.",
     )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
@@ -85,7 +90,7 @@ class SimulateRequest(Request):
     schedules: Schedules
     duration_s: Duration
     output_step_s: Annotated[float, Field(ge=0.0005, le=MAX_DURATION_S)] = Field(
-        default=0.01, description="Between the rows of the trajectory."
+        default=OUTPUT_STEP_S, description="Between the rows of the trajectory."
     )
     environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
         default=None, description="Gust and turbulence; still air without."

@@ -72,9 +72,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
-    # what is wrong is said before the library is loaded, which takes seconds
     body = request.body(sample_document)
-    require_valid(request.operation, body)
+    require_valid(request.operation, body)  # before the library is loaded, which takes seconds
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)

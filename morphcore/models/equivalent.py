@@ -28,11 +28,11 @@ from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.parameters import MAX_LINKS
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_LINKS = 8
 NEUTRAL_LIFT_FACTOR = 1.0
 SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
 
@@ -156,7 +156,7 @@ def chain_model(
     InvalidInput : the number of links is out of range.
     """
     links = whole_number(
-        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", least=1, most=MOST_LINKS
+        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", least=1, most=MAX_LINKS
     )
     return _chain_model(aircraft, flight, links, lattice)
 

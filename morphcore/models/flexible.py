@@ -25,12 +25,11 @@ from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
 from morphcore.multibody.beam import GAUSS, Beams, Section, make_beams
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-DEFAULT_ELEMENTS = 10
-MOST_ELEMENTS = 100
 INERTIA_POINTS = 400  # midpoints along a rigid surface's span; its mass and inertia converge as their square
 
 
@@ -68,7 +67,7 @@ def flexible_model(
     ------
     InvalidInput : the number of elements is out of range.
     """
-    elements = whole_number(elements, "elements", pointer="/model/elements", least=1, most=MOST_ELEMENTS)
+    elements = whole_number(elements, "elements", pointer="/model/elements", least=1, most=MAX_ELEMENTS)
     parts = aircraft_lattice(aircraft, lattice)
     ends: list[list[int]] = []
     rest, sections, damping = [], [], []

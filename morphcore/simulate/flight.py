@@ -17,7 +17,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
 from morphcore.geometry.surface import beyond_range
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
-from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
+from morphcore.models.flexible import flexible_model
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
@@ -38,12 +38,11 @@ from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
+from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
 
 Array = NDArray[np.float64]
 Schedules = Sequence[Schedule] | Mapping[str, Schedule] | documents.Schedules | Trajectory
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
-
-OUTPUT_STEP_S = 0.01  # as the example flights
 
 
 @dataclass(frozen=True, repr=False)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.models.parameters_document import parameter_batch, parameters_document
 from morphcore.shown import Shown
 from morphcore.simulate.flight import ModelChoice, Simulation, flight_steps
@@ -26,7 +25,7 @@ from morphcore.threads import use_threads
 from morphcore.validity import documents
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.schedules import SIDES
-from morphdata.simulate import FlexibleModel, FlightModel, SimulateRequest
+from morphdata.simulate import DEFAULT_ELEMENTS, FlexibleModel, FlightModel, SimulateRequest
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]

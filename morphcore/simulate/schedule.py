@@ -56,7 +56,7 @@ class ConstantRate:
     final_rad: float
     duration_s: float
     start_s: float = 0.0
-    ramp_s: float = 0.1
+    ramp_s: float = documents.DEFAULT_RAMP_S
 
     def __post_init__(self) -> None:
         if self.duration_s <= 0:

@@ -98,8 +98,8 @@ def test_odd_surfaces():
 def flattened(surface):
     """The same surface in the plane z = 0, its hinge, if it has one, for sweep."""
     x, y, _ = surface.position_m
-    hinge = surface.hinge and replace(
-        surface.hinge, axis="z", position_m=(*surface.hinge.position_m[:2], 0.0)
+    hinge = surface.hinge and surface.hinge.model_copy(
+        update={"axis": "z", "position_m": [*surface.hinge.position_m[:2], 0.0]}
     )
     return replace(surface, position_m=(x, y, 0.0), hinge=hinge)
 

@@ -13,7 +13,7 @@ import pytest
 
 from morphcore.errors import InvalidInput, MorphError
 from morphcore.evolution import EvolutionSettings
-from morphcore.geometry.fields import Fields, whole_number
+from morphcore.geometry.fields import whole_number
 from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
@@ -107,24 +107,6 @@ def test_numbers_of_links_and_elements_are_whole() -> None:
         with pytest.raises(InvalidInput) as caught:
             make()
         assert caught.value.hint == hint
-
-
-@pytest.mark.parametrize(
-    ("value", "bounds", "hint"),
-    [
-        (201.0, {"most": 200.0}, "it must be at most 200"),
-        (-1.0, {"least": 0.0}, "it must be at least 0"),
-        (0.0, {"above": 0.0}, "it must be more than 0"),
-        (0.0, {"above": 0.0, "most": 600.0}, "it must be more than 0"),
-        (601.0, {"above": 0.0, "most": 600.0}, "it must be at most 600"),
-        (-4.0, {"least": -3.0, "most": 3.0}, "it must be at least -3"),
-    ],
-)
-def test_a_hint_names_the_bound_that_was_broken(value: float, bounds: dict[str, float], hint: str) -> None:
-    """One bound, in words, and none that does not exist."""
-    with pytest.raises(InvalidInput) as caught:
-        Fields({"x": value}, "").number("x", **bounds)
-    assert caught.value.hint == hint
 
 
 HUGE = (1e300, -1e300)
