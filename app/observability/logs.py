@@ -18,7 +18,6 @@ from app.documents import finite
 from app.observability.context import current_facts
 from app.observability.tracing import current_trace_id
 
-FORMATS = ("text", "json")
 # those of others have handlers of their own: they go through ours instead
 GATHERED = (
     "uvicorn",

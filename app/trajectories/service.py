@@ -11,7 +11,7 @@ from app.audit.service import note
 from app.database import Session
 from app.errors import InvalidRequest
 from app.http.context import Caller
-from app.keys.quota import charge_bytes
+from app.keys.quota import charge
 from app.parsing.pool import refusal
 from app.trajectories.checks import columns_faults, file_faults
 from app.trajectories.repository import insert_trajectory, stored_form
@@ -88,7 +88,7 @@ def store_trajectory(
     if faults:
         raise InvalidRequest.of(faults)
     document = stored_form(upload.model_dump(exclude={"name"}))
-    charge_bytes(session, caller.key_id, len(document))
+    charge(session, caller.key_id, size_bytes=len(document))
     stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
     note(session, caller, Action.TRAJECTORY_POST, stored.id)
     return stored
