@@ -139,7 +139,7 @@ def _keep_private(file: Path) -> None:
 
 
 def _postgres_link(url: URL) -> dict[str, Any]:
-    """What the driver is told beside the URL; whatever the URL says itself holds."""
+    """Connection options in addition to the URL; whatever the URL says itself takes precedence."""
     options = " ".join(f"-c {name}={value}" for name, value in POSTGRES_PATIENCE.items())
     own = url.query.get("options")
     told = {**POSTGRES_LINK, "options": f"{options} {own}" if own else options}

@@ -41,7 +41,7 @@ class DatabaseTrouble(Enum):
 
 
 def trouble_of(error: BaseException) -> DatabaseTrouble | None:
-    """Tell what is the matter with the database, None when the fault is in the statement itself."""
+    """Classify the trouble that the database has; None when the fault is in the statement itself."""
     if isinstance(error, PoolTimeout):
         return DatabaseTrouble.AWAY
     if not isinstance(error, DBAPIError):

@@ -8,7 +8,7 @@ LOOPBACK_NAMES = frozenset({"localhost", "ip6-localhost"})
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether `host` (a name or an address, with or without brackets) reaches this machine only."""
+    """Whether `host` (a name or an address, with or without brackets) reaches this machine only."""
     bare = host.strip("[]").lower()
     if bare in LOOPBACK_NAMES:
         return True

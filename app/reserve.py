@@ -15,7 +15,7 @@ SUFFIX = "-reserve"
 
 
 class Reserve:
-    """A file beside an SQLite database whose blocks are given to the database when the disk has no others.
+    """A file next to an SQLite database whose blocks are given to the database when the disk has no others.
 
     Writes that may wait never get them, so a disk that is full for them is not full for a cancel. Any number
     of processes may lend and fill at once: each step leaves a file that is merely shorter or longer.

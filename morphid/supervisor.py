@@ -105,7 +105,7 @@ class Child:
         code = self.exit_code
         if code is None:
             return None
-        self._kill_group()  # what it leaves behind would work beside its successor
+        self._kill_group()  # what it leaves behind would work at the same time as its successor
         if now - self._started_at > HEALTHY_AFTER_S:
             self._pause_s = FIRST_PAUSE_S
         pause_s, self._pause_s = self._pause_s, min(2.0 * self._pause_s, MAX_PAUSE_S)

@@ -10,7 +10,7 @@ from enum import Enum
 from app.database import Database, Session
 from app.jobs.chunks import Flown, flown, hand_out
 from app.jobs.records import Claim, JobStatus
-from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
+from app.jobs.store import finish_job, load_checkpoint, release_job, save_progress
 from worker.job_cache import JobCache
 from worker.lease import LeaseKeeper, StopReason
 from worker.numerics import Kernels
@@ -163,9 +163,7 @@ class Attempt:
 
     def _begin(self, find_operation: Callable[[str], Begin]) -> Work:
         self._work, self._chunks = self._cache.prepared(
-            self._claim.job_id,
-            lambda: self._store.read(lambda session: load_request(session, self._claim.job_id)),
-            lambda request: find_operation(self._claim.operation)(request, self._kernels.threads),
+            self._claim, self._store, find_operation, self._kernels.threads
         )
         return self._work
 

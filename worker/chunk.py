@@ -8,7 +8,6 @@ from collections.abc import Callable
 from app.database import Database
 from app.jobs.chunks import finish_chunk, give_back_chunk
 from app.jobs.records import ChunkClaim
-from app.jobs.store import load_request
 from worker.attempt import Ending, error_document
 from worker.job_cache import JobCache
 from worker.lease import LeaseKeeper, StopReason
@@ -77,11 +76,7 @@ class ChunkFlight:
     def _outcome(self, find_operation: Callable[[str], Begin]) -> bytes:
         if not self._kernels.wait(self._keeper.should_stop):
             raise WorkInterrupted
-        work, _ = self._cache.prepared(
-            self._chunk.job_id,
-            lambda: self._store.read(lambda session: load_request(session, self._chunk.job_id)),
-            lambda request: find_operation(self._chunk.operation)(request, self._kernels.threads),
-        )
+        work, _ = self._cache.prepared(self._chunk, self._store, find_operation, self._kernels.threads)
         if not isinstance(work, SpreadWork):
             raise TypeError(f"operation {self._chunk.operation!r} cannot be spread")
         return work.fly(self._chunk.task, self._keeper.should_stop)

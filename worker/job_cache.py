@@ -6,7 +6,10 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import NamedTuple
 
-from worker.operations import Document, Work
+from app.jobs.records import ChunkClaim, Claim
+from app.jobs.store import load_request
+from worker.operations import Begin, Document, Work
+from worker.retry import Retry
 
 JOBS_KEPT = 2  # a swarm's tables take some megabytes; a worker alternates between few jobs
 DEFAULT_CHUNKS = 16
@@ -33,22 +36,25 @@ class JobCache:
         self._kept: OrderedDict[str, Prepared] = OrderedDict()
 
     def prepared(
-        self, job_id: str, load: Callable[[], Document], begin: Callable[[Document], Work]
+        self, claim: Claim | ChunkClaim, store: Retry, find_operation: Callable[[str], Begin], threads: int
     ) -> Prepared:
         """Return a job's work: what was kept of it, or begun from its request.
 
         Parameters
         ----------
-        load : callable
+        store : Retry
             Loads the request.
-        begin : callable
-            Begins the work of a request.
+        find_operation : callable
+            Name -> function that begins the work.
+        threads : int
+            Numeric threads of one job.
         """
+        job_id = claim.job_id
         if job_id in self._kept:
             self._kept.move_to_end(job_id)
             return self._kept[job_id]
-        request = load()
-        prepared = Prepared(begin(request), chunks_of(request))
+        request = store.read(lambda session: load_request(session, job_id))
+        prepared = Prepared(find_operation(claim.operation)(request, threads), chunks_of(request))
         if prepared.chunks:
             self._kept[job_id] = prepared
             if len(self._kept) > JOBS_KEPT:

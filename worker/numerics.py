@@ -68,7 +68,7 @@ def ensure_cache() -> None:
     if chosen and not takes_files(Path(chosen)):
         _keep_kernels_elsewhere(f"NUMBA_CACHE_DIR {chosen} cannot be written")
     elif not chosen and not any(takes_files(folder) for folder in _own_cache_folders()):
-        _keep_kernels_elsewhere("compiled kernels fit neither beside this installation nor in a home folder")
+        _keep_kernels_elsewhere("compiled kernels fit neither in this installation nor in a home folder")
     # without a folder matplotlib makes one at each start and complains
     if not os.environ.get("MPLCONFIGDIR") and not takes_files(_home("XDG_CONFIG_HOME", ".config")):
         folder = os.environ.get("NUMBA_CACHE_DIR") or _private_folder()
@@ -91,7 +91,7 @@ def takes_files(folder: Path) -> bool:
 
 
 def _own_cache_folders() -> Iterator[Path]:
-    """Where numba keeps what it compiled when nobody says: beside the source, else in the user's cache."""
+    """Where numba keeps what it compiled by default: next to the source, else in the user's cache."""
     library = find_spec("morphcore")  # found, not imported
     if library is not None and library.origin is not None:
         yield Path(library.origin).parent / "__pycache__"

@@ -90,14 +90,7 @@ class Runner:
         return ending, claim.job_id
 
     def _fly(self, chunk: ChunkClaim) -> tuple[Ending, Document | None]:
-        keeper = LeaseKeeper(
-            self.database,
-            chunk,
-            lease_s=self.chunk_lease_s,
-            heartbeat_s=self.chunk_lease_s / HEARTBEATS_PER_LEASE,
-            shutting_down=self.shutting_down,
-        )
-        with keeper:
+        with self._keeper(chunk, self.chunk_lease_s, self.chunk_lease_s / HEARTBEATS_PER_LEASE) as keeper:
             flight = ChunkFlight(self.database, chunk, keeper, self.kernels, self.cache, clock=self.clock)
             ending = flight.run(self.find_operation)
         log.debug("job %s: chunk %d.%d %s", chunk.job_id, chunk.generation, chunk.number, ending.value)
@@ -114,14 +107,7 @@ class Runner:
 
     def _attempt(self, claim: Claim, error: Document | None = None) -> Ending:
         log.info("job %s: attempt %d of %d", claim.job_id, claim.attempt, claim.max_attempts)
-        keeper = LeaseKeeper(
-            self.database,
-            claim,
-            lease_s=self.lease_s,
-            heartbeat_s=self.heartbeat_s,
-            shutting_down=self.shutting_down,
-        )
-        with keeper:
+        with self._keeper(claim, self.lease_s, self.heartbeat_s) as keeper:
             attempt = Attempt(self.database, claim, keeper, self.kernels, self.cache, clock=self.clock)
             if error is None:
                 ending = attempt.run(self.find_operation)
@@ -131,6 +117,15 @@ class Runner:
             self.publish(claim.job_id, attempt.handed_out)
         log.info("job %s: %s", claim.job_id, ending.value)
         return ending
+
+    def _keeper(self, claim: Claim | ChunkClaim, lease_s: float, heartbeat_s: float) -> LeaseKeeper:
+        return LeaseKeeper(
+            self.database,
+            claim,
+            lease_s=lease_s,
+            heartbeat_s=heartbeat_s,
+            shutting_down=self.shutting_down,
+        )
 
     def _claim(self) -> Claim | ChunkClaim | None:
         for _ in range(CLAIM_TRIES):

@@ -1,4 +1,4 @@
-"""Let the pool's children know that the worker is asked to end.
+"""Let the pool's children know that a shutdown was requested.
 
 Celery tells only the parent process about SIGTERM; its children go on until their task ends, maybe in an
 hour. They inherit the reading end of a pipe, and one byte in it, which nobody takes out, is the message to
@@ -21,7 +21,7 @@ def arm() -> None:
 
 
 def announce() -> None:
-    """Tell the children (called in a signal handler)."""
+    """Write the byte for the children (called in a signal handler)."""
     with contextlib.suppress(OSError):
         for writing in _ends[1:]:
             os.write(writing, b"!")
@@ -34,5 +34,5 @@ def disarm() -> None:
 
 
 def announced() -> bool:
-    """Whether the worker is asked to end (called in a child)."""
+    """Whether a shutdown was requested (called in a child)."""
     return any(select.select(_ends[:1], (), (), 0.0)[0]) if _ends else False

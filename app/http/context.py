@@ -104,7 +104,7 @@ def caller_of(scope: AsgiScope) -> Caller | None:
 
 
 async def current_caller(request: Request) -> Caller:
-    """Tell who makes the request.
+    """Return who makes the request.
 
     Raises
     ------

@@ -29,7 +29,7 @@ class Boundary:
     Attributes
     ----------
     hosts : frozenset of str or None
-        Names that the service answers for, beside addresses and loopback names; None: any name.
+        Names that the service answers for, in addition to addresses and loopback names; None: any name.
     loopback_only : bool
         Refuse whatever came over a network, however the server was told to listen.
     """

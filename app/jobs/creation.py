@@ -104,7 +104,7 @@ def create_job(
         if earlier is not None:
             return earlier
     size_bytes = len(document.data)
-    quota.charge(session, origin.key_id, flights=flights_estimated, size_bytes=size_bytes)
+    quota.charge(session, origin.key_id, new_jobs=1, flights=flights_estimated, size_bytes=size_bytes)
     starts_by = None if terms.expires_in_s is None else database_time() + terms.expires_in_s
     row = session.execute(
         insert(jobs)

@@ -31,7 +31,7 @@ def _client(broker_url: str) -> Any:
 
 
 def publish(job_id: str, broker_url: str | None = None) -> bool:
-    """Tell the workers that a job waits; call it after the commit.
+    """Send the workers a wake-up message for a job; call it after the commit.
 
     Returns
     -------
@@ -91,7 +91,7 @@ class Publisher:
         try:
             job_id = self._waiting.get(timeout=WARM_UP_AFTER_S)
         except Empty:
-            # importing Celery takes most of a second: better before the first job than beside it
+            # importing Celery takes most of a second: better before the first job than together with it
             _client(self._broker_url).connection_for_write().transport  # noqa: B018 - imports, connects to nothing
             job_id = self._waiting.get()
         while job_id is not None:

@@ -19,9 +19,8 @@ from app.jobs.waiting import idle_slots
 from app.leases import Note
 from app.tables import jobs
 
-DEADLINE_GRACE_S = (
-    30.0  # a worker that heeds the deadline itself keeps its best so far; then the reaper ends the job
-)
+# a worker that notices the deadline itself keeps its best so far; after this the reaper ends the job
+DEADLINE_GRACE_S = 30.0
 ROUND_LIMIT = 500  # rows per round: a round stays a short transaction whatever the backlog
 PUBLISH_LIMIT = 100  # messages per round
 
@@ -78,7 +77,7 @@ def reap(
 
 
 def log_ends(report: ReapReport) -> None:
-    """Tell the operator of the jobs that a round has changed."""
+    """Log the jobs that a round has changed."""
     for kind in ("requeued", "failed", "cancelled", "expired"):
         for job_id in getattr(report, kind):
             log.warning("reaper: job %s %s", job_id, kind)

@@ -82,7 +82,6 @@ class Claim:
     attempt: int
     max_attempts: int
     worker: str
-    max_seconds: float | None
     request_id: str | None = None  # of the call that posted the job: leads from its logs to the worker's
     traceparent: str | None = None
     waited_s: float = 0.0  # since the job was made

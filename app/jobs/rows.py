@@ -16,7 +16,7 @@ from app.tables import job_checkpoints, job_chunks, job_events, jobs
 
 JOB_COLUMNS = tuple(jobs.c[field.name] for field in fields(Job) if field.name != "replayed")
 MOMENTS = tuple(column.name for column in JOB_COLUMNS if column.name.endswith("_at"))
-CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds, jobs.c.request_id, jobs.c.traceparent)
+CLAIM_COLUMNS = (jobs.c.fence, jobs.c.request_id, jobs.c.traceparent)
 QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
 
 FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second

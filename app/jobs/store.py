@@ -84,7 +84,6 @@ def claim_from_row(row: LeasedRow, worker_name: str) -> Claim:
         attempt=row.attempt,
         max_attempts=row.max_attempts,
         worker=worker_name,
-        max_seconds=row.max_seconds,
         request_id=row.request_id,
         traceparent=row.traceparent,
         waited_s=row.updated_at - row.created_at,

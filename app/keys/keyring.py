@@ -61,7 +61,7 @@ class KeyRing:
         return known is not None and self._clock() - known.read_at < FRESH_S
 
     def check(self, text: KeyText) -> ApiKey | Refusal:
-        """Tell whose key it is, or why it opens nothing; reads the database unless it `is_fresh`."""
+        """Return whose key it is, or why it opens nothing; reads the database unless it `is_fresh`."""
         known = self._remembered.get(text.prefix)
         if known is None or self._clock() - known.read_at >= FRESH_S:
             known = self._read(text.prefix)

@@ -6,14 +6,12 @@ locked until the commit. Both make charges of one key wait for one another, and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sqlalchemy import ColumnElement, case, func, select, update
 
 from app.database import Session, current_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
-from app.keys.records import Quota, Usage
+from app.keys.records import Usage
 from app.leases import LeasedRow, Note
 from app.tables import (
     STATUSES,
@@ -31,49 +29,47 @@ IN_FLIGHT = tuple(status for status in STATUSES if status not in FINISHED)
 SOON_S = 30  # when to ask again for room that other jobs of the key give back
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What one request wants of a key's quota."""
-
-    jobs: int
-    flights: int
-    size_bytes: int
-
-
 def usage_day(at_s: float) -> int:
     """Day that a moment of database time is counted to, days since 1970 UTC."""
     return int(at_s // DAY_S)
 
 
-def charge(session: Session, key_id: str | None, *, flights: int, size_bytes: int = 0) -> None:
-    """Take a new job's share of its key's quota; call it before the job's row is written.
+def charge(
+    session: Session, key_id: str | None, *, new_jobs: int = 0, flights: int = 0, size_bytes: int = 0
+) -> None:
+    """Take a share of a key's quota; call it before the rows are written that use it.
 
     Parameters
     ----------
     key_id
         None where keys are off: nothing is limited then.
+    new_jobs : int
+        Their rows do the counting, and so do the rows that hold the bytes.
     flights : int
         As estimated; `settle` corrects it when the job has ended.
-    size_bytes : int
-        That the job's rows take so far.
 
     Raises
     ------
     QuotaExceeded
         Naming limit and use.
     """
-    _charge(session, key_id, _Asked(jobs=1, flights=flights, size_bytes=size_bytes))
-
-
-def charge_bytes(session: Session, key_id: str | None, size_bytes: int) -> None:
-    """Make sure that the key may store `size_bytes` more; the row that is written next does the counting.
-
-    Raises
-    ------
-    QuotaExceeded
-        Naming limit and use.
-    """
-    _charge(session, key_id, _Asked(jobs=0, flights=0, size_bytes=size_bytes))
+    if key_id is None:
+        return
+    limits = (api_keys.c.max_jobs_in_flight, api_keys.c.max_flights_per_day, api_keys.c.max_stored_bytes)
+    row = session.execute(
+        select(*limits).where(api_keys.c.id == key_id).with_for_update()  # nothing on SQLite: see above
+    ).one_or_none()
+    now = current_time(session)
+    max_jobs, max_flights, max_bytes = (None, None, None) if row is None else row
+    if max_jobs is not None and new_jobs:
+        _compare("jobs_in_flight", max_jobs, _jobs_in_flight(session, key_id), new_jobs, SOON_S)
+    if max_flights is not None and flights:
+        used = _flights(session, key_id, usage_day(now))
+        _compare("flights_per_day", max_flights, used, flights, DAY_S - int(now % DAY_S))
+    if max_bytes is not None:
+        _compare("stored_bytes", max_bytes, _stored(session, key_id), size_bytes, SOON_S)
+    if flights:
+        _add_flights(session, key_id, usage_day(now), flights)
 
 
 def settle(session: Session, job: LeasedRow, _note: Note) -> None:
@@ -93,32 +89,6 @@ def usage(session: Session, key_id: str) -> Usage:
     """Count what a key uses now."""
     today = usage_day(current_time(session))
     return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
-
-
-def _charge(session: Session, key_id: str | None, asked: _Asked) -> None:
-    if key_id is None:
-        return
-    limits = (api_keys.c.max_jobs_in_flight, api_keys.c.max_flights_per_day, api_keys.c.max_stored_bytes)
-    row = session.execute(
-        select(*limits).where(api_keys.c.id == key_id).with_for_update()  # nothing on SQLite: see above
-    ).one_or_none()
-    if row is not None:
-        _refuse_excess(session, key_id, Quota(*row), asked)
-    if asked.flights:
-        _add_flights(session, key_id, usage_day(current_time(session)), asked.flights)
-
-
-def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -> None:
-    now = current_time(session)
-    if quota.max_jobs_in_flight is not None and asked.jobs:
-        _compare("jobs_in_flight", quota.max_jobs_in_flight, _jobs_in_flight(session, key_id), 1, SOON_S)
-    if quota.max_flights_per_day is not None and asked.flights:
-        used = _flights(session, key_id, usage_day(now))
-        until_tomorrow_s = DAY_S - int(now % DAY_S)
-        _compare("flights_per_day", quota.max_flights_per_day, used, asked.flights, until_tomorrow_s)
-    if quota.max_stored_bytes is not None:
-        used = _stored(session, key_id)
-        _compare("stored_bytes", quota.max_stored_bytes, used, asked.size_bytes, SOON_S)
 
 
 def _compare(name: str, limit: int, used: int, asked: int, retry_after_s: int) -> None:

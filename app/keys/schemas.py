@@ -34,7 +34,7 @@ class Quotas(BaseModel):
 
     @classmethod
     def of(cls, used: Usage, quota: Quota) -> Quotas:
-        """Show use beside limits."""
+        """Combine use and limits."""
         return cls(
             jobs_in_flight=LimitAndUse(used=used.jobs_in_flight, limit=quota.max_jobs_in_flight),
             flights_per_day=LimitAndUse(used=used.flights_today, limit=quota.max_flights_per_day),

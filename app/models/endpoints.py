@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Path
+from fastapi import APIRouter
 
 from app.audit.records import Action
 from app.audit.service import note
 from app.database import Session
 from app.errors import InvalidRequest, ModelNotFound
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
-from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
+from app.http.parameters import CursorQuery, IdPath, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
 from app.models import repository
@@ -45,9 +43,7 @@ def list_models(
     summary="Get an identified model",
     responses=documented(InvalidRequest, ModelNotFound),
 )
-def get_model(
-    app: ServiceDep, owner: OwnerDep, model_id: Annotated[str, Path(pattern=ID_PATTERN)]
-) -> IdentifiedModel:
+def get_model(app: ServiceDep, owner: OwnerDep, model_id: IdPath) -> IdentifiedModel:
     """Return parameters, fit, aircraft and flight of one model."""
     with app.database.read() as session:
         summary, document = repository.get_model(session, owner, model_id)
@@ -62,9 +58,7 @@ def get_model(
     status_code=204,
     responses=documented(InvalidRequest, ModelNotFound),
 )
-def delete_model(
-    app: ServiceDep, caller: CallerDep, model_id: Annotated[str, Path(pattern=ID_PATTERN)]
-) -> None:
+def delete_model(app: ServiceDep, caller: CallerDep, model_id: IdPath) -> None:
     """Delete a model; its job keeps the result, and jobs that were started with it have copies."""
 
     def remove(session: Session) -> None:

@@ -1,8 +1,8 @@
 """Log lines of the API and the workers: one event, one line, for eyes or as JSON for machines.
 
-``MORPHID_LOG_FORMAT=text|json`` and ``MORPHID_LOG_LEVEL`` choose. What a line says of its own beside its
-message is handed over as ``extra={"facts": {...}}``; what a whole piece of work has in common comes from
-`app.observability.context`. Secrets that slip into a message are blotted out.
+``MORPHID_LOG_FORMAT=text|json`` and ``MORPHID_LOG_LEVEL`` choose. What a line says in addition to its
+message is passed as ``extra={"facts": {...}}``; what a whole piece of work has in common comes from
+`app.observability.context`. Secrets that slip into a message are masked.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from app.documents import finite
 from app.observability.context import current_facts
 from app.observability.tracing import current_trace_id
 
-FORMATS = ("text", "json")
 # those of others have handlers of their own: they go through ours instead
 GATHERED = (
     "uvicorn",
@@ -46,7 +45,7 @@ SECRETS = (
 )
 
 
-def blotted(text: str) -> str:
+def masked(text: str) -> str:
     """Return `text` without secrets."""
     for pattern, replacement in SECRETS:
         text = pattern.sub(replacement, text)
@@ -83,7 +82,7 @@ def _message(record: logging.LogRecord) -> str:
         message = record.getMessage()
     except (TypeError, ValueError):
         message = f"{record.msg} {record.args}"  # a line with a mistake is worth more than none
-    return blotted(message)[:MAX_MESSAGE]
+    return masked(message)[:MAX_MESSAGE]
 
 
 class JsonFormatter(logging.Formatter):
@@ -99,7 +98,7 @@ class JsonFormatter(logging.Formatter):
             **getattr(record, "facts", {}),
         }
         if record.exc_info and record.exc_info[0] is not None:
-            line["exception"] = blotted(self.formatException(record.exc_info))
+            line["exception"] = masked(self.formatException(record.exc_info))
         if record.stack_info:
             line["stack"] = record.stack_info
         return json.dumps(finite(line), ensure_ascii=True, default=str)
@@ -118,7 +117,7 @@ class TextFormatter(logging.Formatter):
         if facts:
             line += f" [{facts}]"
         if record.exc_info and record.exc_info[0] is not None:
-            line += "\n" + blotted(self.formatException(record.exc_info))
+            line += "\n" + masked(self.formatException(record.exc_info))
         return line
 
 

@@ -1,4 +1,4 @@
-"""What a parser process answers: a JSON text whose long lists of numbers stand beside it as plain bytes.
+"""What a parser process answers: a JSON text followed by its long lists of numbers as plain bytes.
 
 The reader of a frame trusts nothing in it: every length is checked, and no more is made of it than JSON
 values and lists of numbers.
@@ -16,7 +16,7 @@ HEAD = struct.Struct("<4sII")  # magic, bytes of the JSON text, count of arrays
 ARRAY = struct.Struct("<cQ")  # type code, bytes
 WIDTHS = {b"d": 8, b"q": 8}  # float64, int64
 MIN_ARRAY = 64  # items; shorter lists stay in the JSON text
-MAX_EXCEPTIONS = 20  # of a list: items that are no numbers, kept beside it so that their place can be named
+MAX_EXCEPTIONS = 20  # of a list: items that are no numbers, kept apart so that their place can be named
 MARK = "\x00"  # key of a place holder; no text from outside holds this character
 MAX_TEXT_BYTES = 4 * 2**20  # of everything that is no number; our requests need some kilobytes
 MAX_EXACT = 2**53  # integers beyond it are no exact floats

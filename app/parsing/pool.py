@@ -124,7 +124,7 @@ class ParserPool:
 
 
 def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMediaType:
-    """Tell a file's fault as a problem of the request."""
+    """Turn a file's fault into a problem of the request."""
     detail, hint = as_sentence(fault.detail), as_sentence(fault.hint)
     if fault.code in FORMAT_FAULTS:
         return UnsupportedMediaType(detail, pointer, hint)

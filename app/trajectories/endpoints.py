@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
@@ -21,7 +21,7 @@ from app.errors import (
 )
 from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
-from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
+from app.http.parameters import CursorQuery, IdPath, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
 from app.trajectories import repository, service
@@ -156,7 +156,7 @@ def list_trajectories(
 def get_trajectory(
     app: ServiceDep,
     owner: OwnerDep,
-    trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)],
+    trajectory_id: IdPath,
 ) -> Response:
     """Return an uploaded flight with its rows, in s and rad."""
     with app.database.read() as session:
@@ -174,9 +174,7 @@ def get_trajectory(
     status_code=204,
     responses=documented(InvalidRequest, TrajectoryNotFound),
 )
-def delete_trajectory(
-    app: ServiceDep, caller: CallerDep, trajectory_id: Annotated[str, Path(pattern=ID_PATTERN)]
-) -> None:
+def delete_trajectory(app: ServiceDep, caller: CallerDep, trajectory_id: IdPath) -> None:
     """Delete an uploaded flight; jobs that were started with it have copies of their own."""
 
     def remove(session: Session) -> None:

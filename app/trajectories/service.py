@@ -9,7 +9,7 @@ from app.audit.service import note
 from app.database import Session
 from app.errors import InvalidRequest
 from app.http.context import Caller
-from app.keys.quota import charge_bytes
+from app.keys.quota import charge
 from app.parsing.pool import refusal
 from app.trajectories.repository import insert_trajectory, stored_form
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
@@ -76,7 +76,7 @@ def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload)
         When the caller's key may not store that much more.
     """
     document = stored_form(upload.model_dump(exclude={"name"}))
-    charge_bytes(session, caller.key_id, len(document))
+    charge(session, caller.key_id, size_bytes=len(document))
     stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
     note(session, caller, Action.TRAJECTORY_POST, stored.id)
     return stored

@@ -63,7 +63,7 @@ class AddressRefused(Exception):
 
 
 def is_public(address: Address) -> bool:
-    """Tell whether `address` is global unicast, and so is any IPv4 address that is wrapped in it."""
+    """Whether `address` is global unicast, and so is any IPv4 address that is wrapped in it."""
     if isinstance(address, ipaddress.IPv6Address):
         if address.scope_id is not None:
             return False

@@ -12,7 +12,7 @@ from sqlalchemy import delete, insert, select
 from app.database import Session, current_time, database_time, insert_new
 from app.documents import Document
 from app.identifiers import new_identifier
-from app.jobs.records import FINISHED, moment
+from app.jobs.records import moment
 from app.leases import LeasedRow, Note
 from app.tables import models, webhook_deliveries, webhooks
 
@@ -22,7 +22,6 @@ GIVEN_UP = "given_up"
 
 TEST_EVENT = "webhook.test"
 CHALLENGE_EVENT = "webhook.challenge"
-JOB_EVENTS = tuple(f"job.{status}" for status in FINISHED)
 CHALLENGE_BYTES = 24
 MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
 

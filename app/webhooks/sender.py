@@ -113,7 +113,7 @@ class WebhookSender:
             return tries
 
     async def _begin(self, poster: Poster) -> int:
-        """Claim as many deliveries as may be under way beside those that are, and begin to send them."""
+        """Claim as many deliveries as there is room for, and begin to send them."""
         room = self._settings.max_at_once - len(self._under_way)
         if room <= 0:
             return 0

@@ -48,10 +48,10 @@ def database(settings: Any) -> Iterator[Finding]:
     from sqlalchemy.exc import SQLAlchemyError
 
     from app.database import Database, database_time, schema_revision
-    from app.observability.logs import blotted
+    from app.observability.logs import masked
     from migrations import HEAD
 
-    url = blotted(settings.database_url)
+    url = masked(settings.database_url)
     if settings.uses_sqlite and not _sqlite_file(settings.database_url).exists():
         yield warn("database", f"{url} is not there yet", "`morphid serve` or `morphid db upgrade` makes it")
         return
@@ -65,7 +65,7 @@ def database(settings: Any) -> Iterator[Finding]:
     except SQLAlchemyError as error:
         sentence = str(getattr(error, "orig", None) or error).splitlines()[0]
         remedy = "start it, or correct MORPHID_DATABASE_URL; a spoilt file: `morphid db restore`"
-        yield fail("database", f"{url}: {blotted(sentence)}", remedy)
+        yield fail("database", f"{url}: {masked(sentence)}", remedy)
         return
     finally:
         store.dispose()
@@ -137,9 +137,9 @@ def _postgres(session: Any) -> Iterator[Finding]:
 def broker(url: str) -> Iterator[Finding]:
     """Does it answer to our password, and does it keep what it is given."""
     from app.health.broker import NOT_CHECKED, broker_client, broker_state
-    from app.observability.logs import blotted
+    from app.observability.logs import masked
 
-    where, state = blotted(url), broker_state(url)
+    where, state = masked(url), broker_state(url)
     if state == NOT_CHECKED:
         yield ok("broker", f"{where}: {state}")
         return

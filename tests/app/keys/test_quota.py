@@ -27,7 +27,9 @@ def put_job(database: Database, key_id: str, number: int = 0, **values: Any) -> 
     row: dict[str, Any] = {"status": "queued", "flights_estimated": 0, "size_bytes": 0, **values}
     zero = dict.fromkeys(("priority", "attempt", "fence", "event_seq"), 0)
     with database.write() as session:
-        quota.charge(session, key_id, flights=row["flights_estimated"], size_bytes=row["size_bytes"])
+        quota.charge(
+            session, key_id, new_jobs=1, flights=row["flights_estimated"], size_bytes=row["size_bytes"]
+        )
         session.execute(
             insert(jobs).values(
                 id=job_id,
@@ -129,7 +131,7 @@ def test_stored_bytes_are_those_of_jobs_and_flights(database: Database) -> None:
     key_id = make_key(database, quota=Quota(max_stored_bytes=100)).key.id
     job_id = put_job(database, key_id, 1, size_bytes=60)
     with database.write() as session:
-        quota.charge_bytes(session, key_id, 40)
+        quota.charge(session, key_id, size_bytes=40)
         session.execute(
             insert(trajectories).values(
                 id="traj_1",
@@ -145,7 +147,7 @@ def test_stored_bytes_are_those_of_jobs_and_flights(database: Database) -> None:
         )
     assert used(database, key_id).stored_bytes == 100
     with pytest.raises(QuotaExceeded, match="stored bytes"), database.write() as session:
-        quota.charge_bytes(session, key_id, 1)
+        quota.charge(session, key_id, size_bytes=1)
     with database.write() as session:
         session.execute(delete(jobs).where(jobs.c.id == job_id))
     assert used(database, key_id).stored_bytes == 40
@@ -168,7 +170,7 @@ def test_keys_do_not_pay_for_one_another(database: Database) -> None:
     put_job(database, other, 1)
     assert used(database, full).jobs_in_flight == used(database, other).jobs_in_flight == 1
     with database.write() as session:
-        quota.charge(session, None, flights=10**9, size_bytes=10**12)
+        quota.charge(session, None, new_jobs=1, flights=10**9, size_bytes=10**12)
         end_job(session, None, estimated=10**9, flown=0, day=0)
 
 

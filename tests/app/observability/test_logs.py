@@ -96,7 +96,7 @@ def test_lines_carry_what_their_work_has_in_common(as_json: Written) -> None:
         ("signed with whsec_c2VjcmV0c2VjcmV0", "c2VjcmV0c2VjcmV0"),
     ],
 )
-def test_secrets_are_blotted_out(message: str, secret: str) -> None:
+def test_secrets_are_masked(message: str, secret: str) -> None:
     """Secrets that slip into a message or an exception do not reach the log."""
     for kind in ("json", "text"):
         log = Written(kind)
