@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from morphcore.jit import WithoutDoor, entry_kernel, kernel
+from morphcore.jit import WithoutDoor, entry_kernel, inlined, is_kept, kernel
 from tests.kernels import door
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -41,6 +41,65 @@ def test_kernels_without_doors_refuse_python_and_serve_kernels() -> None:
             _doubled(values)
     door(_doubled)(values)
     np.testing.assert_array_equal(values, 8.0)
+
+
+@inlined
+def _thrice(value):
+    return 3.0 * value
+
+
+@entry_kernel
+def _nine_times(values):
+    for i in range(values.size):
+        values[i] = _thrice(_thrice(values[i]))
+
+
+def test_inlined_functions_serve_kernels_and_python() -> None:
+    """Python runs their Python; kernels hold their code."""
+    assert _thrice(2.0) == 6.0
+    values = np.ones(3)
+    _nine_times(values)
+    np.testing.assert_array_equal(values, 9.0)
+    assert _thrice(2.0) == 6.0
+
+
+SCALED = """
+from morphcore.jit import entry_kernel
+
+@entry_kernel
+def scaled(x):
+    return 2 * x.sum()
+"""
+SCALE = """
+import sys, numpy as np
+sys.path.insert(0, {folder!r})
+from scaled import scaled
+scaled(np.ones(3, dtype={dtype!r}))
+print(sum(scaled.stats.cache_hits.values()))
+"""
+
+
+def test_processes_that_compile_at_once_keep_all_their_code(tmp_path: Path) -> None:
+    """Two processes compile one entry for two types at the same time: a third finds both in the cache."""
+    if is_kept(_four_times) is None:
+        pytest.skip("nothing is compiled, or nothing is kept")
+    (tmp_path / "scaled.py").write_text(SCALED, "utf-8")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+
+    def hits() -> list[str]:
+        running = [
+            subprocess.Popen(
+                [sys.executable, "-P", "-c", SCALE.format(folder=str(tmp_path), dtype=dtype)],
+                env=environment,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            for dtype in ("float64", "float32")
+        ]
+        return [each.communicate()[0].strip() for each in running]
+
+    assert hits() == ["0", "0"]
+    assert hits() == ["1", "1"]
 
 
 def test_kernels_that_cannot_be_kept_are_compiled_anew(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.operator import BODY_AFT
-from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_normals, solve_circulation
+from morphcore.aero.vlm import influence
 from morphcore.geometry.lattice import surface_pose
 from morphcore.lanes import ALONE, lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants, to_lanes
@@ -16,6 +16,7 @@ from morphcore.models.kernels.layout import S_FREE
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.kernels.batch import rates_of_blocks
 from morphcore.simulate.plan import FlightPlan
+from tests.oracles.lattice import edge_forces, edge_midpoints, panel_normals, solve_circulation
 
 Array = NDArray[np.float64]
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from morphcore.aero.vlm import (
-    edge_circulation,
-    edge_forces,
-    edge_midpoints,
-    influence,
-    panel_normals,
-    solve_circulation,
-)
+from morphcore.aero.vlm import influence
 from morphcore.errors import InvalidInput, UnsupportedRegime
 from morphdata.lattice import VortexCore
 from tests.aero.planforms import Lattice, lattice, straight_wings
+from tests.oracles.lattice import (
+    edge_circulation,
+    edge_forces,
+    edge_midpoints,
+    panel_normals,
+    solve_circulation,
+)
 
 STREAM_B = np.array([-0.98, -0.05, -0.17])
 RNG_SEED = 5

@@ -9,12 +9,13 @@ from scipy.spatial.transform import Rotation
 from morphcore.aero.kernels.lattice_place import induced_velocity
 from morphcore.aero.kernels.lattice_place import refine as refine_kernel
 from morphcore.aero.moving_lattice import MovingLattice
-from morphcore.aero.vlm import edge_midpoints, influence, panel_normals
+from morphcore.aero.vlm import influence
 from morphcore.jit import entry_kernel
 from morphcore.models.flexible import flexible_model
 from morphdata.lattice import Lattice, VortexCore
 from tests.kernels import door
 from tests.models.chains import example_aircraft, example_flight
+from tests.oracles.lattice import edge_midpoints, panel_normals
 
 refine = door(refine_kernel)
 

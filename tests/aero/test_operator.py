@@ -13,7 +13,7 @@ from morphcore.aero.operator import (
     aircraft_lattice,
     lattice_operator,
 )
-from morphcore.aero.vlm import influence, solve_circulation
+from morphcore.aero.vlm import influence
 from morphcore.errors import UnsupportedRegime
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
@@ -21,6 +21,7 @@ from morphdata.aircraft import load_aircraft
 from morphdata.lattice import Lattice
 from tests.aero.planforms import EXAMPLES, straight_wings
 from tests.models.chains import odd_aircraft
+from tests.oracles.lattice import solve_circulation
 
 ANGLES = (0.3, 0.9)
 

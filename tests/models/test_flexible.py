@@ -13,8 +13,9 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
 from morphcore.models.flexible import FlexibleModel, flexible_model
-from morphcore.multibody.beam import BeamWorkspace, NodePoses, node_forces, sections_of
+from morphcore.multibody.beam import BeamWorkspace, NodePoses, node_forces
 from tests.models.chains import EXAMPLES, aircraft_of, example_aircraft, example_flight
+from tests.oracles.clamped_beams import sections_of
 from tests.oracles.polar import steady_polar
 
 NO_GRAVITY = np.zeros(3)

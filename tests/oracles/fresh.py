@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2, JONES_MEAN_LAG
-from morphcore.aero.vlm import edge_forces, edge_midpoints, influence, panel_normals, solve_circulation
+from morphcore.aero.vlm import influence
 from morphcore.errors import FlightDiverged, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.models.equivalent import SHORTEST_LAG_S, ChainModel, ParameterBatch
@@ -29,6 +29,7 @@ from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
 from tests.oracles.chain_tree import chain_tree, link_bodies, link_ends
 from tests.oracles.dynamics import Motion, bias, body_poses, body_twists, mass_matrix
+from tests.oracles.lattice import edge_forces, edge_midpoints, panel_normals, solve_circulation
 from tests.oracles.tree import Tree
 
 Array = NDArray[np.float64]

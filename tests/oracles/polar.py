@@ -8,20 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.vlm import (
-    EdgeForces,
-    RingTable,
-    edge_forces,
-    edge_midpoints,
-    influence,
-    panel_normals,
-    ring_table,
-    solve_circulation,
-)
+from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_lattice, surface_pose
 from morphdata.lattice import DEFAULT_CORE, DEFAULT_LATTICE, Lattice, VortexCore
+from tests.oracles.lattice import EdgeForces, edge_forces, edge_midpoints, panel_normals, solve_circulation
 
 Array = NDArray[np.float64]
 

@@ -164,7 +164,7 @@ def _ride(R, x, arm, out):
 
 @inlined
 def _normal(corners, of_ring, side, out, p):
-    """Unit normal of a ring on the lifting side, across the diagonals, as `vlm.panel_normals`."""
+    """Unit normal of a ring on the lifting side, across the diagonals."""
     root_front, tip_front, root_aft, tip_aft = of_ring[0], of_ring[1], of_ring[2], of_ring[3]
     ax = corners[tip_front, 0] - corners[root_aft, 0]
     ay = corners[tip_front, 1] - corners[root_aft, 1]
