@@ -10,8 +10,8 @@ from morphcore.errors import InvalidInput
 from morphcore.evolution import FEWEST, EvolutionSettings
 from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
-from morphcore.identify.parameters import BOUND_NAMES
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
+from morphcore.models.parameters import CHAIN_PARAMETERS
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
@@ -78,7 +78,8 @@ def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSe
     fields = Fields(document, pointer)
     default = ModelSettings()
     bounds = fields.optional_child("bounds")
-    pairs = {name: _pair(bounds, name) for name in BOUND_NAMES if bounds.has(name)}
+    names = [parameter.name for parameter in CHAIN_PARAMETERS]
+    pairs = {name: _pair(bounds, name) for name in names if bounds.has(name)}
     bounds.done()
     listed = fields.raw("aero_coefficients", None)
     settings = ModelSettings(

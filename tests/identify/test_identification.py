@@ -88,8 +88,8 @@ def test_finds_the_parameters_that_flew_the_sample() -> None:
     for fit in result.fits:
         assert fit.J("identified") < 1e-5 * fit.J("initial")  # type: ignore[operator]
     found = result.parameters
-    np.testing.assert_allclose(found.stiffness[0, 0, 0, 0], batch.stiffness[0, 0, 0, 0], rtol=0.03)
-    np.testing.assert_allclose(found.lift_factor, batch.lift_factor, rtol=0.03)
+    np.testing.assert_allclose(found["stiffness_nm_rad"][0, 0, 0, 0], batch["stiffness_nm_rad"][0, 0, 0, 0], rtol=0.03)
+    np.testing.assert_allclose(found["lift_factor"], batch["lift_factor"], rtol=0.03)
 
 
 @pytest.mark.parametrize("search", [QUICK, SWARM, EVOLUTION, replace(QUICK, method="least_squares")])

@@ -139,12 +139,12 @@ def random_batch(
     guess = physical_guess(model, division)
     return replace(
         guess,
-        stiffness=guess.stiffness * np.exp(rng.uniform(-1.5, 1.5, size=guess.stiffness.shape)),
-        damping=guess.damping * np.exp(rng.uniform(-1.5, 1.5, size=guess.stiffness.shape)),
+        stiffness=guess["stiffness_nm_rad"] * np.exp(rng.uniform(-1.5, 1.5, size=guess["stiffness_nm_rad"].shape)),
+        damping=guess["damping_nms_rad"] * np.exp(rng.uniform(-1.5, 1.5, size=guess["stiffness_nm_rad"].shape)),
         lift_factor=rng.uniform(0.8, 1.2, size=particles),
         centre_shift=rng.uniform(-0.03, 0.03, size=particles),
         profile_drag=rng.uniform(0.0, 0.05, size=particles),
-        lag=guess.lag * np.exp(rng.uniform(-1.0, 1.0, size=particles)),
+        lag=guess["lag_s"] * np.exp(rng.uniform(-1.0, 1.0, size=particles)),
     )
 
 

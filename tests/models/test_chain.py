@@ -49,7 +49,7 @@ def drag_wrenches(model, batch, particle, tree, motion, density):
     link = 0
     for s, surface in enumerate(model.aircraft.surfaces):
         ends = link_ends(model, batch, s, particle)
-        drag = batch.profile_drag[particle] if surface.flexible else surface.profile_drag
+        drag = batch["profile_drag"][particle] if surface.flexible else surface.profile_drag
         for start, end in pairwise(ends):
             a, b = surface.chord_at(start), surface.chord_at(end)
             length = end - start

@@ -65,11 +65,11 @@ def test_physical_guess_has_beta_damping():
     """c = beta k, neutral corrections, the surface's own profile drag."""
     model = small_model(example_aircraft(), example_flight(), 3)
     guess = physical_guess(model)
-    np.testing.assert_allclose(guess.damping, 0.004 * guess.stiffness)
-    assert guess.lift_factor[0] == 1.0
-    assert guess.centre_shift[0] == 0.0
-    assert guess.profile_drag[0] == 0.01
-    assert guess.division.shape == (1, 1, 3)
+    np.testing.assert_allclose(guess["damping_nms_rad"], 0.004 * guess["stiffness_nm_rad"])
+    assert guess["lift_factor"][0] == 1.0
+    assert guess["centre_shift_m"][0] == 0.0
+    assert guess["profile_drag"][0] == 0.01
+    assert guess["division"].shape == (1, 1, 3)
 
 
 def test_wing_sets():
@@ -142,8 +142,8 @@ def test_a_stiff_chain_is_the_rigid_wing():
             guess,
             lag=np.zeros(1),
             profile_drag=np.zeros(1),
-            stiffness=1e9 * guess.stiffness,
-            damping=0.0 * guess.damping,
+            stiffness=1e9 * guess["stiffness_nm_rad"],
+            damping=0.0 * guess["damping_nms_rad"],
         )
         n = model.coordinates
         state = np.concatenate([start[:, :13], np.zeros((1, 2 * n + 9 * model.links))], axis=1)

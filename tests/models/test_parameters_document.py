@@ -50,7 +50,7 @@ def test_documents_keep_every_digit(seed: int, links: int, wings: int, particle:
 def test_a_whole_result_and_one_damping_a_joint_are_understood(examples: Path) -> None:
     """The model may stand inside its result; a joint's damping may be one number for its three axes."""
     read = parameters_from_document({"model": {**DOCUMENT, "damping_nms_rad": [200.0]}, "fit": []})
-    np.testing.assert_array_equal(read.damping, np.full((1, 1, 1, 3), 200.0))
+    np.testing.assert_array_equal(read["damping_nms_rad"], np.full((1, 1, 1, 3), 200.0))
     rigid = chain_model(load_aircraft(examples / "aircraft.json"), load_flight(examples / "flight.json"), 1)
     assert parameters_from_document(parameters_document(physical_guess(rigid))).links == 1
 

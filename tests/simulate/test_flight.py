@@ -125,7 +125,7 @@ def test_stiff_joints_tend_to_the_rigid_model(
     """
     guess = replace(guess, profile_drag=np.zeros(1))
     one_link = physical_guess(chain_model(aircraft, flight, 1, COARSE))
-    stiff = replace(guess, stiffness=1e6 * guess.stiffness, damping=1e6 * guess.damping)
+    stiff = replace(guess, stiffness=1e6 * guess["stiffness_nm_rad"], damping=1e6 * guess["damping_nms_rad"])
     schedules = [MORPH, Hold()]
     rigid = simulate(
         aircraft, flight, schedules, model=replace(one_link, profile_drag=np.zeros(1)), **EASY
@@ -221,10 +221,10 @@ def test_a_wing_without_stiffness_is_no_flight(
     aircraft: Aircraft, flight: Flight, guess: ParameterBatch
 ) -> None:
     """Too soft to carry the aircraft: no trim. Joints that push away from rest: divergence, with its time."""
-    soft = replace(guess, stiffness=1e-4 * guess.stiffness, damping=0.0 * guess.damping)
+    soft = replace(guess, stiffness=1e-4 * guess["stiffness_nm_rad"], damping=0.0 * guess["damping_nms_rad"])
     with pytest.raises(TrimNotFound):
         simulate(aircraft, flight, [MORPH, Hold()], model=soft, **EASY)
-    soft = replace(guess, stiffness=-guess.stiffness)
+    soft = replace(guess, stiffness=-guess["stiffness_nm_rad"])
     with pytest.raises(FlightDiverged) as caught:
         simulate(aircraft, flight, [MORPH, MORPH], model=soft, start="given", **EASY)
     assert 0.0 <= caught.value.time_s < 1.0

@@ -119,7 +119,7 @@ def vacuum_drifts(step_s, schedules, *, links=3, gravity=0.0):
     rng = np.random.default_rng(0)
     model = small_model(example_aircraft(), airless(example_flight(), gravity=gravity), links)
     guess = physical_guess(model)
-    batch = replace(guess, stiffness=1e-3 * guess.stiffness, damping=0.0 * guess.damping)
+    batch = replace(guess, stiffness=1e-3 * guess["stiffness_nm_rad"], damping=0.0 * guess["damping_nms_rad"])
     state = random_state(rng, model, 1, speed=10.0)
     n = model.coordinates
     state[:, 13 : 13 + n] *= 0.3
@@ -183,7 +183,7 @@ def test_accelerations_balance_momentum_and_power_to_round_off(links):
     rng = np.random.default_rng(links)
     model = small_model(odd_aircraft(rng), airless(example_flight(), gravity=0.0), links)
     batch = replace(random_batch(rng, model, 1, wing_sets=4))
-    batch = replace(batch, damping=0.0 * batch.damping)
+    batch = replace(batch, damping=0.0 * batch["damping_nms_rad"])
     hinges, state = random_hinges(rng, model), random_state(rng, model, 1)
     n = model.coordinates
     rates = state_rates(model, instant(model, hinges), 0, lane_constants(model, batch, STEP_S), state)[0]

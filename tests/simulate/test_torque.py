@@ -63,7 +63,7 @@ def test_motors_do_the_work_that_the_aircraft_gains(links):
     model = example_model(links)
     model = small_model(model.aircraft, airless(model.flight), links)
     guess = physical_guess(model)
-    batch = replace(guess, damping=0.0 * guess.damping)
+    batch = replace(guess, damping=0.0 * guess["damping_nms_rad"])
     schedules = [Spline(np.array([0.0, 0.3, 0.6]), np.array([0.0, 0.2, angle])) for angle in (0.5, 0.3)]
     plan = flight_plan(model, schedules, time_grid(np.linspace(0.0, 0.6, 61), 0.001))
     states = fly_free(model, plan, batch, resting(model)).states[:, 0]
