@@ -150,14 +150,14 @@ class SearchSpace:
                 continue
             values = batch[unknown.parameter.name]
             if unknown.sets:
-                each = [values[0, chosen[k]] for k in unknown.surfaces]
-                if any(np.any(other != each[0]) for other in each):
+                given = {chosen[k] for k in unknown.surfaces}
+                if len(given) > 1 and unknown.parameter.scope == "surface":
                     raise InvalidInput(
                         "the search would begin from a model whose wings have parameters of their own",
                         pointer=WARM_START,
                         hint="set model.separate_wings, or begin from a model whose wings are alike",
                     )
-                values = each[0]
+                values = values[0, min(given)]
             x[at] = unknown.transform.forward(values.reshape(-1))
         return np.asarray(np.clip(x, self.lower, self.upper))
 

@@ -73,7 +73,14 @@ class ParameterBatch(Shown):
         return replace(self, values={name: value[index] for name, value in self.values.items()})
 
     def changed(self, **values: Array) -> ParameterBatch:
-        """The same with other values of some parameters."""
+        """The same with other values of some parameters.
+
+        Raises
+        ------
+        KeyError : it has no such parameter.
+        """
+        if not values.keys() <= self.values.keys():
+            raise KeyError(f"of {', '.join(values)} only {', '.join(self.values)} are parameters")
         return replace(self, values={**self.values, **values})
 
 

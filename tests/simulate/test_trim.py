@@ -48,7 +48,7 @@ def test_nothing_accelerates(links):
     """
     rng = np.random.default_rng(links)
     model = example_model(links)
-    batch = random_batch(rng, model, 4, wing_sets=2)
+    batch = random_batch(rng, model, 4, separate_wings=True)
     found = trim(model, batch, instant(model, SWEPT)).require()
     rates = start_rates(model, batch, SWEPT, found)
     n = model.coordinates
