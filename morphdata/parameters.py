@@ -40,6 +40,32 @@ class Corrections(Strict):
     lag_s: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
+class SurfaceParameters(Strict):
+    """Parameters of one flexible surface."""
+
+    division: Shares
+    stiffness_nm_rad: Joints
+    damping_nms_rad: Joints
+    profile_drag: Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class MirroredParameters(Strict):
+    """A surface with the parameters of its mirror image."""
+
+    mirror_of: str = Field(description="Name of the surface whose parameters they are.")
+
+
+def _whose(value: Any) -> str:
+    mirrored = "mirror_of" in value if isinstance(value, dict) else isinstance(value, MirroredParameters)
+    return "mirrored" if mirrored else "own"
+
+
+OwnOrMirrored = Annotated[
+    Annotated[SurfaceParameters, Tag("own")] | Annotated[MirroredParameters, Tag("mirrored")],
+    Discriminator(_whose),
+]
+
+
 class Parameters(Strict):
     """The `model` of an identification's result, as it stands there."""
 
@@ -57,6 +83,14 @@ class Parameters(Strict):
         description="The same of the dampings."
     )
     aero: Corrections
+    surfaces: dict[str, OwnOrMirrored] | None = Field(
+        default=None,
+        max_length=MAX_WINGS,
+        description="Of an aircraft whose flexible surfaces are not one mirror pair: by name, each one's "
+        "own parameters. `division`, `stiffness_nm_rad`, `damping_nms_rad` and `aero.profile_drag` are then "
+        "those of the largest. Without it these are taken for the largest, and the others are as far from "
+        "their own beam theory.",
+    )
     lattice: Lattice | None = Field(default=None, description="With which the model was identified.")
     step_s: StepS | None = None
     start: Start | None = None

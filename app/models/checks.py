@@ -7,7 +7,14 @@ from typing import Any
 
 from app.models.left_models import has_flown
 from morphdata.faults import Fault
-from morphdata.parameters import AXES, KnownModel, Parameters, WholeResult
+from morphdata.parameters import (
+    AXES,
+    KnownModel,
+    MirroredParameters,
+    Parameters,
+    SurfaceParameters,
+    WholeResult,
+)
 
 SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
 RAGGED = -1
@@ -50,7 +57,24 @@ def known_model_faults(model: KnownModel, pointer: str = "/model") -> list[Fault
 
 
 def _parameters_faults(parameters: Parameters, pointer: str) -> Iterator[Fault]:
-    links = parameters.links_per_wing
+    yield from _structure_faults(parameters, parameters.links_per_wing, pointer)
+    surfaces = parameters.surfaces or {}
+    for name, own in surfaces.items():
+        at = f"{pointer}/surfaces/{name.replace('~', '~0').replace('/', '~1')}"
+        if isinstance(own, SurfaceParameters):
+            yield from _structure_faults(own, parameters.links_per_wing, at)
+        elif isinstance(surfaces.get(own.mirror_of, own), MirroredParameters):
+            yield Fault(
+                "mirrors_nothing",
+                f"{name!r} mirrors {own.mirror_of!r}, which has no parameters.",
+                f"{at}/mirror_of",
+                "Name a surface with parameters of its own.",
+            )
+
+
+def _structure_faults(
+    parameters: Parameters | SurfaceParameters, links: int, pointer: str
+) -> Iterator[Fault]:
     rows = _rows(parameters.division)
     shapes: dict[str, tuple[int, ...]] = {
         "division": (len(rows), links),

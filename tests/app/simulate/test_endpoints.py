@@ -256,6 +256,27 @@ def test_separate_wings_are_accepted(service: RunningService) -> None:
         stored(service, equivalent(parameters={**single, **joints}))
 
 
+OWN = {name: RESULT["model"][name] for name in ("division", "stiffness_nm_rad", "damping_nms_rad")}
+SURFACES: dict[str, Any] = {"right": {**OWN, "profile_drag": 0.01}, "left": {"mirror_of": "right"}}
+
+
+def test_surfaces_may_have_parameters_of_their_own(service: RunningService) -> None:
+    """By name, or as the mirror image of another; what does not fit is named."""
+    model = {**RESULT["model"], "separate_wings": False, "surfaces": SURFACES}
+    assert stored(service, equivalent(parameters=model))["model"]["parameters"] == model
+    for change, pointer, code in (
+        ({"right": {**SURFACES["right"], "division": [0.5, 0.6]}}, "/right/division", "division_not_whole"),
+        ({"right": {**SURFACES["right"], "stiffness_nm_rad": []}}, "/right/stiffness_nm_rad", "wrong_shape"),
+        ({"right": OWN}, "/right/profile_drag", "missing"),
+        ({"left": {"mirror_of": "tail"}}, "/left/mirror_of", "mirrors_nothing"),
+        ({"left": {"mirror_of": "left"}}, "/left/mirror_of", "mirrors_nothing"),
+        ({"left": {"mirror_of": "right", "division": [1.0]}}, "/left/division", "unknown_field"),
+    ):
+        wrong = {**model, "surfaces": {**SURFACES, **change}}
+        at = f"/model/parameters/surfaces{pointer}"
+        assert_named(service, "/simulate", equivalent(parameters=wrong), at, code, "")
+
+
 def test_work_is_bounded(service: RunningService) -> None:
     """More rows or more steps of a model than can be flown in reasonable time are refused by their field."""
     long = changed(simulate_document(), "/duration_s", 600.0)
