@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
+from morphdata.aircraft import Aircraft, Surface
 from morphdata.identify import CostEstimate, SamplesRequest, Search, SoughtModel
 from morphdata.samples import InlineSample
 
@@ -27,15 +29,49 @@ def _asymmetric(sample: InlineSample) -> bool:
     return max(apart, turned) > ASYMMETRIC_RAD
 
 
-def parameter_count(model: SoughtModel, links: int, training: Sequence[InlineSample]) -> int:
-    """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections."""
+def _mirror_groups(surfaces: Sequence[Surface]) -> int:
+    """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
+    waiting: list[Surface] = []
+    groups = 0
+    for surface in (each for each in surfaces if each.flexible):
+        side: Literal["right", "left"] = "left" if surface.side == "right" else "right"
+        hinge = surface.hinge
+        changes = {
+            "side": side,
+            "position_m": _across(surface.position_m),
+            "hinge": hinge and hinge.model_copy(update={"position_m": _across(hinge.position_m)}),
+        }
+        image = next(
+            (w for w in waiting if w == surface.model_copy(update={**changes, "name": w.name})), None
+        )
+        if image is None:
+            groups += 1
+            waiting.append(surface)
+        else:
+            waiting.remove(image)
+    return groups
+
+
+def _across(position_m: list[float] | None) -> list[float] | None:
+    return position_m and [position_m[0], -position_m[1], position_m[2]]
+
+
+def parameter_count(
+    aircraft: Aircraft, model: SoughtModel, links: int, training: Sequence[InlineSample]
+) -> int:
+    """Unknowns: per joint three stiffnesses and three dampings, link shares, aerodynamic corrections.
+
+    Every flexible surface has its own but for mirror images; those of a pair always share the profile drag.
+    """
+    groups = _mirror_groups(aircraft.surfaces)
     if model.aero_coefficients is None:
-        corrections = CORRECTIONS - (not any(_asymmetric(sample) for sample in training))
+        drag = any(_asymmetric(sample) for sample in training)
+        corrections = CORRECTIONS - 1 + drag
     else:
+        drag = "profile_drag" in model.aero_coefficients
         corrections = len(model.aero_coefficients)
-    joints = links - 1
-    per_wing = 7 * joints
-    return per_wing * (2 if model.separate_wings else 1) + corrections
+    sets = sum(surface.flexible for surface in aircraft.surfaces) if model.separate_wings else groups
+    return 7 * (links - 1) * sets + corrections + drag * (groups - 1)
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:
@@ -58,7 +94,7 @@ def estimate(request: SamplesRequest, links: int, samples: Sequence[InlineSample
         The samples with their rows.
     """
     training = [sample for sample in samples if sample.role == "train"]
-    parameters = parameter_count(request.model, links, training)
+    parameters = parameter_count(request.aircraft, request.model, links, training)
     sets = _parameter_sets(request.search, parameters)
     flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
     return CostEstimate(
