@@ -85,6 +85,7 @@ class Parameters(Strict):
     aero: Corrections
     surfaces: dict[str, OwnOrMirrored] | None = Field(
         default=None,
+        min_length=1,
         max_length=MAX_WINGS,
         description="Of an aircraft whose flexible surfaces are not one mirror pair: by name, each one's "
         "own parameters. `division`, `stiffness_nm_rad`, `damping_nms_rad` and `aero.profile_drag` are then "

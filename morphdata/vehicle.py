@@ -177,6 +177,29 @@ def _hinge_faults(hinge: Hinge, at: str) -> Iterator[Fault]:
         )
 
 
+def model_surfaces_faults(aircraft: Aircraft, parameters: Mapping[str, Any], pointer: str) -> Iterator[Fault]:
+    """Check that every flexible surface has its parameters in the document of an equivalent model."""
+    flexible = [surface.name for surface in aircraft.surfaces if surface.flexible]
+    surfaces, division = parameters.get("surfaces"), parameters["division"]
+    wings = len(division) if isinstance(division[0], list) else 1
+    hint = "Give the model that was identified for this aircraft."
+    if surfaces:
+        for name in (each for each in flexible if each not in surfaces):
+            yield Fault(
+                "surface_without_parameters",
+                f"The flexible surface {name!r} has no parameters.",
+                f"{pointer}/surfaces",
+                hint,
+            )
+    elif wings not in (1, len(flexible)):
+        yield Fault(
+            "other_number_of_wings",
+            f"The parameters are of {wings} wings, the aircraft has {len(flexible)} flexible surfaces.",
+            f"{pointer}/division",
+            hint,
+        )
+
+
 def speed_of_sound(altitude_m: float) -> float:
     """Speed of sound of the standard atmosphere, m/s (ICAO Doc 7488: 6.5 K/km up to 11 km, then constant)."""
     temperature_k = 288.15 - 0.0065 * min(altitude_m, 11_000.0)

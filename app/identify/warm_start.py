@@ -17,6 +17,7 @@ from morphdata.faults import Fault
 from morphdata.identify import IdentifyRequest
 from morphdata.parameters import KnownModel, WholeResult
 from morphdata.search import WarmStart
+from morphdata.vehicle import model_surfaces_faults
 
 POINTER = "/search/warm_start"
 WAYS = ("job_id", "model_id", "parameters")
@@ -92,6 +93,9 @@ def _require_fit(request: IdentifyRequest, parameters: Document, at: str) -> Non
             at,
             f"Begin from a model with {sought}, or set model.links_per_wing to {known}.",
         )
+    faults = list(model_surfaces_faults(request.aircraft, parameters, f"{POINTER}{at}"))
+    if faults:
+        raise InvalidRequest.of(faults)
     if parameters.get("separate_wings") and not request.model.separate_wings:
         raise _refused(
             "wings_differ",

@@ -9,7 +9,12 @@ from app.models.service import known_model
 from app.optimize.checks import morph_faults, work_faults
 from app.optimize.cost import estimate
 from morphdata.optimize import OptimizeRequest, ScheduleCost
-from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    vehicle_document,
+    vehicle_faults,
+)
 
 REPORT_TIME_S = 1800.0  # after the search's own time budget: flights of the flexible model, plots
 
@@ -27,6 +32,7 @@ def prepare(session: Session, owner: str, request: OptimizeRequest) -> Order[Sch
     faults = [
         *vehicle_faults(request.aircraft, request.flight, start=model.get("start")),
         *flexible_wing_faults(request.aircraft, "nothing_to_bend"),
+        *model_surfaces_faults(request.aircraft, model["parameters"], "/model/parameters"),
         *morph_faults(request),
         *work_faults(cost.flights),
     ]

@@ -10,7 +10,12 @@ from app.models.service import known_model
 from app.simulate.checks import air_faults, schedules_faults, size_faults
 from app.simulate.cost import estimate
 from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest
-from morphdata.vehicle import flexible_wing_faults, vehicle_document, vehicle_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    vehicle_document,
+    vehicle_faults,
+)
 
 
 def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[FlightCost]:
@@ -31,6 +36,8 @@ def prepare(session: Session, owner: str, request: SimulateRequest) -> Order[Fli
     ]
     if request.model.kind != "rigid":
         faults += flexible_wing_faults(request.aircraft, "nothing_to_bend")
+    if "parameters" in model:
+        faults += model_surfaces_faults(request.aircraft, model["parameters"], "/model/parameters")
     if faults:
         raise InvalidRequest.of(faults)
     return Order(

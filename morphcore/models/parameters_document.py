@@ -57,6 +57,8 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     if not fields.has("surfaces"):
         return _batch(values)
     surfaces = fields.child("surfaces")
+    if not fields.raw("surfaces"):
+        raise _error(fields, "surfaces", "surfaces is empty")
     owners: dict[str, list[str]] = {}
     own: dict[str, list[Array]] = {}
     for name in fields.raw("surfaces"):
