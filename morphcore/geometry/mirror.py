@@ -37,11 +37,13 @@ def mirror_groups(surfaces: Sequence[Surface]) -> tuple[tuple[int, ...], ...]:
 
     Parameters
     ----------
-    surfaces : surfaces of an aircraft; two are a pair if all values of one are those of the other, mirrored.
+    surfaces : sequence of Surface
+        Two are a pair if all values of one are those of the other, mirrored.
 
     Returns
     -------
-    A pair (first, image) or a single (first,) for each group: every surface is in one of them.
+    tuple of tuples of int
+        Groups (first, image) and (first,): every surface is in one of them.
     """
     groups = []
     waiting = list(range(len(surfaces)))

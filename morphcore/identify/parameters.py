@@ -26,9 +26,22 @@ WARM_START = "/search/warm_start"  # where a request says what to begin from
 class Unknown:
     """One parameter of one surface, of a mirror pair or of the aircraft.
 
-    prefix : of its names, "" where there is no other of its kind. sets : sets of a batch that have it; none
-    of the aircraft's. surfaces : indices of the surfaces that have it. lower, upper, guess : (d,) its search
-    coordinates, of size 0 where it is fixed.
+    Attributes
+    ----------
+    parameter : Parameter
+        Its kind.
+    links : int
+        Links per wing.
+    prefix : str
+        Of its names; "" where there is no other of its kind.
+    sets : tuple of int
+        Sets of a batch that have it; none of the aircraft's.
+    surfaces : tuple of int
+        Indices of the surfaces that have it; none of the aircraft's.
+    transform : Transform
+        How it is searched.
+    lower, upper, guess : ndarray, shape (d,)
+        Box and physical guess in search coordinates; d = 0 where it is fixed.
     """
 
     parameter: Parameter
@@ -67,7 +80,15 @@ class Unknown:
 class SearchSpace:
     """Box of search coordinates and the way from them to parameters.
 
-    fixed : the values (one particle) of all that is not searched. free_aero : the corrections that are.
+    Attributes
+    ----------
+    model : ChainModel
+    unknowns : tuple of Unknown
+        In the order of coordinates and reports, fixed ones included.
+    free_aero : tuple of str
+        Names of the corrections that are searched.
+    fixed : ParameterBatch
+        The values (one particle) of all that is not.
     """
 
     model: ChainModel
@@ -134,12 +155,13 @@ class SearchSpace:
 
         Raises
         ------
-        InvalidInput : it has other links than are sought, wings of its own where all are sought alike, or
-            other surfaces.
+        InvalidInput
+            It has other links than are searched, wings of their own where mirror images are searched alike,
+            or other surfaces.
         """
         if batch.links != self.links:
             raise InvalidInput(
-                f"the search seeks {self.links} links per wing, the model to begin from has {batch.links}",
+                f"the search is for {self.links} links per wing, the model to begin from has {batch.links}",
                 pointer=WARM_START,
                 hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
             )
@@ -246,13 +268,18 @@ def search_space(
 
     Parameters
     ----------
-    separate_wings : whether both surfaces of a mirror pair have parameters of their own.
-    aero_coefficients : the corrections to search; None: all.
-    bounds : low and high in SI units, by the name of a parameter, in the place of its own.
+    model : ChainModel
+    separate_wings : bool
+        Whether both surfaces of a mirror pair have parameters of their own.
+    aero_coefficients : sequence of str, optional
+        The corrections to search; None: all.
+    bounds : mapping of str to (float, float), optional
+        Low and high in SI units, by the name of a parameter, in the place of its own.
 
     Raises
     ------
-    InvalidInput : a bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
+    InvalidInput
+        A bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
     """
     known = {parameter.name: parameter for parameter in model.parameters}
     for name, pair in (bounds or {}).items():

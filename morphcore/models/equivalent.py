@@ -38,12 +38,16 @@ MOST_LINKS = 8
 class ParameterBatch(Shown):
     """Parameters of many equivalent models of one aircraft (p particles, w sets, n links).
 
-    values : by the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), fractions of the span
-    that sum to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and lag;
-    ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``centre_shift_m`` (forward positive) and
-    ``lag_s`` (p,): those of its reference surface, others have them in proportion to their chords.
-    surfaces : names of the surfaces of each set. None: one set is that of all flexible surfaces, which are
-    mirror images; several are those of the flexible surfaces in the aircraft's order.
+    Attributes
+    ----------
+    values : mapping of str to ndarray
+        By the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span that sum
+        to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and lag;
+        ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``centre_shift_m`` (forward positive) and
+        ``lag_s`` (p,): those of its largest surface, others have them in proportion to their chords.
+    surfaces : tuple of tuples of str, optional
+        Names of the surfaces of each set. None: one set is that of all flexible surfaces, which are one
+        mirror pair; several are those of the flexible surfaces in the aircraft's order.
     """
 
     values: Mapping[str, Array]
@@ -77,7 +81,8 @@ class ParameterBatch(Shown):
 
         Raises
         ------
-        KeyError : it has no such parameter.
+        KeyError
+            It has no such parameter.
         """
         if not values.keys() <= self.values.keys():
             raise KeyError(f"of {', '.join(values)} only {', '.join(self.values)} are parameters")
@@ -199,7 +204,8 @@ class ChainModel(Shown):
 
         Raises
         ------
-        InvalidInput : the batch has no set for a surface, or none of its own.
+        InvalidInput
+            The batch has no set for a surface, or half an aircraft would have wings that differ.
         """
         surfaces = self.aircraft.surfaces
         chosen = [-1] * len(surfaces)
@@ -290,8 +296,12 @@ def physical_guess(
 
     Parameters
     ----------
-    division : (p, w, n) shares of the span of each set of `ChainModel.sets`, or (p, 1, n) of all alike; None:
-        one particle of equal links.
+    model : ChainModel
+    division : ndarray, shape (p, w, n) or (p, 1, n), optional
+        Shares of the span of each set of `ChainModel.sets`, or of all alike; None: one particle of equal
+        links.
+    separate_wings : bool
+        Whether both surfaces of a mirror pair have a set of their own.
     """
     sets = model.sets(separate_wings=separate_wings)
     n = model.links_per_wing
@@ -314,14 +324,15 @@ def physical_guess(
 
 
 def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
-    """The parameters as the surfaces of a model have them.
+    """Return parameters as the surfaces of a model have them.
 
     A single set for an aircraft of several unlike flexible surfaces is that of its largest one. The others
     are off their own beam theory by the same factors, and keep their own profile drag.
 
     Raises
     ------
-    InvalidInput : the batch is of another aircraft.
+    InvalidInput
+        The batch is of another aircraft.
     """
     if batch.surfaces is None and batch.sets == 1 < len(model.pairs):
         guess = physical_guess(model, batch["division"])
@@ -374,11 +385,21 @@ def from_lanes(blocks: Array, particles: int) -> Array:
 
 
 def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> LaneConstants:
-    """Lay a batch of parameters out for the kernels and for steps of ``step_s``.
+    """Lay a batch of parameters out for the kernels.
+
+    Parameters
+    ----------
+    model : ChainModel
+        What flies: the aircraft, or half of it.
+    batch : ParameterBatch
+        As the model's surfaces have them (see `fitted`).
+    step_s : float
+        Time step, s.
 
     Raises
     ------
-    InvalidInput : the batch is of another aircraft, or half an aircraft would have wings that differ.
+    InvalidInput
+        The batch is of another aircraft, or half an aircraft would have wings that differ.
     """
     particles = batch.particles
     links = np.zeros((particles, model.links, LINK_ROWS))

@@ -60,7 +60,15 @@ LARGEST_STIFFNESS = 1e15  # N m/rad, and N m s/rad of a damping, that a document
 
 @dataclass(frozen=True)
 class CutSurface:
-    """A surface in its flight condition, cut into links by ``division`` (p, n), which sums to one."""
+    """A surface in its flight condition, cut into links.
+
+    Attributes
+    ----------
+    surface : Surface
+    flight : Flight
+    division : ndarray, shape (p, n)
+        Shares of the span of the links of p models, which sum to one.
+    """
 
     surface: Surface
     flight: Flight
@@ -74,11 +82,22 @@ class CutSurface:
 
 @dataclass
 class SurfaceRows:
-    """The constants of one surface's links for the kernels, while they are filled in.
+    """The constants of one surface's links for the kernels, while parameters are written into them.
 
-    links : (p, n, LINK_ROWS). stiffness, damping : (p, 3 (n - 1)). overlap : (p, 2 strips n) share of each
-    strip and middle of that share for each link. touched : (p, n, 2) first strip of each link, and the one
-    after its last.
+    Attributes
+    ----------
+    surface : Surface
+    part : SurfaceLattice
+    step_s : float
+        Time step, s.
+    links : ndarray, shape (p, n, LINK_ROWS)
+        The rows that articulated.py and loads.py name (``L_...``).
+    stiffness, damping : ndarray, shape (p, 3 (n - 1))
+        Of flap, torsion and lag of each gimbal, N m/rad and N m s/rad.
+    overlap : ndarray, shape (p, 2 strips n)
+        For each strip and link the share of the strip, and the middle of that share in link axes, m.
+    touched : ndarray of int, shape (p, n, 2)
+        First strip of each link, and the one after its last.
     """
 
     surface: Surface
@@ -95,21 +114,41 @@ class SurfaceRows:
 class Parameter:
     """One kind of identifiable parameter.
 
-    name : in bounds, documents and reports. unit : of its values.
-    transform : how it is searched, on a surface. bounds : (lower, upper) (d,) of its search coordinates on a
-    surface, where no others are asked for.
-    guess : its physical values (p, ...) on a surface. apply : writes values (p, ...) into the constants of a
-    surface's links.
-    scope : who has values of its own: each surface (mirror images share them unless wings are separate), each
-    mirror pair, or the aircraft. size : of an aircraft's parameter, what measures it on a surface (a chord):
-    surfaces have it in proportion.
-    labels : of its values, by number of links; None: there is one. coordinates : names of its search
-    coordinates, where they are not those of the values.
-    correction : whether a request may leave it out of the search; documents have it in ``aero``.
-    asymmetric : flights tell it only where both sides differ.
-    minimum, maximum, above : limits of a value in a document. positive : bounds must be greater than zero.
-    default : of a value that a document leaves out; None if it must not. at_bound : hints for who ends at
-    the "lower" or the "upper" bound, where widening it is none.
+    Attributes
+    ----------
+    name : str
+        In bounds, documents and reports.
+    unit : str
+        Of its values, "1" if they have none.
+    transform : callable, Surface -> Transform
+        How it is searched on a surface.
+    bounds : callable, CutSurface -> (lower, upper)
+        Bounds (d,) of its search coordinates on a surface, where no others are asked for.
+    guess : callable, CutSurface -> ndarray, shape (p, ...)
+        Its physical values on a surface.
+    apply : callable, (SurfaceRows, ndarray) -> None
+        Writes values (p, ...) into the constants of a surface's links.
+    scope : {"surface", "pair", "aircraft"}
+        Who has values of its own: each surface (mirror images share them unless wings are separate), each
+        mirror pair, or the aircraft.
+    size : callable, Surface -> float
+        What measures an aircraft's parameter on a surface, such as a chord: surfaces have it in proportion.
+    labels : callable, int -> tuple of str, optional
+        Names of its values by number of links; None: there is one value.
+    coordinates : callable, int -> tuple of str, optional
+        Names of its search coordinates by number of links, where they are not those of the values.
+    correction : bool
+        Whether a request may leave it out of the search. Documents have it in ``aero``.
+    asymmetric : bool
+        Flights tell it only where both sides differ.
+    minimum, maximum, above : float
+        Limits of a value in a document, the last one excluded.
+    positive : bool
+        Bounds must be greater than zero.
+    default : float, optional
+        Of a value that a document leaves out; None: it must not.
+    at_bound : mapping of str to str
+        Hints for who ends at the "lower" or the "upper" bound, where widening it is none.
     """
 
     name: str
@@ -147,9 +186,19 @@ class Parameter:
 
 
 def lag_weights(lag_s: Array, step_s: float) -> Array:
-    """Weights (..., 4) of one step of both of Jones' exponentials for mean lag times (...), s.
+    """Weights of one step of both of Jones' exponentials.
 
-    For each of slow and fast: the decay e = exp(-h / T), and 1 - (1 - e) T / h.
+    Parameters
+    ----------
+    lag_s : ndarray, shape (...)
+        Mean lag times, s.
+    step_s : float
+        Length h of the step, s.
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        For each of slow and fast: the decay e = exp(-h / T), and 1 - (1 - e) T / h.
     """
     weights = []
     for semichords in (1.0 / JONES_B1, 1.0 / JONES_B2):

@@ -35,7 +35,8 @@ class Transform(Protocol):
 
         Raises
         ------
-        InvalidInput : there is no room for them.
+        InvalidInput
+            There is no room for them.
         """
         ...
 
