@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from morphcore.aero.kernels.loads import L_DRAG
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document
 from morphcore.geometry.lattice import LatticeSettings
@@ -24,8 +25,10 @@ from morphcore.models.equivalent import (
     lane_constants,
     physical_guess,
 )
+from morphcore.models.kernels.layout import LINKS_C
 from morphcore.models.links import joint_stiffness, link_edges
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
+from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
@@ -145,7 +148,7 @@ def test_drag_of_a_rigid_model_is_each_surface_s_own() -> None:
         rows = lane_constants(
             chain_model(aircraft(names), still, 1, LATTICE), physical_guess(chain(names, links=1)), 0.01
         ).rows
-        areas = rows[0, 6:, 0][: 4 * 16].reshape(4, 16)[:, 8]
+        areas = rows[0, LINKS_C : LINKS_C + 4 * LINK_ROWS, 0].reshape(4, LINK_ROWS)[:, L_DRAG]
         expected = [s.profile_drag * s.area_m2 for s in aircraft(names).surfaces]
         np.testing.assert_allclose(areas, expected, rtol=1e-12)
 
