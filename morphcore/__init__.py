@@ -7,7 +7,7 @@ what lies inside a room by ``from morphcore.identify.settings import ...``.
 from __future__ import annotations
 
 from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
-from morphcore.identify import Identification, IdentifyResult, identification_from_document, identify
+from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
 from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
@@ -25,7 +25,7 @@ __all__ = [
     "Simulation",
     "Trajectory",
     "__version__",
-    "identification_from_document",
+    "identification_from_request",
     "identify",
     "load_aircraft",
     "load_flight",

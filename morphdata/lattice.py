@@ -6,13 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from morphdata.fields import Strict
+from morphdata.base import Document
+from morphdata.options import MODEL, Option
 
 
-class VortexCore(Strict):
+class VortexCore(Document):
     """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
 
-    law: Literal["line", "smoothed"] = "line"
+    law: Annotated[Literal["line", "smoothed"], Option("--core", MODEL)] = Field(
+        default="line", description="Core of the lattice's vortices."
+    )
     fraction: Annotated[float, Field(gt=0.0, le=0.5)] | None = Field(
         default=None,
         description="Core radius over the smaller side of a panel (line, 0.1 when left out) or over the mean "
@@ -20,11 +23,15 @@ class VortexCore(Strict):
     )
 
 
-class Lattice(Strict):
+class Lattice(Document):
     """Panels of each wing's vortex lattice, and the core of its vortices."""
 
-    chordwise: int = Field(default=4, ge=1, le=8)
-    spanwise: int = Field(default=10, ge=4, le=20)
+    chordwise: Annotated[int, Option("--chordwise", MODEL)] = Field(
+        default=4, ge=1, le=8, description="Lattice panels along the chord."
+    )
+    spanwise: Annotated[int, Option("--spanwise", MODEL)] = Field(
+        default=10, ge=4, le=20, description="Lattice panels along the span."
+    )
     core: VortexCore = VortexCore()
 
 

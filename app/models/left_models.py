@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from app.documents import Document
+from morphdata.parameters import has_flown
 
 
 def left_model(operation: str, result: Document) -> Document | None:
@@ -17,15 +18,9 @@ def left_model(operation: str, result: Document) -> Document | None:
     """
     find = LEFT_MODELS.get(operation)
     found = None if find is None else find(result)
-    return found if found is not None and has_flown(found) else None
-
-
-def has_flown(identified: Document) -> bool:
-    """Whether there is a model, and it flies all samples to fit: where it does not, J is null."""
-    fits = identified.get("fit")
-    rows = [row for row in fits if isinstance(row, dict)] if isinstance(fits, list) else []
-    lost = any(row.get("role") == "train" and row.get("J_identified", 0.0) is None for row in rows)
-    return identified.get("model") is not None and not lost
+    if found is None or found.get("model") is None or not has_flown(found.get("fit")):
+        return None
+    return found
 
 
 def _identified(result: Document) -> Document | None:

@@ -21,8 +21,8 @@ from app.owner_turns import OwnerTurns
 from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
+from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
-from morphdata.fields import MAX_ROWS
 from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 
 ROOT = Path(__file__).resolve().parent.parent.parent

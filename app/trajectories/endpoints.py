@@ -6,8 +6,6 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.exceptions import RequestValidationError
-from pydantic import ValidationError
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
@@ -24,7 +22,7 @@ from app.errors import (
 from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
-from app.http.problems import documented, escaped
+from app.http.problems import documented
 from app.keys.records import Scope
 from app.trajectories import repository, service
 from app.trajectories.schemas import (
@@ -33,6 +31,7 @@ from app.trajectories.schemas import (
     TrajectorySummary,
     TrajectoryUpload,
 )
+from morphdata.refusals import escaped
 
 router = APIRouter(tags=["trajectories"])
 
@@ -81,9 +80,9 @@ async def upload_trajectory(
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
     kind = media_type(request)
     if kind == "multipart/form-data":
-        upload, pointer = await _from_form(request, app, caller.owner), "/file"
+        upload = await _from_form(request, app, caller.owner)
     elif is_json(kind):
-        upload, pointer = _checked(await json_document(request)), ""
+        upload = TrajectoryUpload.parse(await json_document(request))
     else:
         raise UnsupportedMediaType(
             f"The body is announced as {kind[:60] or 'nothing'!r}.",
@@ -95,7 +94,7 @@ async def upload_trajectory(
 
     def store() -> repository.StoredTrajectory:
         with app.database.write() as session:
-            return service.store_trajectory(session, caller, upload, pointer)
+            return service.store_trajectory(session, caller, upload)
 
     stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"
@@ -126,14 +125,6 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
         return service.upload_of(columns, filename, name if isinstance(name, str) else None)
     finally:
         await form.close()
-
-
-def _checked(document: Any) -> TrajectoryUpload:
-    try:
-        return TrajectoryUpload.model_validate(document)
-    except ValidationError as error:
-        items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors(include_url=False)]
-        raise RequestValidationError(items, body=document) from None
 
 
 def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.atmosphere import standard_atmosphere
 from morphcore.errors import InvalidInput, UnsupportedRegime
 from morphcore.geometry.fields import Fields
 from morphcore.geometry.section import GivenSection, Material
 from morphcore.geometry.surface import DEFAULT_HINGE_RANGE_RAD, Hinge, Surface
 from morphcore.shown import Shown
+from morphdata.atmosphere import standard_atmosphere
 
 Array = NDArray[np.float64]
 

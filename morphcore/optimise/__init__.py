@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.fields import Fields
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
+from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import (
-    VERIFICATIONS,
     FlexibleSettings,
-    Limits,
-    Morph,
     ScheduleSearch,
-    Verify,
-    Weights,
     flexible_settings,
-    limits_settings,
-    morph_settings,
     schedule_search,
-    weights_settings,
 )
-from morphcore.simulate.request import flown_model
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.optimize import Limits, Morph, OptimizeRequest, Verify, Weights
+from morphdata.parameters import flown_with
 
 __all__ = [
     "FlexibleSettings",
@@ -40,7 +30,7 @@ __all__ = [
     "ScheduleSearch",
     "Step",
     "Weights",
-    "optimisation_from_document",
+    "optimisation_from_request",
     "optimise_schedule",
 ]
 
@@ -89,8 +79,8 @@ def optimise_schedule(
     return run.result(checkpoint)
 
 
-def optimisation_from_document(document: dict[str, Any], threads: int | None = None) -> ScheduleOptimisation:
-    """The optimisation that a request document (the body of ``POST /optimize``) asks for.
+def optimisation_from_request(request: OptimizeRequest, threads: int | None = None) -> ScheduleOptimisation:
+    """The optimisation that a request (the body of ``POST /optimize``) asks for.
 
     Identified parameters bring their own lattice, step and start, unless others are given beside them.
 
@@ -100,25 +90,19 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
     """
     if threads is not None:
         use_threads(threads)
-    fields = Fields(document, "")
-    aircraft = aircraft_from_document(fields.raw("aircraft"))
-    flight = flight_from_document(fields.raw("flight"))
-    parameters = parameters_from_document(fields.child("model").raw("parameters"), "/model/parameters")
-    model = flown_model({"kind": "equivalent", **fields.raw("model")})
-    run = ScheduleOptimisation(
-        aircraft,
-        flight,
-        parameters,
-        morph=morph_settings(fields.raw("morph")),
-        limits=limits_settings(fields.raw("limits", {})),
-        weights=weights_settings(fields.raw("weights", {})),
-        search=schedule_search(fields.raw("search", {})),
-        verify=fields.choice("verify", VERIFICATIONS, default="flexible"),  # type: ignore[arg-type]
-        flexible=flexible_settings(fields.raw("flexible", {})),
-        lattice=model.lattice,
-        start=model.start,
-        step_s=model.step_s,
+    given, model = request.document(), request.model
+    flown = flown_with(model)
+    return ScheduleOptimisation(
+        aircraft_from_document(given["aircraft"]),
+        flight_from_document(given["flight"]),
+        parameters_from_document(given["model"]["parameters"], "/model/parameters"),
+        morph=request.morph,
+        limits=request.limits,
+        weights=request.weights,
+        search=schedule_search(request.search),
+        verify=request.verify,
+        flexible=flexible_settings(request.flexible),
+        lattice=lattice_settings(flown.lattice.model_dump(exclude_none=True)),
+        start=flown.start,
+        step_s=flown.step_s,
     )
-    fields.raw("execution", None)  # how a service runs it: no number depends on that
-    fields.done()
-    return run

@@ -16,7 +16,7 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.trajectory import trajectory_from_document
-from morphdata.fields import Strict
+from morphdata.base import Document
 from morphdata.samplefiles.fault import as_sentence
 from tests.app.calls import changed, fault, post
 from tests.app.request_documents import identify_document, sample_document, simulate_document
@@ -113,14 +113,14 @@ def test_a_flight_beyond_its_bounds_is_refused_in_the_same_words(
     assert found["pointer"] == caught.value.pointer
 
 
-def strict_models(kind: type[Strict] = Strict) -> Iterator[type[Strict]]:
+def strict_models(kind: type[Document] = Document) -> Iterator[type[Document]]:
     """Every model of a document that clients send."""
     for model in kind.__subclasses__():
         yield model
         yield from strict_models(model)
 
 
-def whole_fields() -> list[tuple[type[Strict], str, bool]]:
+def whole_fields() -> list[tuple[type[Document], str, bool]]:
     """Every field that the JSON schema calls an integer, or a list of such."""
     from app.main import create_app  # noqa: F401 - loads every model
 
@@ -135,7 +135,7 @@ def whole_fields() -> list[tuple[type[Strict], str, bool]]:
     return sorted(found, key=lambda item: (item[0].__name__, item[1]))
 
 
-def faults_at(model: type[Strict], name: str, value: Any) -> set[str]:
+def faults_at(model: type[Document], name: str, value: Any) -> set[str]:
     """Kinds of faults that a model finds in one field; the others are left out."""
     try:
         model.model_validate({name: value})
@@ -145,7 +145,7 @@ def faults_at(model: type[Strict], name: str, value: Any) -> set[str]:
 
 
 @pytest.mark.parametrize(("model", "name", "listed"), whole_fields(), ids=str)
-def test_a_whole_number_may_have_a_point(model: type[Strict], name: str, listed: bool) -> None:  # noqa: FBT001
+def test_a_whole_number_may_have_a_point(model: type[Document], name: str, listed: bool) -> None:  # noqa: FBT001
     """3.0 is an integer of JSON Schema; 3.5, true and a text are none. So it is in the library."""
     for value, whole in ((5, True), (5.0, True), (3.5, False), (True, False), ("3", False)):
         found = faults_at(model, name, [value] if listed else value)

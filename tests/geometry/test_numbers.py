@@ -19,9 +19,10 @@ from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import flexible_model
-from morphcore.optimise import FlexibleSettings, Morph, ScheduleSearch, optimisation_from_document
+from morphcore.optimise import FlexibleSettings, ScheduleSearch
 from morphcore.simulate.request import FlownModel, simulation_from_document
 from morphcore.swarm import SwarmSettings
+from morphdata.optimize import OptimizeRequest
 from tests.app.request_documents import optimize_document, simulate_document
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
@@ -53,7 +54,6 @@ SETTINGS: list[tuple[type, dict[str, Any]]] = [
     (ScheduleSearch, {}),
     (FlexibleSettings, {}),
     (FlownModel, {"kind": "rigid"}),
-    (Morph, {"final_rad": 1.0, "duration_s": 2.0}),
 ]
 
 
@@ -151,7 +151,7 @@ def with_value(document: Any, pointer: str, value: Any) -> Any:
 
 READERS = [
     (simulate_document(), simulation_from_document),
-    (optimize_document(), optimisation_from_document),
+    (optimize_document(), OptimizeRequest.parse),
 ]
 
 

@@ -12,6 +12,7 @@ from morphcore.identify.parameters import AERO_COEFFICIENTS
 from morphcore.identify.settings import model_settings
 from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
+from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag")
@@ -78,7 +79,7 @@ def test_the_result_names_what_was_sought() -> None:
 
 def test_the_document_may_leave_them_out() -> None:
     """Left out or null: the library's choice. A list, even an empty one, is the caller's."""
-    assert model_settings({}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": None}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": []}).aero_coefficients == ()
-    assert model_settings({"aero_coefficients": list(LISTED)}).aero_coefficients == LISTED
+    assert model_settings(EquivalentModel()).aero_coefficients is None
+    assert model_settings(EquivalentModel(aero_coefficients=None)).aero_coefficients is None
+    assert model_settings(EquivalentModel(aero_coefficients=[])).aero_coefficients == ()
+    assert model_settings(EquivalentModel(aero_coefficients=list(LISTED))).aero_coefficients == LISTED

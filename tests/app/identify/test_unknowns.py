@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from morphcore.identify import identification_from_document
+from morphcore.identify import identification_from_request
+from morphdata.identify import IdentifyRequest
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
 
@@ -28,4 +29,4 @@ def test_the_unknowns_are_those_of_the_search(
     if listed is not None:
         document["model"]["aero_coefficients"] = listed
     told = service.client.post("/validate/identify", json=document).json()["cost"]
-    assert told["parameters"] == identification_from_document(document).space.dimension
+    assert told["parameters"] == identification_from_request(IdentifyRequest.parse(document)).space.dimension

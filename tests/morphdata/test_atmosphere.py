@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from morphcore.atmosphere import GRAVITY_M_S2, standard_atmosphere
 from morphcore.errors import InvalidInput
+from morphdata.atmosphere import GRAVITY_M_S2, standard_atmosphere
 
 
 @pytest.mark.parametrize(

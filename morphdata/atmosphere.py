@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from morphcore.errors import InvalidInput
+from morphdata.faults import InvalidInput
 
 SEA_LEVEL_TEMPERATURE_K = 288.15
 SEA_LEVEL_PRESSURE_PA = 101_325.0
@@ -46,10 +45,10 @@ def standard_atmosphere(altitude_m: float) -> AirState:
     exponent = -GRAVITY_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_RATE_K_M)
     pressure = SEA_LEVEL_PRESSURE_PA * (temperature / SEA_LEVEL_TEMPERATURE_K) ** exponent
     above = altitude_m - below
-    pressure *= np.exp(-GRAVITY_M_S2 * above / (GAS_CONSTANT_J_KG_K * temperature))
+    pressure *= math.exp(-GRAVITY_M_S2 * above / (GAS_CONSTANT_J_KG_K * temperature))
     return AirState(
         temperature_k=temperature,
-        pressure_pa=float(pressure),
-        density_kg_m3=float(pressure / (GAS_CONSTANT_J_KG_K * temperature)),
-        speed_of_sound_m_s=float(np.sqrt(HEAT_RATIO * GAS_CONSTANT_J_KG_K * temperature)),
+        pressure_pa=pressure,
+        density_kg_m3=pressure / (GAS_CONSTANT_J_KG_K * temperature),
+        speed_of_sound_m_s=math.sqrt(HEAT_RATIO * GAS_CONSTANT_J_KG_K * temperature),
     )
