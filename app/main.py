@@ -12,7 +12,8 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app.afterwards import Afterwards
+from app import on_end  # noqa: F401 - the API ends jobs: it cancels them, and its reaper ends some
+from app.background_writer import BackgroundWriter
 from app.database import Database, upgrade
 from app.errors import TooManyStreams
 from app.health.endpoints import router as health
@@ -121,8 +122,8 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
         database = Database(settings.database_url)
         publisher = Publisher(settings.broker_url)
         watcher = JobWatcher(database, settings.event_poll_s)
-        afterwards = Afterwards(database)
-        keys = KeyRing(database, afterwards)
+        background = BackgroundWriter(database)
+        keys = KeyRing(database, background)
         key_watch = KeyWatch(database)
         app.state.service = Service(
             settings=settings,
@@ -132,7 +133,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             queue=QueueView(),
             keys=keys,
             key_watch=key_watch,
-            afterwards=afterwards,
+            background=background,
             parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
             reads=_turns(settings, READS_AT_ONCE),
             streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
@@ -140,7 +141,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             webhook_policy=sending.policy,
         )
         app.state.health = Health(database, settings)
-        afterwards.start()
+        background.start()
         publisher.start()
         watcher.start()
         key_watch.start()
@@ -157,7 +158,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             await asyncio.to_thread(upkeep.stop)
             await asyncio.to_thread(sender.stop)
             await asyncio.to_thread(publisher.stop)
-            await asyncio.to_thread(afterwards.stop)
+            await asyncio.to_thread(background.stop)
             database.dispose()
             await asyncio.to_thread(stop_tracing)
 

@@ -120,7 +120,7 @@ class Gate:
 
 def _note_refused(service: Service, address: str, prefix: str, refused: Refusal) -> None:
     logger.warning("an API key was refused: %s, prefix %r, from %s", refused.value, prefix, address)
-    service.afterwards.put(
+    service.background.put(
         partial(
             audit.insert_entry,
             action=Action.AUTH_REFUSED,

@@ -1,20 +1,17 @@
-"""Job rows as values, and the one way to change them."""
+"""Job rows as values, and as leased work."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Text, cast, delete, func, insert, select, update
+from sqlalchemy import Row, Text, cast, delete, func, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import finite
 from app.errors import JobNotFound
-from app.jobs.records import FINISHED, Job, JobStatus, moment, optional_moment
-from app.keys import quota
-from app.observability.job_counts import note_transition
+from app.jobs.records import FINISHED, HELD, Job, JobStatus, moment, optional_moment
+from app.leases import LeasedRow, LeasedTable, Note
 from app.tables import job_checkpoints, job_chunks, job_events, jobs
-from app.webhooks.outbox import note_end
 
 JOB_COLUMNS = (
     jobs.c.id,
@@ -42,6 +39,35 @@ QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
 
 FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second
 SPARSE_STEP = 120  # of what is older, one event a minute stays
+
+
+def write_event(session: Session, row: LeasedRow, note: Note) -> None:
+    """Write the event of a change; its number is the one that the change has given out.
+
+    The job's new ``status`` and ``attempt`` are added to its payload.
+    """
+    content = {**(note.payload or {}), "status": row.status, "attempt": row.attempt}
+    session.execute(
+        insert(job_events).values(
+            job_id=row.id, seq=row.event_seq, type=note.event, payload=finite(content), at=database_time()
+        )
+    )
+
+
+JOBS = LeasedTable(
+    jobs,
+    key=(jobs.c.id,),
+    lease=jobs.c.lease_until,
+    waiting=JobStatus.QUEUED.value,
+    held=HELD,
+    ends=FINISHED,
+    returning=(*JOB_COLUMNS, *CLAIM_COLUMNS, *QUOTA_COLUMNS),
+    unheld={"worker": None, "lease_until": None},
+    dated={"updated_at": database_time()},
+    noted={"event_seq": jobs.c.event_seq + 1},
+    on_change=[write_event],
+    on_end=None,  # `app.on_end` says it
+)
 
 
 def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
@@ -86,87 +112,19 @@ def get_job(session: Session, owner: str, job_id: str) -> Job:
     return job_from_row(row)
 
 
-def transition(
-    session: Session,
-    *conditions: ColumnElement[bool],
-    event: str | None,
-    payload: Mapping[str, Any] | None = None,
-    **values: Any,
-) -> Row[*tuple[Any, ...]] | None:
-    """Compare-and-set on one job row, with its event.
-
-    An end, of whatever kind, also settles the job's share of the key's quota and drops the state of its work.
-
-    Parameters
-    ----------
-    *conditions
-        What must hold of the row (its id, and its state or fence).
-    event, payload
-        Type and content of the event; the job's new ``status`` and ``attempt`` are added.
-        None writes no event.
-    **values
-        Columns to set.
-
-    Returns
-    -------
-    Row or None
-        The row as it is now (`JOB_COLUMNS` and `CLAIM_COLUMNS`), or None when the conditions did not hold.
-    """
-    if event is not None:
-        values["event_seq"] = jobs.c.event_seq + 1
-    row = session.execute(
-        update(jobs)
-        .where(*conditions)
-        .values(**values, updated_at=database_time())
-        .returning(*JOB_COLUMNS, *CLAIM_COLUMNS, *QUOTA_COLUMNS)
-    ).one_or_none()
-    if row is not None and event is not None:
-        insert_event(session, row.id, row.event_seq, event, row.status, row.attempt, payload)
-        note_transition(session, row, event, payload)
-    if row is not None and row.status in FINISHED:
-        quota.settle(
-            session,
-            row.key_id,
-            estimated=row.flights_estimated,
-            flown=row.flights,
-            day=quota.usage_day(row.created_at),
-        )
-        note_end(session, row)
-        _drop_state(session, row.id)
-    return row
-
-
-def _drop_state(session: Session, job_id: str) -> None:
+def drop_state(session: Session, row: LeasedRow, _note: Note) -> None:
     """Delete what only somebody who goes on with a job needs, and count what stays: nothing grows any more.
 
     What an end leaves of its best so far is in its result by then, or lost with its worker.
     """
-    session.execute(delete(job_chunks).where(job_chunks.c.job_id == job_id))
-    session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == job_id))
+    session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
+    session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == row.id))
     history = (
         select(func.coalesce(func.sum(func.length(cast(job_events.c.payload, Text))), 0))
-        .where(job_events.c.job_id == job_id)
+        .where(job_events.c.job_id == row.id)
         .scalar_subquery()
     )
-    session.execute(update(jobs).where(jobs.c.id == job_id).values(size_bytes=jobs.c.size_bytes + history))
-
-
-def insert_event(
-    session: Session,
-    job_id: str,
-    seq: int,
-    event: str,
-    status: str,
-    attempt: int,
-    payload: Mapping[str, Any] | None,
-) -> None:
-    """Write one event; only for a number that the job's row has given out."""
-    content = {**(payload or {}), "status": status, "attempt": attempt}
-    session.execute(
-        insert(job_events).values(
-            job_id=job_id, seq=seq, type=event, payload=finite(content), at=database_time()
-        )
-    )
+    session.execute(update(jobs).where(jobs.c.id == row.id).values(size_bytes=jobs.c.size_bytes + history))
 
 
 def thin_events(session: Session, job_id: str, newest: int) -> None:

@@ -14,6 +14,7 @@ from app.database import Session, database_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
 from app.keys.records import Quota, Usage
+from app.leases import LeasedRow, Note
 from app.tables import (
     STATUSES,
     api_keys,
@@ -75,25 +76,15 @@ def charge_bytes(session: Session, key_id: str | None, size_bytes: int) -> None:
     _charge(session, key_id, _Asked(jobs=0, flights=0, size_bytes=size_bytes))
 
 
-def settle(session: Session, key_id: str | None, *, estimated: int, flown: int, day: int) -> None:
-    """Replace the estimate of a job by what it flew; call it once, when the job ends.
-
-    Parameters
-    ----------
-    estimated : int
-        What `charge` was told, ``jobs.flights_estimated``.
-    flown : int
-        ``jobs.flights``.
-    day : int
-        The day it was charged to: ``usage_day(jobs.created_at)``.
-    """
-    if key_id is None or estimated == flown:
+def settle(session: Session, job: LeasedRow, _note: Note) -> None:
+    """Replace the estimate of a job that has ended by what it flew, on the day that it was charged to."""
+    if job.key_id is None or job.flights_estimated == job.flights:
         return
-    corrected = key_usage.c.flights + (flown - estimated)
+    corrected = key_usage.c.flights + (job.flights - job.flights_estimated)
     session.execute(
         update(key_usage)
-        .where(key_usage.c.key_id == key_id, key_usage.c.day == day)
-        # never below nothing: a job posted in the millisecond of midnight was charged to the day before
+        .where(key_usage.c.key_id == job.key_id, key_usage.c.day == usage_day(job.created_at))
+        # never below zero: a job posted in the millisecond of midnight was charged to the day before
         .values(flights=case((corrected > 0, corrected), else_=0))
     )
 

@@ -49,7 +49,7 @@ def insert_model(
     request
         Of the job that identified it; its aircraft, flight and options are kept.
     identified
-        The ``model`` and its ``fit``, see `app.models.left_models`.
+        The ``model`` and its ``fit``, see `app.models.extraction`.
     """
     model = identified.get("model") or {}
     aircraft = request.get("aircraft") or {}

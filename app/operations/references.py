@@ -17,7 +17,7 @@ from app.errors import JobNotFound, ModelNotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
-from app.models.left_models import left_model
+from app.models.extraction import extracted_model
 from app.trajectories import repository as trajectories
 from morphdata.execution import Request
 from morphdata.faults import Fault, InvalidInput
@@ -144,7 +144,7 @@ def _model_of_job(session: Session, owner: str, reference: Reference) -> Documen
     except JobNotFound as error:
         raise InvalidInput.of([Fault("job_not_found", error.detail, reference.pointer, error.hint)]) from None
     text = jobs.result_json(session, owner, job.id)
-    left = None if text is None else left_model(job.operation, json.loads(text))
+    left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:
         state = "has ended" if job.finished else f"is {job.status.value}"
         hint = "Wait for its end, or cancel it: what it has found by then is its result."

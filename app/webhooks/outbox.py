@@ -1,20 +1,20 @@
 """The outbox: a job's end and its deliveries are written in one transaction.
 
-Imported by the job store, and so by workers: nothing here speaks HTTP.
+Workers import it: nothing here speaks HTTP.
 """
 
 from __future__ import annotations
 
 import secrets
-from typing import Any
 
-from sqlalchemy import Row, delete, insert, select
+from sqlalchemy import delete, insert, select
 
 from app.database import Session, database_time, insert_new
 from app.documents import Document
 from app.identifiers import new_identifier
 from app.jobs.records import FINISHED, moment
-from app.tables import webhook_deliveries, webhooks
+from app.leases import LeasedRow, Note
+from app.tables import models, webhook_deliveries, webhooks
 
 WAITING = "waiting"
 DELIVERED = "delivered"
@@ -27,16 +27,8 @@ CHALLENGE_BYTES = 24
 MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
 
 
-def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
-    """Write one delivery for each of the owner's webhooks that wants to know how the job ended.
-
-    Parameters
-    ----------
-    row
-        The job's row after the change; one that has not ended is left alone.
-    """
-    if row.status not in FINISHED:
-        return
+def note_end(session: Session, row: LeasedRow, _note: Note) -> None:
+    """Write one delivery for each of the owner's webhooks that wants to know how the job ended."""
     event = f"job.{row.status}"
     # key share: a webhook that is being deleted at this moment must not take the job's end down with it
     hooks = session.execute(
@@ -53,7 +45,7 @@ def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
         if event in hook.events:
             session.execute(
                 insert_new(session, webhook_deliveries)
-                .values(new_delivery(hook.id, event, _ended(event, row), job_id=row.id))
+                .values(new_delivery(hook.id, event, _ended(session, event, row), job_id=row.id))
                 .on_conflict_do_nothing()
             )
 
@@ -101,7 +93,7 @@ def forget_before(session: Session, time: float) -> int:
     ).rowcount
 
 
-def _ended(event: str, row: Row[*tuple[Any, ...]]) -> Document:
+def _ended(session: Session, event: str, row: LeasedRow) -> Document:
     at = f"/jobs/{row.id}"
     return {
         "type": event,
@@ -111,7 +103,7 @@ def _ended(event: str, row: Row[*tuple[Any, ...]]) -> Document:
             "operation": row.operation,
             "status": row.status,
             "error": _small(row.error),
-            "model_id": row.model_id,
+            "model_id": session.scalar(select(models.c.id).where(models.c.job_id == row.id)),
             "links": {"self": at, "result": f"{at}/result", "artifacts": f"{at}/artifacts"},
         },
     }

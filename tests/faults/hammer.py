@@ -9,6 +9,7 @@ import time
 
 from sqlalchemy import func, select
 
+from app import on_end  # noqa: F401 - jobs end here
 from app.database import Database
 from app.jobs.repository import JobFilter, list_jobs
 from app.jobs.store import claim_job, create_job, finish_job, save_progress

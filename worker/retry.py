@@ -1,4 +1,4 @@
-"""Writing into a job store that may be away: as often as it takes, while the claim is ours."""
+"""Retry transactions while the job store is away, for as long as the claim is ours."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from sqlalchemy import Connection
 from sqlalchemy.exc import SQLAlchemyError
 
-from app.database import Database
+from app.database import Database, Session
 from app.database_errors import DatabaseTrouble, trouble_of
-from app.jobs.store import load_request
-from worker.lease import StopReason, Vigil
-from worker.operations import Document
+from worker.lease import LeaseKeeper, StopReason
 
 log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
@@ -33,66 +30,73 @@ class StorageFull(Exception):
     """The job store has no room for what should be written; what was there before still is."""
 
 
-class Patient:
-    """Who holds a claim and waits for the job store.
+class Retry:
+    """Transactions of the holder of a claim, repeated until the job store is back.
+
+    Nobody else can take the job meanwhile; if only this worker is cut off, the fence keeps its writes out.
 
     Parameters
     ----------
-    database : the job store.
-    vigil : keeps the claim alive and knows when to stop.
-    job_id : for the log.
-    clock : seconds that only rise.
-    sleep : waits a number of seconds.
+    database : Database
+        The job store.
+    keeper : LeaseKeeper
+        Keeps the claim alive and knows when to stop.
+    clock : callable
+        Seconds that only rise.
+    sleep : callable
+        Waits a number of seconds.
     """
 
     def __init__(
         self,
         database: Database,
-        vigil: Vigil,
-        job_id: str,
+        keeper: LeaseKeeper,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._database = database
-        self._vigil = vigil
-        self._job_id = job_id
+        self._keeper = keeper
         self._clock = clock
         self._sleep = sleep
 
-    def _request(self) -> Document:
-        """The job's request."""
+    def read(self, load: Callable[[Session], Answer]) -> Answer:
+        """Read in a transaction of its own."""
 
-        def load() -> Document:
-            with self._database.read() as connection:
-                return load_request(connection, self._job_id)
+        def once() -> Answer:
+            with self._database.read() as session:
+                return load(session)
 
-        return self._patiently(load)
+        return self._call(once)
 
-    def _persist(self, write: Callable[[Connection], bool], *, even_if_full: bool = False) -> None:
-        """Write in a transaction of its own; wait out a job store that is away.
+    def write(self, write: Callable[[Session], bool], *, even_if_full: bool = False) -> None:
+        """Write in a transaction of its own.
 
         Parameters
         ----------
-        even_if_full : use the job store's reserve of disk space: for a few rows that must be written.
+        write : callable
+            Returns False when the claim is stale.
+        even_if_full : bool
+            Use the job store's reserve of disk space: for a few rows that must be written.
 
         Raises
         ------
-        StaleClaim : the store refused the write, or this worker ends before the store is back.
-        StorageFull : there is no room.
+        StaleClaim
+            The store refused the write, or this worker ends before the store is back.
+        StorageFull
+            There is no room.
         """
 
         def once() -> bool:
             if even_if_full:
                 return self._database.write_even_if_full(write)
-            with self._database.write() as connection:
-                return write(connection)
+            with self._database.write() as session:
+                return write(session)
 
-        if not self._patiently(once):
+        if not self._call(once):
             raise StaleClaim
 
-    def _patiently(self, action: Callable[[], Answer]) -> Answer:
-        """Do something with the job store as often as it takes; nobody else can have the job meanwhile."""
+    def _call(self, action: Callable[[], Answer]) -> Answer:
         pause_s, tries, shutdown_at = FIRST_PAUSE_S, 0, None
         while True:
             try:
@@ -103,10 +107,10 @@ class Patient:
                     raise
                 if trouble is DatabaseTrouble.FULL and tries == FULL_TRIES:
                     raise StorageFull from error
-                log.warning("job %s: the job store is %s, trying again", self._job_id, trouble.value)
-            if self._vigil.reason is StopReason.LOST:
+                log.warning("the job store is %s, trying again", trouble.value)
+            if self._keeper.reason is StopReason.LOST:
                 raise StaleClaim
-            if self._vigil.reason is StopReason.SHUTDOWN:
+            if self._keeper.reason is StopReason.SHUTDOWN:
                 shutdown_at = self._clock() if shutdown_at is None else shutdown_at
                 if self._clock() - shutdown_at > SHUTDOWN_PATIENCE_S:
                     raise StaleClaim

@@ -1,4 +1,4 @@
-"""What an attempt at a job tells of itself: log lines that say whose they are, and spans of its trace."""
+"""Spans and log facts of an attempt at a job or a chunk."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from app.jobs.chunks import ChunkClaim
-from app.jobs.records import Claim
+from app.jobs.records import ChunkClaim, Claim
 from app.observability.context import bound
 from app.observability.tracing import past_span, span
 
 
 @contextmanager
-def told(claim: Claim | ChunkClaim) -> Iterator[None]:
-    """Let every line within the block carry the job, and trace the attempt as part of the request's trace."""
+def attempt_span(claim: Claim | ChunkClaim) -> Iterator[None]:
+    """Trace an attempt as part of the request's trace; log lines within the block carry the job."""
     with bound(job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker):
-        chunk = isinstance(claim, ChunkClaim)
-        if not isinstance(claim, ChunkClaim) and claim.fence == 1:  # a job handed back begins attempt 1 again
+        kind = "chunk" if isinstance(claim, ChunkClaim) else "attempt"
+        if isinstance(claim, Claim) and claim.fence == 1:  # a job handed back begins attempt 1 again
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
-            f"chunk {claim.operation}" if chunk else f"attempt {claim.operation}",
+            f"{kind} {claim.operation}",
             kind="consumer",
             traceparent=claim.traceparent,
             attributes={
@@ -32,12 +31,13 @@ def told(claim: Claim | ChunkClaim) -> Iterator[None]:
             yield
 
 
-class Phases:
+class PhaseSpans:
     """Spans of the phases of a search, seen from its steps: a phase began when the step before it ended.
 
     Parameters
     ----------
-    clock : seconds that only rise.
+    clock : callable
+        Seconds that only rise.
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic) -> None:

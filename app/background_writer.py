@@ -19,7 +19,7 @@ Write = Callable[[Session], object]
 logger = logging.getLogger(__name__)
 
 
-class Afterwards:
+class BackgroundWriter:
     """One thread that writes in the order of asking; a write that fails is logged and forgotten.
 
     Parameters
@@ -30,7 +30,7 @@ class Afterwards:
     def __init__(self, database: Database) -> None:
         self._database = database
         self._waiting: queue.Queue[Write | None] = queue.Queue(MOST_WAITING)
-        self._thread = threading.Thread(target=self._run, name="afterwards", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="background-writer", daemon=True)
 
     def start(self) -> None:
         """Begin to write."""
