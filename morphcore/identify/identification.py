@@ -23,6 +23,7 @@ from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
+from morphcore.simulate.compilation import compile_flights
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphcore.steps import Step
@@ -215,6 +216,7 @@ class Identification:
 
     def _first(self, stop: Stop | None) -> SearchState:
         """Choose the step, in the search's time, and fly what is known, which always is flown."""
+        compile_flights()
         deadline = Deadline(self.search.max_seconds, stop)
         try:
             self._chosen_step(deadline)
