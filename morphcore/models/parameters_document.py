@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
+from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -26,9 +27,10 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     document : a ``model`` object of an identification's result, or the whole result that holds one.
         ``division`` (n,), ``stiffness_nm_rad`` (n - 1, 3) of flap, torsion and lag in N m/rad,
         ``damping_nms_rad`` (n - 1, 3) in N m s/rad (or one number for a joint's three axes); each with one
-        more leading axis where the wings have parameters of their own. ``aero``: ``lift_factor`` (-),
-        ``centre_shift_m`` (forward positive), ``profile_drag`` (-), ``lag_s``. Other fields are not looked
-        at.
+        more leading axis where the wings have parameters of their own. ``aero``: the corrections, by the
+        names of ``CHAIN_PARAMETERS``. ``surfaces``, where flexible surfaces are not one mirror pair: by the
+        name of each, its own division, stiffness, damping and profile drag, or ``mirror_of`` another. Other
+        fields are not looked at.
     pointer : where the document stands, for errors.
 
     Returns
@@ -45,6 +47,47 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     fields = Fields(whole.raw("model"), pointer) if whole.has("model") else whole
     fields.raw("links_per_wing")
     links = fields.whole("links_per_wing", default=1, least=1, most=MOST_LINKS)
+    values = _structure(fields, links)
+    wings = values["division"].shape[0]
+    aero = fields.child("aero")
+    for parameter in CHAIN_PARAMETERS:
+        if parameter.correction:
+            value = np.full(1, _correction(aero, parameter))
+            values[parameter.name] = value if parameter.scope == "aircraft" else np.tile(value, wings)
+    if not fields.has("surfaces"):
+        return _batch(values)
+    surfaces = fields.child("surfaces")
+    owners: dict[str, list[str]] = {}
+    own: dict[str, list[Array]] = {}
+    for name in fields.raw("surfaces"):
+        entry = surfaces.child(name)
+        if entry.has("mirror_of"):
+            owners.setdefault(entry.text("mirror_of"), []).append(name)
+            continue
+        owners.setdefault(name, []).insert(0, name)
+        found = _structure(entry, links)
+        for parameter in CHAIN_PARAMETERS:
+            if parameter.correction and parameter.scope != "aircraft":
+                found[parameter.name] = np.full(1, _correction(entry, parameter))
+        for key, value in found.items():
+            own.setdefault(key, []).append(value[0])
+    for label, names in owners.items():
+        if names[0] != label:
+            raise _error(surfaces, label, f"{names[0]!r} mirrors {label!r}, which has no parameters")
+    values |= {key: np.stack(rows) for key, rows in own.items()}
+    return _batch(values, tuple(tuple(names) for names in owners.values()))
+
+
+def _batch(values: dict[str, Array], surfaces: tuple[tuple[str, ...], ...] | None = None) -> ParameterBatch:
+    """One particle of values without their leading axis."""
+    whole = {parameter.name for parameter in CHAIN_PARAMETERS if parameter.scope == "aircraft"}
+    return ParameterBatch(
+        {name: value if name in whole else value[None] for name, value in values.items()}, surfaces
+    )
+
+
+def _structure(fields: Fields, links: int) -> dict[str, Array]:
+    """Division (w, n), stiffness and damping (w, n - 1, 3) of an object with w wings."""
     division = _array(fields, "division")
     wings = 1 if division.ndim == 1 else division.shape[0]
     division = _shaped(fields, "division", division, (wings, links))
@@ -59,43 +102,50 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     for name, values in (("stiffness_nm_rad", stiffness), ("damping_nms_rad", damping)):
         if np.any(values < 0.0):
             raise _error(fields, name, f"{name} has a negative entry")
-    aero = fields.child("aero")
-    corrections = {
-        "lift_factor": aero.number("lift_factor", default=1.0, above=0.0, most=100.0),
-        "centre_shift": aero.number("centre_shift_m", default=0.0, least=-100.0, most=100.0),
-        "profile_drag": aero.number("profile_drag", least=0.0, most=10.0),
-        "lag": aero.number("lag_s", least=0.0, most=100.0),
+    return {
+        "division": division / division.sum(axis=1, keepdims=True),
+        "stiffness_nm_rad": stiffness,
+        "damping_nms_rad": damping,
     }
-    return ParameterBatch(
-        division=(division / division.sum(axis=1, keepdims=True))[None],
-        stiffness=stiffness[None],
-        damping=damping[None],
-        **{name: np.array([value]) for name, value in corrections.items()},
-    )
+
+
+def _correction(fields: Fields, parameter: Parameter) -> float:
+    limits = {"least": parameter.minimum, "most": parameter.maximum, "above": parameter.above}
+    if parameter.default is None:
+        return fields.number(parameter.name, **limits)
+    return fields.number(parameter.name, default=parameter.default, **limits)
 
 
 def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
     """Write one parameter set of a batch as a ``model`` object; ``parameters_from_document`` reads it back.
 
-    Shared parameters are written flat; where each wing has its own, with one more leading axis.
+    Shared parameters are written flat; where each wing has its own, with one more leading axis. Where the
+    batch names the surfaces of its sets, the flat ones are those of the first and ``surfaces`` has all.
     """
-    shared = batch.division.shape[1] == 1
+    flat = batch.sets == 1 or batch.surfaces is not None
     values = {
-        "division": batch.division[particle],
-        "stiffness_nm_rad": batch.stiffness[particle],
-        "damping_nms_rad": batch.damping[particle],
+        parameter.name: batch[parameter.name][particle]
+        for parameter in CHAIN_PARAMETERS
+        if parameter.name in batch.values
     }
-    return {
+    structure = [p.name for p in CHAIN_PARAMETERS if not p.correction]
+    corrections = [p for p in CHAIN_PARAMETERS if p.correction and p.name in values]
+    document: Document = {
         "links_per_wing": batch.links,
-        "separate_wings": not shared,
-        **{name: (value[0] if shared else value).tolist() for name, value in values.items()},
+        "separate_wings": not flat,
+        **{name: (values[name][0] if flat else values[name]).tolist() for name in structure},
         "aero": {
-            "lift_factor": float(batch.lift_factor[particle]),
-            "centre_shift_m": float(batch.centre_shift[particle]),
-            "profile_drag": float(batch.profile_drag[particle]),
-            "lag_s": float(batch.lag[particle]),
+            p.name: float(values[p.name] if p.scope == "aircraft" else values[p.name][0]) for p in corrections
         },
     }
+    if batch.surfaces is not None:
+        own = [*structure, *(p.name for p in corrections if p.scope != "aircraft")]
+        document["surfaces"] = {
+            name: {"mirror_of": names[0]} if i else {key: values[key][k].tolist() for key in own}
+            for k, names in enumerate(batch.surfaces)
+            for i, name in enumerate(names)
+        }
+    return document
 
 
 def _require_flown(document: Document, pointer: str) -> None:

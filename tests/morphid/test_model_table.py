@@ -57,7 +57,7 @@ def test_names_are_those_of_the_uncertainty(separate: bool) -> None:  # noqa: FB
     """Names and values are the library's, in its order: no interval stands beside another parameter."""
     model = chain_model(reference_aircraft(), reference_flight(), 3)
     space = search_space(model, separate_wings=separate)
-    batch = physical_guess(model, wing_sets=space.wing_sets)
+    batch = physical_guess(model, separate_wings=separate)
     found = dict(named_parameters(parameters_document(batch)))
     expected = dict(zip(space.parameter_names, space.flatten(batch)[0].tolist(), strict=True))
     assert list(found.items()) == list(expected.items())
