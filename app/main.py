@@ -45,12 +45,12 @@ from app.parsing.confinement import Limits
 from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
 from app.trajectories.endpoints import router as trajectories
-from app.version import VERSION
 from app.web.endpoints import mount_static
 from app.web.endpoints import router as web
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
+from morphdata.version import VERSION
 
 BODIES_AT_ONCE = 16  # of the largest size
 READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too

@@ -22,9 +22,9 @@ from app.errors import (
 from app.http.problems import MEDIA_TYPE, documented
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
-from app.version import VERSION
 from app.webhooks.endpoints import messages
 from morphdata.operations import OPERATIONS
+from morphdata.version import VERSION
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"

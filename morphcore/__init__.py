@@ -12,8 +12,8 @@ from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.version import VERSION
 from morphcore.warming import warm_up, warm_up_further
+from morphdata.version import VERSION
 
 __version__ = VERSION
 

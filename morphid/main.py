@@ -42,7 +42,7 @@ class Morphid(TyperGroup):
 def print_version(wanted: bool) -> None:
     """Print the version and end, where it is asked for."""
     if wanted:
-        from app.version import VERSION
+        from morphdata.version import VERSION
 
         typer.echo(f"morphid {VERSION}")
         raise typer.Exit

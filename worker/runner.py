@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from app import on_end  # noqa: F401 - workers end jobs
+import app.on_end  # noqa: F401 - workers end jobs
 from app.database import Database, Session
 from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.chunks import claim_chunk, must_be_taken_over, take_over

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 from sqlalchemy import Row, Text, cast, delete, func, insert, select, update
@@ -9,31 +10,12 @@ from sqlalchemy import Row, Text, cast, delete, func, insert, select, update
 from app.database import Session, database_time
 from app.documents import finite
 from app.errors import JobNotFound
-from app.jobs.records import FINISHED, HELD, Job, JobStatus, moment, optional_moment
+from app.jobs.records import FINISHED, HELD, Job, JobStatus, optional_moment
 from app.leases import LeasedRow, LeasedTable, Note
 from app.tables import job_checkpoints, job_chunks, job_events, jobs
 
-JOB_COLUMNS = (
-    jobs.c.id,
-    jobs.c.owner,
-    jobs.c.operation,
-    jobs.c.status,
-    jobs.c.priority,
-    jobs.c.summary,
-    jobs.c.progress,
-    jobs.c.error,
-    jobs.c.attempt,
-    jobs.c.max_attempts,
-    jobs.c.event_seq,
-    jobs.c.model_id,
-    jobs.c.partial,
-    jobs.c.created_at,
-    jobs.c.started_at,
-    jobs.c.updated_at,
-    jobs.c.finished_at,
-    jobs.c.deadline_at,
-    jobs.c.label,
-)
+JOB_COLUMNS = tuple(jobs.c[field.name] for field in fields(Job) if field.name != "replayed")
+MOMENTS = tuple(column.name for column in JOB_COLUMNS if column.name.endswith("_at"))
 CLAIM_COLUMNS = (jobs.c.fence, jobs.c.max_seconds, jobs.c.request_id, jobs.c.traceparent)
 QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
 
@@ -72,28 +54,10 @@ JOBS = LeasedTable(
 
 def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
     """Turn a row of `JOB_COLUMNS` into a value."""
-    return Job(
-        id=row.id,
-        owner=row.owner,
-        operation=row.operation,
-        status=JobStatus(row.status),
-        priority=row.priority,
-        summary=row.summary,
-        progress=row.progress,
-        error=row.error,
-        attempt=row.attempt,
-        max_attempts=row.max_attempts,
-        event_seq=row.event_seq,
-        model_id=row.model_id,
-        partial=bool(row.partial),
-        created_at=moment(row.created_at),
-        started_at=optional_moment(row.started_at),
-        updated_at=moment(row.updated_at),
-        finished_at=optional_moment(row.finished_at),
-        deadline_at=optional_moment(row.deadline_at),
-        label=row.label,
-        replayed=replayed,
-    )
+    values = {column.name: getattr(row, column.name) for column in JOB_COLUMNS}
+    values |= {name: optional_moment(values[name]) for name in MOMENTS}
+    values |= {"status": JobStatus(row.status), "partial": bool(row.partial)}
+    return Job(**values, replayed=replayed)
 
 
 def get_job(session: Session, owner: str, job_id: str) -> Job:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, case, func, select, update
 
-from app.database import Session, database_time, insert_new
+from app.database import Session, current_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
 from app.keys.records import Quota, Usage
@@ -91,7 +91,7 @@ def settle(session: Session, job: LeasedRow, _note: Note) -> None:
 
 def usage(session: Session, key_id: str) -> Usage:
     """Count what a key uses now."""
-    today = usage_day(_now(session))
+    today = usage_day(current_time(session))
     return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
 
 
@@ -105,11 +105,11 @@ def _charge(session: Session, key_id: str | None, asked: _Asked) -> None:
     if row is not None:
         _refuse_excess(session, key_id, Quota(*row), asked)
     if asked.flights:
-        _add_flights(session, key_id, usage_day(_now(session)), asked.flights)
+        _add_flights(session, key_id, usage_day(current_time(session)), asked.flights)
 
 
 def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -> None:
-    now = _now(session)
+    now = current_time(session)
     if quota.max_jobs_in_flight is not None and asked.jobs:
         _compare("jobs_in_flight", quota.max_jobs_in_flight, _jobs_in_flight(session, key_id), 1, SOON_S)
     if quota.max_flights_per_day is not None and asked.flights:
@@ -124,10 +124,6 @@ def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -
 def _compare(name: str, limit: int, used: int, asked: int, retry_after_s: int) -> None:
     if used + asked > limit:
         raise QuotaExceeded(name, limit=limit, used=used, asked=asked, retry_after_s=retry_after_s)
-
-
-def _now(session: Session) -> float:
-    return float(session.scalar(select(database_time())) or 0.0)
 
 
 def _jobs_in_flight(session: Session, key_id: str) -> int:

@@ -71,7 +71,7 @@ def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
     except ImportError:
         log.warning("traces are asked for but OpenTelemetry is missing: pip install 'morphid[telemetry]'")
         return False
-    from app.version import VERSION
+    from morphdata.version import VERSION
 
     stop_tracing()
     resource = Resource.create(

@@ -92,13 +92,13 @@ async def upload_trajectory(
 
     caller.key.must_open()  # the body and its reader may have taken a minute
 
-    def store() -> repository.StoredTrajectory:
+    def store() -> TrajectorySummary:
         with app.database.write() as session:
             return service.store_trajectory(session, caller, upload)
 
     stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"
-    return _summary(stored)
+    return stored
 
 
 async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUpload:
@@ -127,14 +127,6 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
         await form.close()
 
 
-def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
-    return TrajectorySummary(
-        id=stored.id,
-        name=stored.name,
-        rows=stored.rows,
-        duration_s=stored.duration_s,
-        created_at=stored.created_at,
-    )
 
 
 @router.get(
@@ -152,9 +144,7 @@ def list_trajectories(
 ) -> TrajectoryPage:
     """Your uploaded flights without their rows, newest first."""
     with app.database.read() as session:
-        found = repository.list_trajectories(session, owner, before=cursor, limit=limit + 1)
-    shown = [_summary(stored) for stored in found[:limit]]
-    return TrajectoryPage(trajectories=shown, next_cursor=shown[-1].id if len(found) > limit else None)
+        return repository.list_trajectories(session, owner, cursor=cursor, limit=limit)
 
 
 @router.get(
@@ -174,7 +164,7 @@ def get_trajectory(
     with app.database.read() as session:
         stored, columns = repository.get_trajectory_json(session, owner, trajectory_id)
     # the rows go out as they are stored: to parse and write a long flight would hold up the other requests
-    text = _summary(stored).model_dump_json().encode()[:-1] + b"," + columns[1:]
+    text = stored.model_dump_json().encode()[:-1] + b"," + columns[1:]
     return Response(text, media_type="application/json")
 
 

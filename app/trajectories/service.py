@@ -11,8 +11,8 @@ from app.errors import InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge_bytes
 from app.parsing.pool import refusal
-from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
-from app.trajectories.schemas import TrajectoryUpload
+from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.fault import FileFault, as_sentence
 from morphdata.samplefiles.flight import INLINE, flight_faults
@@ -72,7 +72,7 @@ def _place(fault: FileFault) -> str:
     return f"{column}{row}" if fault.title == "t" else f"{row}{column}"
 
 
-def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload) -> StoredTrajectory:
+def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload) -> TrajectorySummary:
     """Store a flight.
 
     Raises

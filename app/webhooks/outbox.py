@@ -9,7 +9,7 @@ import secrets
 
 from sqlalchemy import delete, insert, select
 
-from app.database import Session, database_time, insert_new
+from app.database import Session, current_time, database_time, insert_new
 from app.documents import Document
 from app.identifiers import new_identifier
 from app.jobs.records import FINISHED, moment
@@ -77,18 +77,19 @@ def note_challenge(session: Session, webhook_id: str) -> str:
 
 
 def _note(session: Session, webhook_id: str, event: str, data: Document) -> str:
-    at = moment(session.execute(select(database_time())).scalar_one())
+    at = moment(current_time(session))
     payload = {"type": event, "timestamp": at.isoformat(), "data": {"webhook_id": webhook_id, **data}}
     values = new_delivery(webhook_id, event, payload)
     session.execute(insert(webhook_deliveries).values(values))
     return str(values["id"])
 
 
-def forget_before(session: Session, time: float) -> int:
-    """Delete deliveries that ended before `time` (s since 1970 UTC); return how many there were."""
+def forget_ended(session: Session, older_than_s: float) -> int:
+    """Delete deliveries that ended longer ago; return how many there were."""
     return session.execute(
         delete(webhook_deliveries).where(
-            webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)), webhook_deliveries.c.finished_at < time
+            webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)),
+            webhook_deliveries.c.finished_at < database_time() - older_than_s,
         )
     ).rowcount
 
