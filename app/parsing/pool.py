@@ -21,8 +21,8 @@ from app.owner_turns import OwnerTurns
 from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
-from morphdata.base import MAX_ROWS
 from app.parsing.json_text import token
+from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
 from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 

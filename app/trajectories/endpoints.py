@@ -127,8 +127,6 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
         await form.close()
 
 
-
-
 @router.get(
     "/trajectories",
     dependencies=[demands(Scope.DATA_READ)],
