@@ -134,7 +134,8 @@ class SearchSpace:
 
         Raises
         ------
-        InvalidInput : it has other links than are sought, or wings of its own where all are sought alike.
+        InvalidInput : it has other links than are sought, wings of its own where all are sought alike, or
+            other surfaces.
         """
         if batch.links != self.links:
             raise InvalidInput(
@@ -142,7 +143,10 @@ class SearchSpace:
                 pointer=WARM_START,
                 hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
             )
-        batch = fitted(self.model, batch)
+        try:
+            batch = fitted(self.model, batch)
+        except InvalidInput as error:
+            raise InvalidInput(error.message, pointer=WARM_START, hint=error.hint) from None
         chosen = self.model.set_of(batch)
         x = self.guess.copy()
         for unknown, at, _ in self._parts():

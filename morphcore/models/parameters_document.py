@@ -57,6 +57,8 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     if not fields.has("surfaces"):
         return _batch(values)
     surfaces = fields.child("surfaces")
+    if not fields.raw("surfaces"):
+        raise _error(fields, "surfaces", "surfaces is empty")
     owners: dict[str, list[str]] = {}
     own: dict[str, list[Array]] = {}
     for name in fields.raw("surfaces"):
@@ -73,7 +75,8 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
             own.setdefault(key, []).append(value[0])
     for label, names in owners.items():
         if names[0] != label:
-            raise _error(surfaces, label, f"{names[0]!r} mirrors {label!r}, which has no parameters")
+            entry = surfaces.child(names[0])
+            raise _error(entry, "mirror_of", f"{names[0]!r} mirrors {label!r}, which has no parameters")
     values |= {key: np.stack(rows) for key, rows in own.items()}
     return _batch(values, tuple(tuple(names) for names in owners.values()))
 

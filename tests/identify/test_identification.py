@@ -188,8 +188,8 @@ def test_a_diverged_flight_costs_much_but_not_infinity() -> None:
     model = chain_model(reference_aircraft(), reference_flight(), 2)
     guess = physical_guess(model)
     wild = guess.changed(lift_factor=np.array([1e6]))
-    both = type(guess)(
-        **{name: np.concatenate([value, getattr(wild, name)]) for name, value in vars(guess).items()}
+    both = guess.changed(
+        **{name: np.concatenate([value, wild[name]]) for name, value in guess.values.items()}
     )
     cases = sample_cases(model, [shortened(example("rate_0.8"), 60)])
     pair, alone = costs(model, both, cases, "trim"), costs(model, guess, cases, "trim")
