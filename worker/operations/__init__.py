@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
 from morphdata.faults import Pickled
-from morphdata.operations import OPERATIONS
+from morphdata.operations import operation_named
 
 Document = dict[str, Any]
 Stop = Callable[[], bool]
@@ -127,11 +127,6 @@ Begin = Callable[[Document, int], Work]
 class UnknownOperation(Pickled, LookupError):
     """This worker does not know the operation of a job; a newer one may."""
 
-    def __init__(self, name: str) -> None:
-        known = ", ".join(operation.name for operation in OPERATIONS)
-        super().__init__(f"this worker knows {known}, not {name!r}")
-        self.name = name
-
 
 def find_operation(name: str) -> Begin:
     """Import the function that begins an operation.
@@ -140,9 +135,10 @@ def find_operation(name: str) -> Begin:
     ------
     UnknownOperation : no such operation.
     """
-    begins = {operation.name: operation.begin for operation in OPERATIONS}
-    if name not in begins:
-        raise UnknownOperation(name)
-    module, _, function = begins[name].partition(":")
+    try:
+        operation = operation_named(name)
+    except LookupError as error:
+        raise UnknownOperation(f"this worker cannot run it: {error}") from None
+    module, _, function = operation.begin.partition(":")
     begin: Begin = getattr(import_module(module), function)
     return begin
