@@ -10,7 +10,7 @@ from morphcore import evolution, swarm
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.simulate.compilation import SMALL, compile_flights, tiny_aircraft
-from morphcore.simulate.flight import simulate
+from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.torque import hinge_torques
@@ -43,7 +43,8 @@ def warm_up_further() -> None:
     states = np.zeros((held.grid.steps + 1, model.state_rows))
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
-    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=SMALL, step_s=0.01)
+    for _ in flight_steps(aircraft, flight, sample, model="flexible", elements=1, lattice=SMALL, step_s=0.01):
+        pass
     # packages that the searches load when they are first needed
     importlib.import_module("scipy.stats")
     evolution.strategies()

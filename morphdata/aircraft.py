@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
@@ -144,6 +145,11 @@ class Material(Document):
         default=0.0, ge=0.0, le=10.0, description="Damping as a multiple of stiffness, c = beta k."
     )
 
+    @property
+    def shear_modulus_pa(self) -> float:
+        """G = E / (2 (1 + nu))."""
+        return self.youngs_modulus_pa / (2 * (1 + self.poisson_ratio))
+
 
 class Section(Document):
     """Section properties given outright, instead of those of a solid box."""
@@ -180,6 +186,11 @@ class Hinge(Document):
     max_rad: Angle = Field(
         default=HINGE_RANGE_RAD, description="Greatest angle; samples beyond it are refused."
     )
+
+    @property
+    def axis_index(self) -> int:
+        """0, 1 or 2 for x, y, z."""
+        return "xyz".index(self.axis)
 
     def faults(self) -> Iterator[Fault]:
         """The range has a width."""
@@ -278,3 +289,14 @@ class Aircraft(Document):
                     "Rename one.",
                 )
             names.add(surface.name)
+
+
+def load_aircraft(path: str | Path) -> Aircraft:
+    """Read an aircraft from its JSON file.
+
+    Raises
+    ------
+    InvalidInput
+        Naming every fault, with pointers that begin with ``/aircraft``.
+    """
+    return Aircraft.load(path, "/aircraft")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import html
+import json
 import math
+import reprlib
 from collections.abc import Iterator
 from functools import cache
 from numbers import Integral
+from pathlib import Path
 from typing import Annotated, Any, Self, get_args
 
 from pydantic import (
@@ -26,6 +30,7 @@ from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
 MAX_ROWS = MOST_ROWS  # of one sample
 MIN_ROWS = FEWEST_ROWS
+SHOWN_ITEMS = 4  # of a list, at a prompt
 LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 
 
@@ -68,12 +73,40 @@ class Document(BaseModel):
         except ValidationError as error:
             raise _refused(error, value, cls, pointer) from None
 
+    @classmethod
+    def load(cls, path: str | Path, pointer: str = "") -> Self:
+        """Read the document from a JSON file.
+
+        Raises
+        ------
+        InvalidInput
+            The file cannot be read, or naming every fault of the document.
+        """
+        try:
+            document = json.loads(Path(path).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InvalidInput(f"{path} does not exist", hint="check the path") from None
+        except OSError as error:
+            raise InvalidInput(f"{path} cannot be read: {error.strerror}", hint="check the path") from None
+        except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of absurd numbers
+            raise InvalidInput(f"{path} is not JSON: {error}", hint="see the examples") from None
+        if not isinstance(document, dict):
+            raise InvalidInput(f"{path} holds no JSON object", hint="see the examples")
+        return cls.parse(document, pointer)
+
     def faults(self) -> Iterator[Fault]:
         """Yield what is wrong across the fields, with pointers relative to this object.
 
         It is called when each field by itself is right.
         """
         return iter(())
+
+    def __repr__(self) -> str:
+        """A few lines: names instead of objects, ends instead of long lists."""
+        return "\n  ".join([type(self).__name__, *(f"{name} = {_brief(value)}" for name, value in self)])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(repr(self))}</pre>"
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -92,6 +125,16 @@ class Document(BaseModel):
         return {
             name: _whole(_listed(value)) if name in whole else _listed(value) for name, value in given.items()
         }
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, Document):
+        return str(getattr(value, "name", type(value).__name__))
+    if isinstance(value, list) and len(value) > SHOWN_ITEMS:
+        return f"{len(value)} items from {_brief(value[0])} to {_brief(value[-1])}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_brief, value))}]"
+    return reprlib.repr(value)
 
 
 def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer: str = "") -> InvalidInput:

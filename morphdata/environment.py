@@ -54,3 +54,8 @@ class Environment(Document):
     gust: Gust | None = None
     turbulence: Turbulence | None = None
     seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
+
+    @property
+    def still(self) -> bool:
+        """Whether there is neither gust nor turbulence."""
+        return self.gust is None and self.turbulence is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, WithJsonSchema
@@ -80,3 +81,14 @@ class Flight(Document):
                 "/mach",
                 f"Linear compressibility ends at Mach {MACH_LIMIT}: fly slower, or leave mach out.",
             )
+
+
+def load_flight(path: str | Path) -> Flight:
+    """Read a flight condition from its JSON file.
+
+    Raises
+    ------
+    InvalidInput
+        Naming every fault, with pointers that begin with ``/flight``.
+    """
+    return Flight.load(path, "/flight")

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
-from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import IdentifyRequest, SamplesRequest
 
 __all__ = [
@@ -29,8 +31,8 @@ __all__ = [
 
 
 def identify(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
     links_per_wing: int = 3,
@@ -51,8 +53,8 @@ def identify(
     InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
     run = Identification(
-        aircraft,
-        flight,
+        Aircraft.of(aircraft),
+        Flight.of(flight),
         samples,
         model or ModelSettings(links_per_wing=links_per_wing),
         search or SearchSettings(seed=seed),
@@ -79,9 +81,8 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
 
 def flown_inputs(request: SamplesRequest) -> tuple[Aircraft, Flight, list[Trajectory]]:
     """Aircraft, flight condition and samples of a request, as numbers."""
-    given = request.document()
     return (
-        aircraft_from_document(given["aircraft"]),
-        flight_from_document(given["flight"]),
-        [trajectory_from_document(item, f"/samples/{i}") for i, item in enumerate(given["samples"])],
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        [Trajectory.of(sample) for sample in request.inline_samples().values()],
     )

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import WholeNumbers
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters_document import parameters_from_document
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.simulate.trim import StartMode
 from morphcore.swarm import SwarmSettings
 from morphdata.identify import IdentifySearch, Method, Search, SoughtModel
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.parameters import parameters_in
 
 PAPER_PARTICLES = 2500
@@ -39,7 +39,7 @@ class ModelSettings(WholeNumbers):
     separate_wings: bool = False
     aero_coefficients: tuple[str, ...] | None = None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    lattice: LatticeSettings = DEFAULT_LATTICE
+    lattice: Lattice = DEFAULT_LATTICE
     step_s: float | None = None
     start: StartMode = "trim"
 
@@ -75,7 +75,7 @@ def model_settings(model: SoughtModel) -> ModelSettings:
         separate_wings=model.separate_wings,
         aero_coefficients=None if listed is None else tuple(listed),
         bounds={} if model.bounds is None else model.bounds.given(),
-        lattice=lattice_settings(model.lattice.model_dump(exclude_none=True)),
+        lattice=model.lattice,
         step_s=model.step_s,
         start=model.start,
     )
@@ -97,5 +97,5 @@ def search_settings(search: Search) -> SearchSettings:
         screen=search.particles or (DEFAULT_SCREEN if known is None else WARM_SCREEN),
         starts=DEFAULT_STARTS if known is None else WARM_STARTS,
         iterations=search.generations or DEFAULT_ITERATIONS,
-        warm_start=None if known is None else parameters_from_document(known.model_dump(exclude_none=True)),
+        warm_start=None if known is None else parameter_batch(known),
     )

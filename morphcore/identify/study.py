@@ -25,6 +25,8 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread, use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
 from morphdata.study import StudiedModels, StudyRequest
 
 LINKS = tuple(StudiedModels().links_per_wing)
@@ -240,8 +242,8 @@ class Study:
 
 
 def study(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
     links: Sequence[int] = LINKS,
@@ -260,7 +262,7 @@ def study(
     ------
     InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
-    run = Study(aircraft, flight, samples, links=links, model=model, search=search)
+    run = Study(Aircraft.of(aircraft), Flight.of(flight), samples, links=links, model=model, search=search)
     checkpoint = b""
     for step in run.steps():
         checkpoint = step.checkpoint

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters_document import parameters_from_document
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import (
@@ -17,6 +17,9 @@ from morphcore.optimise.settings import (
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.optimize import Limits, Morph, OptimizeRequest, Verify, Weights
 from morphdata.parameters import flown_with
 
@@ -36,8 +39,8 @@ __all__ = [
 
 
 def optimise_schedule(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     model: ParameterBatch,
     *,
     morph: Morph,
@@ -45,7 +48,7 @@ def optimise_schedule(
     weights: Weights | None = None,
     search: ScheduleSearch | None = None,
     verify: Verify = "flexible",
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
 ) -> ScheduleResult:
     """Find the morph schedule that disturbs the attitude least, from start to end.
 
@@ -63,8 +66,8 @@ def optimise_schedule(
     trimmed.
     """
     run = ScheduleOptimisation(
-        aircraft,
-        flight,
+        Aircraft.of(aircraft),
+        Flight.of(flight),
         model,
         morph=morph,
         limits=limits,
@@ -90,19 +93,25 @@ def optimisation_from_request(request: OptimizeRequest, threads: int | None = No
     """
     if threads is not None:
         use_threads(threads)
-    given, model = request.document(), request.model
-    flown = flown_with(model)
+    flown = flown_with(request.model)
+    known = request.model.known
+    if known is None:
+        raise InvalidInput(
+            "only a service knows a model by its id",
+            pointer="/model/model_id",
+            hint="give the model's parameters instead",
+        )
     return ScheduleOptimisation(
-        aircraft_from_document(given["aircraft"]),
-        flight_from_document(given["flight"]),
-        parameters_from_document(given["model"]["parameters"], "/model/parameters"),
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        parameter_batch(known),
         morph=request.morph,
         limits=request.limits,
         weights=request.weights,
         search=schedule_search(request.search),
         verify=request.verify,
         flexible=flexible_settings(request.flexible),
-        lattice=lattice_settings(flown.lattice.model_dump(exclude_none=True)),
+        lattice=flown.lattice,
         start=flown.start,
         step_s=flown.step_s,
     )

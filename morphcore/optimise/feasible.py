@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.surface import beyond_range
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.optimize import Limits, Morph
@@ -32,7 +33,7 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
     least, most = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
     for name in ("initial_rad", "final_rad"):
         angle = getattr(morph, name)
-        if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
+        if any(beyond_range(hinge, np.array([angle])).size for hinge in hinges):
             raise InvalidInput(
                 f"{name} {angle:g} is beyond the hinges' range {least:g}..{most:g} rad",
                 pointer=f"/morph/{name}",

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from morphcore.errors import FlightDiverged, InvalidInput, NotFlyable, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.soft_joints import chain_obstacle, soft_joint
@@ -48,6 +47,7 @@ from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.threads import one_blas_thread
 from morphcore.validity import documents
 from morphdata.faults import refuse
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.optimize import Limits, Morph, Verify, Weights, goal_faults
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ class ScheduleOptimisation:
         search: ScheduleSearch | None = None,
         verify: Verify = "flexible",
         flexible: FlexibleSettings | None = None,
-        lattice: LatticeSettings = DEFAULT_LATTICE,
+        lattice: Lattice = DEFAULT_LATTICE,
         start: StartMode = "trim",
         step_s: float | None = None,
         clock: Clock = time.perf_counter,

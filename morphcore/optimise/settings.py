@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from morphcore.geometry.fields import WholeNumbers
-from morphcore.geometry.lattice import LatticeSettings, lattice_settings
 from morphcore.swarm import SwarmSettings
 from morphdata import optimize
+from morphdata.lattice import Lattice
 
 PAPER_PARTICLES = 50  # of the paper's swarm
 DEFAULT_SCREEN = 16  # schedules flown to find the descent's starts
@@ -54,11 +54,9 @@ class FlexibleSettings(WholeNumbers):
     """
 
     elements: int = optimize.VerifyingModel().elements
-    lattice: LatticeSettings | None = None
+    lattice: Lattice | None = None
 
 
 def flexible_settings(model: optimize.VerifyingModel) -> FlexibleSettings:
     """Take the flexible model's part of a request."""
-    lattice = model.lattice
-    chosen = None if lattice is None else lattice_settings(lattice.model_dump(exclude_none=True))
-    return FlexibleSettings(model.elements, chosen)
+    return FlexibleSettings(model.elements, model.lattice)

@@ -14,8 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.jit import is_kept
 from morphcore.lanes import ALONE, TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
@@ -25,8 +24,11 @@ from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.stopping import say
 from morphcore.threads import usable_cores
+from morphdata import aircraft as documents
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import Lattice
 
-SMALL = LatticeSettings(chordwise=1, spanwise=4)
+SMALL = Lattice(chordwise=1, spanwise=4)
 _COMPILE_ALONE = "from morphcore.simulate.compilation import fly_tiny; fly_tiny(1)"
 
 
@@ -74,7 +76,7 @@ def tiny_aircraft() -> tuple[Aircraft, Flight]:
         "thickness_m": 0.02,
         "material": {"density_kg_m3": 500.0, "youngs_modulus_pa": 1e10},
     }
-    aircraft = aircraft_from_document(
+    aircraft = documents.Aircraft.parse(
         {
             "fuselage": {"length_m": 1.0, "width_m": 0.2, "height_m": 0.2, "density_kg_m3": 100.0},
             "surfaces": [
@@ -83,4 +85,5 @@ def tiny_aircraft() -> tuple[Aircraft, Flight]:
             ],
         }
     )
-    return aircraft, flight_from_document({"airspeed_m_s": 30.0, "gravity_m_s2": 9.81})
+    flight = FlightDocument(airspeed_m_s=30.0, gravity_m_s2=9.81)
+    return Aircraft.of(aircraft), Flight.of(flight)

@@ -12,7 +12,13 @@ from morphcore.identify.settings import model_settings
 from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.identify import EquivalentModel
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
 
 AERO_COEFFICIENTS = ("lift_factor", "centre_shift_m", "profile_drag", "lag_s")
 WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag")
@@ -65,8 +71,7 @@ def test_a_heading_is_no_yaw() -> None:
 def test_the_result_names_what_was_sought() -> None:
     """The corrections, and those left out have the values of the physical guess."""
     found = identify(
-        reference_aircraft(),
-        reference_flight(),
+        *reference_documents(),
         [shortened(example("rate_0.8"), 40)],
         model=ModelSettings(links_per_wing=1),
         search=SearchSettings(iterations=2),

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore import simulate
 from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, ModelSettings, SearchSettings, Step
@@ -17,7 +16,14 @@ from morphcore.identify.study import Study, study, study_from_request
 from morphcore.identify.study_timing import ROUNDS, timed_flight
 from morphdata.study import StudyRequest
 from tests.identification_request import identification
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
+from tests.simulate.flights import fly
 
 QUICK = SearchSettings(seed=3, screen=16, starts=2, iterations=3)
 TRAIN = shortened(example("rate_0.8"), 80)
@@ -117,7 +123,7 @@ def test_the_models_of_a_study_fly(undisturbed: tuple[Study, list[Step]]) -> Non
     """
     run, steps = undisturbed
     row = run.result(steps[-1].checkpoint).row(2)
-    flown = simulate(reference_aircraft(), reference_flight(), TRAIN, model=row.batch).trajectory
+    flown = fly(reference_aircraft(), reference_flight(), TRAIN, model=row.batch).trajectory
     J = np.sum((flown.euler - TRAIN.euler) ** 2)
     assert row.J_train == pytest.approx(J, rel=1e-6)
 
@@ -238,7 +244,7 @@ def test_the_example_flights_want_few_links(seed: int) -> None:
     samples = [example(name) for name in ("rate_0.2", "rate_0.5", "rate_0.8")]
     samples.append(example("asymmetric", "held_out"))
     search = SearchSettings(seed=seed)
-    document = study(reference_aircraft(), reference_flight(), samples, search=search).to_document()
+    document = study(*reference_documents(), samples, search=search).to_document()
     for row in document["rows"]:
         print({name: value for name, value in row.items() if name not in ("fit", "model")})
     print(document["rigid"], document["recommended"])

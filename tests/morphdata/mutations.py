@@ -58,11 +58,15 @@ def _change(draw: st.DrawFn, document: Any, place: Place) -> None:
     elif kind == "perturb" and isinstance(value, int | float) and not isinstance(value, bool):
         parent[key] = value * draw(st.sampled_from(FACTORS))
     elif kind == "extra" and isinstance(value, dict):
-        value[draw(st.sampled_from([*EXTRA, *(name[::-1] for name in value)]))] = draw(st.sampled_from(ODD))
+        value[draw(st.sampled_from([*EXTRA, *(name[::-1] for name in value)]))] = _odd(draw)
     elif kind == "swap":
         other = draw(st.sampled_from(list(parent) if isinstance(parent, dict) else range(len(parent))))
         parent[key], parent[other] = parent[other], value
     elif kind == "twice" and isinstance(value, list):
         value.extend(copy.deepcopy(value))
     else:
-        parent[key] = draw(st.sampled_from(ODD))
+        parent[key] = _odd(draw)
+
+
+def _odd(draw: st.DrawFn) -> Any:
+    return copy.deepcopy(draw(st.sampled_from(ODD)))  # further changes go into it

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from app.settings import Settings
+from morphdata.aircraft import EXAMPLE_AIRCRAFT, EXAMPLE_MATERIAL
 from morphdata.faults import InvalidInput
 from morphdata.identify import EXAMPLE_REQUEST
 from morphdata.operations import operation_named
@@ -27,6 +28,34 @@ from tests.morphdata.mutations import mutated
 from worker.operations import WorkRefused, find_operation
 
 Document = dict[str, Any]
+
+SPLINE = {"kind": "spline", "knot_time_s": [0.0, 1.0, 2.0], "knot_angle_rad": [0.0, 0.5, 1.0]}
+TABLE = {"kind": "tabulated", "time_s": [0.0, 1.0, 2.0], "angle_rad": [0.0, 0.5, 1.0]}
+AIR = {
+    "gust": {"amplitude_m_s": 3.0, "gradient_m": 30.0, "start_s": 0.5, "direction_n": [0.0, 0.0, -1.0]},
+    "turbulence": {"wind_20ft_m_s": 7.7, "sigma_high_m_s": 1.5},
+    "seed": 4,
+}
+TAIL = {
+    "name": "tail",
+    "side": "right",
+    "span_m": 1.0,
+    "root_chord_m": 0.3,
+    "tip_chord_m": 0.2,
+    "thickness_m": 0.03,
+    "material": EXAMPLE_MATERIAL,
+    "section": {
+        "ei_flap_n_m2": 5e4,
+        "ei_lag_n_m2": 5e5,
+        "gj_n_m2": 3e4,
+        "mass_per_length_kg_m": 15.0,
+        "inertia_per_length_kg_m": [0.1, 0.2, 0.1],
+    },
+    "position_m": [-2.2, 0.0, 0.0],
+    "flexible": False,
+}
+BODY = {"mass_kg": 875.0, "inertia_kg_m2": [[60.0, 0.0, -1.0], [0.0, 1800.0, 0.0], [-1.0, 0.0, 1850.0]]}
+AS_IDENTIFIED = {"lattice": {"chordwise": 2, "spanwise": 6}, "step_s": 0.005, "start": "given"}
 
 RICH_IDENTIFICATION: Document = {
     **EXAMPLE_REQUEST,
@@ -66,7 +95,29 @@ RICH_OPTIMIZATION: Document = {
 EXAMPLES: dict[str, tuple[Document, ...]] = {
     "identify": (EXAMPLE_REQUEST, RICH_IDENTIFICATION),
     "study": (EXAMPLE_STUDY, {**RICH_IDENTIFICATION, "model": {"links_per_wing": [1, 2]}, "search": {}}),
-    "simulate": (EXAMPLE_SIMULATION,),
+    "simulate": (
+        EXAMPLE_SIMULATION,
+        EXAMPLE_SIMULATION
+        | {
+            "model": {"kind": "equivalent", "parameters": EXAMPLE_PARAMETERS | AS_IDENTIFIED},
+            "schedules": {"left": SPLINE, "right": TABLE},
+        },
+        EXAMPLE_SIMULATION
+        | {
+            "aircraft": {"fuselage": BODY, "surfaces": [*EXAMPLE_AIRCRAFT["surfaces"], TAIL]},
+            "flight": {"airspeed_m_s": 150.0, "mach": "auto", "wind_n_m_s": [1.0, 0.0, 0.0]},
+            "model": {"kind": "flexible", "elements": 4, "step_s": 0.002},
+            "output_step_s": 0.02,
+            "environment": AIR,
+        },
+        EXAMPLE_SIMULATION
+        | {
+            "model": {
+                "kind": "equivalent",
+                "parameters": {"model": EXAMPLE_PARAMETERS, "fit": [{"role": "train", "J_identified": 0.1}]},
+            }
+        },
+    ),
     "optimize": (EXAMPLE_OPTIMIZATION, RICH_OPTIMIZATION),
 }
 # what takes more than the request to see: whether a spline keeps the limits, the library finds by computing

@@ -10,13 +10,13 @@ import pytest
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import STEP_S, common_path
 from morphcore.simulate.schedule import ConstantRate, Spline
 from morphcore.stopping import Interrupted
 from morphcore.threads import thread_count, use_threads
 from morphdata.optimize import Weights
 from tests.identify.flights import reference_aircraft, reference_flight
+from tests.simulate.flights import fly
 
 SCHEDULES = (
     Spline(np.array([0.0, 0.2, 0.35, 0.6]), np.array([0.0, 0.1, 0.2, 0.4])),
@@ -52,7 +52,7 @@ def test_departures_are_those_of_the_simulator(flights):
     """
     flown = flights.fly(SCHEDULES, torque=False)
     for i, schedule in enumerate(SCHEDULES):
-        alone = simulate(
+        alone = fly(
             reference_aircraft(),
             reference_flight(),
             {"left": schedule, "right": schedule},

@@ -30,12 +30,13 @@ from morphcore.optimise import optimisation as module
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.state import decode
-from morphcore.simulate.flight import FlightStep, simulate
+from morphcore.simulate.flight import FlightStep
 from morphcore.simulate.schedule import Spline
 from morphcore.simulate.step_choice import choose_step
 from morphcore.swarm import SwarmSettings
-from tests.identify.flights import EXAMPLES, reference_aircraft, reference_flight
+from tests.identify.flights import EXAMPLES, reference_aircraft, reference_documents, reference_flight
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
+from tests.simulate.flights import fly
 
 SWARM = ScheduleSearch(method="pso", seed=3, swarm=SwarmSettings(particles=6, generations=3))
 TORQUE = Limits(max_rate_rad_s=0.9, max_hinge_torque_nm=560.0)  # the centre of the limits needs more
@@ -49,7 +50,7 @@ def without_times(document: dict[str, Any]) -> dict[str, Any]:
 
 def by_simulation(schedule: Any, model: Any, end_s: float) -> np.ndarray:
     """Departures (k, 3) of a schedule flown by the simulator's front door."""
-    flown = simulate(
+    flown = fly(
         reference_aircraft(),
         reference_flight(),
         {"left": schedule, "right": schedule},
@@ -285,7 +286,7 @@ class FlexibleDouble:
             yield FlightStep(quarter / 4)
         if self.diverges:
             raise FlightDiverged(time_s=0.3)
-        yield FlightStep(1.0, simulate(*args, model="rigid", **options))
+        yield FlightStep(1.0, fly(*args, model="rigid", **options))
 
 
 @pytest.fixture
@@ -352,9 +353,7 @@ def test_one_parameter_set_is_needed() -> None:
     """A batch of several models is not one model to optimise with."""
     guess = physical_guess(chain_model(reference_aircraft(), reference_flight(), 2))
     with pytest.raises(InvalidInput) as caught:
-        optimise_schedule(
-            reference_aircraft(), reference_flight(), guess.select(np.array([0, 0])), morph=SHORT
-        )
+        optimise_schedule(*reference_documents(), guess.select(np.array([0, 0])), morph=SHORT)
     assert caught.value.pointer == "/model/parameters"
 
 
@@ -394,8 +393,7 @@ def test_the_papers_problem_in_the_flexible_model() -> None:
     """With three links the default search ends a quarter below constant rate in the flexible model too."""
     parameters = physical_guess(chain_model(reference_aircraft(), reference_flight(), 3))
     result = optimise_schedule(
-        reference_aircraft(),
-        reference_flight(),
+        *reference_documents(),
         parameters,
         morph=Morph(final_rad=1.0, duration_s=2.0),
         limits=Limits(max_rate_rad_s=1.0),
