@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Double, Engine, Table, create_engine, event, inspect, make_url, text
+from sqlalchemy import URL, Double, Engine, Table, create_engine, event, inspect, make_url, select, text
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.ext.compiler import compiles
@@ -65,6 +65,11 @@ def _sqlite_time(_element: database_time, _compiler: SQLCompiler, **_options: An
 @compiles(database_time, "postgresql")
 def _postgres_time(_element: database_time, _compiler: SQLCompiler, **_options: Any) -> str:
     return "CAST(extract(epoch FROM clock_timestamp()) AS DOUBLE PRECISION)"
+
+
+def current_time(session: Session) -> float:
+    """Read the database's clock, s since 1970 UTC."""
+    return float(session.execute(select(database_time())).scalar_one())
 
 
 def insert_new(session: Session, table: Table) -> Any:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from morphdata.faults import Fault
-from morphdata.samplefiles.fault import Pickled
+from morphdata.faults import Fault, Pickled
 
 
 @dataclass(eq=False)
@@ -48,7 +48,7 @@ class InvalidRequest(ServiceError):
     title = "The request is not valid"
 
     @classmethod
-    def of(cls, faults: list[Fault]) -> InvalidRequest:
+    def of(cls, faults: Sequence[Fault]) -> InvalidRequest:
         """Bundle one or more faults; the first is told at the top."""
         first = faults[0]
         more = f" ({len(faults) - 1} more below)" if len(faults) > 1 else ""

@@ -12,7 +12,8 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app.afterwards import Afterwards
+from app import on_end  # noqa: F401 - the API ends jobs: it cancels them, and its reaper ends some
+from app.background_writer import BackgroundWriter
 from app.database import Database, upgrade
 from app.errors import TooManyStreams
 from app.health.endpoints import router as health
@@ -25,7 +26,6 @@ from app.http.observed import Observed
 from app.http.problems import install_problem_handlers
 from app.http.request_id import RequestId
 from app.http.security_headers import SecurityHeaders
-from app.identify.endpoints import router as identify
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
 from app.jobs.upkeep import Upkeep
@@ -38,21 +38,19 @@ from app.models.endpoints import router as models
 from app.observability.logs import configure_logging
 from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
-from app.optimize.endpoints import router as optimize
+from app.operations.endpoints import router as operations
 from app.owner_limit import OwnerLimit
 from app.owner_turns import OwnerTurns
 from app.parsing.confinement import Limits
 from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
-from app.simulate.endpoints import router as simulate
-from app.study.endpoints import router as study
 from app.trajectories.endpoints import router as trajectories
-from app.version import VERSION
 from app.web.endpoints import mount_static
 from app.web.endpoints import router as web
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
+from morphdata.version import VERSION
 
 BODIES_AT_ONCE = 16  # of the largest size
 READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too
@@ -62,7 +60,7 @@ def routed_app() -> FastAPI:
     """Return the application with its routes, without settings, database or broker."""
     app = FastAPI(title="MorphID", version=VERSION, docs_url=None, redoc_url=None)
     data = (trajectories, models, webhooks, keys)
-    for router in (identify, study, simulate, optimize, jobs, *data, health, web):
+    for router in (operations, jobs, *data, health, web):
         app.include_router(router)
     mount_static(app)
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]  # FastAPI's documented way
@@ -84,7 +82,7 @@ def create_app(settings: Settings | None = None, *, sending: SenderSettings | No
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
     app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
-    install_problem_handlers(app, known_fields=lambda: _request_fields(app))
+    install_problem_handlers(app)
     bodies = BODIES_AT_ONCE * chosen.max_body_bytes
     limits = BodyLimits(
         chosen.max_body_bytes,
@@ -103,14 +101,6 @@ def _wrap(app: FastAPI) -> None:
     """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
     inner = app.build_middleware_stack
     app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
-
-
-def _request_fields(app: FastAPI) -> list[str]:
-    """Names of all documented fields, to guess what a misspelt one meant."""
-    names: set[str] = set()
-    for schema in openapi_document(app)["components"]["schemas"].values():
-        names.update(schema.get("properties", {}))
-    return sorted(names)
 
 
 def _sending(settings: Settings) -> SenderSettings:
@@ -132,8 +122,8 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
         database = Database(settings.database_url)
         publisher = Publisher(settings.broker_url)
         watcher = JobWatcher(database, settings.event_poll_s)
-        afterwards = Afterwards(database)
-        keys = KeyRing(database, afterwards)
+        background = BackgroundWriter(database)
+        keys = KeyRing(database, background)
         key_watch = KeyWatch(database)
         app.state.service = Service(
             settings=settings,
@@ -143,7 +133,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             queue=QueueView(),
             keys=keys,
             key_watch=key_watch,
-            afterwards=afterwards,
+            background=background,
             parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
             reads=_turns(settings, READS_AT_ONCE),
             streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
@@ -151,7 +141,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             webhook_policy=sending.policy,
         )
         app.state.health = Health(database, settings)
-        afterwards.start()
+        background.start()
         publisher.start()
         watcher.start()
         key_watch.start()
@@ -168,7 +158,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             await asyncio.to_thread(upkeep.stop)
             await asyncio.to_thread(sender.stop)
             await asyncio.to_thread(publisher.stop)
-            await asyncio.to_thread(afterwards.stop)
+            await asyncio.to_thread(background.stop)
             database.dispose()
             await asyncio.to_thread(stop_tracing)
 

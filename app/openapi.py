@@ -22,8 +22,9 @@ from app.errors import (
 from app.http.problems import MEDIA_TYPE, documented
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
-from app.version import VERSION
 from app.webhooks.endpoints import messages
+from morphdata.operations import OPERATIONS
+from morphdata.version import VERSION
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"
@@ -48,10 +49,7 @@ A service beyond its own machine demands an API key: `Authorization: Bearer mid_
 scope that the key must have; `GET /me` tells what yours has.
 """
 TAGS = [
-    {"name": "identify", "description": "From sample flights to an equivalent model."},
-    {"name": "study", "description": "How many links a model should have."},
-    {"name": "simulate", "description": "Flights of the rigid, the equivalent and the flexible model."},
-    {"name": "optimize", "description": "Morph schedules that disturb the attitude least."},
+    *({"name": operation.name, "description": operation.subject} for operation in OPERATIONS),
     {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
     {"name": "trajectories", "description": "Sample flights as files."},
     {"name": "models", "description": "Identified models."},

@@ -20,10 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from verdict import verdict
 
 from morphid.broker import free_port
-from morphid.commands.identify import show_model
+from morphid.commands.identify import show_fit, show_verdict
 from morphid.exits import CommandError
 from morphid.screen import meter, print_job_error, stdout
 from morphid.service import Service
@@ -79,7 +78,7 @@ def service() -> Iterator[str]:
         process.communicate()
 
 
-def show_verdict(console: Console, result: dict[str, Any]) -> None:
+def judge(console: Console, result: dict[str, Any]) -> None:
     """Print warnings, verdict and what to do next."""
     for warning in result.get("warnings") or ():
         console.print(f"Warning: {warning['message']}; {warning['hint']}.", style="yellow", markup=False)
@@ -88,13 +87,7 @@ def show_verdict(console: Console, result: dict[str, Any]) -> None:
         f"--flight examples/flight.json --parameters {shown(OUTPUT / 'result.json')} "
         "--final 1.0 --duration 2.0"
     )
-    judged = verdict(result, use)
-    console.print(f"Verdict: {judged.grade}", style="bold")
-    for reason in judged.reasons:
-        console.print(f"  {reason}", markup=False, soft_wrap=True)
-    console.print("What to do next", style="bold")
-    for step in judged.next_steps:
-        console.print(f"  {step}", markup=False, soft_wrap=True)
+    show_verdict(result, use)
 
 
 def shown(path: Path) -> str:
@@ -127,8 +120,8 @@ def main() -> int:
         result, files = client.result(job["id"]), client.artifacts(job["id"])
     for name, content in files.items():
         (OUTPUT / name).write_bytes(content)
-    show_model(result)
-    show_verdict(console, result)
+    show_fit(result)
+    judge(console, result)
     search = result["search"]
     console.print(
         f"{search['flights']:,} flights in {search['wall_s']:.1f} s; "

@@ -6,14 +6,15 @@ what lies inside a room by ``from morphcore.identify.settings import ...``.
 
 from __future__ import annotations
 
-from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
-from morphcore.identify import Identification, IdentifyResult, identification_from_document, identify
+from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
 from morphcore.identify.study import study
 from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.version import VERSION
 from morphcore.warming import warm_up, warm_up_further
+from morphdata.aircraft import Aircraft, load_aircraft
+from morphdata.flight import Flight, load_flight
+from morphdata.version import VERSION
 
 __version__ = VERSION
 
@@ -25,7 +26,7 @@ __all__ = [
     "Simulation",
     "Trajectory",
     "__version__",
-    "identification_from_document",
+    "identification_from_request",
     "identify",
     "load_aircraft",
     "load_flight",

@@ -1,38 +1,10 @@
-"""The error tree of the library: every error carries data and a sentence that says what to do."""
+"""The errors of the numeric library: each carries data and a sentence that says what to do."""
 
 from __future__ import annotations
 
-from morphdata.samplefiles.fault import Pickled
+from morphdata.faults import InvalidInput, MorphError
 
-
-class MorphError(Pickled, Exception):
-    """Base of all errors raised by morphcore.
-
-    Parameters
-    ----------
-    message : what is wrong, as a sentence.
-    pointer : JSON pointer (RFC 6901) to the offending field of the input document, "" for the whole.
-    hint : what the user can do about it.
-    """
-
-    code = "error"
-
-    def __init__(self, message: str, *, pointer: str = "", hint: str = "") -> None:
-        super().__init__(message)
-        self.message = message
-        self.pointer = pointer
-        self.hint = hint
-
-    def __str__(self) -> str:
-        where = f"{self.pointer}: " if self.pointer else ""
-        hint = f" ({self.hint})" if self.hint else ""
-        return f"{where}{self.message}{hint}"
-
-
-class InvalidInput(MorphError):
-    """A field of the input is missing, malformed or out of its range."""
-
-    code = "invalid_input"
+__all__ = ["FlightDiverged", "InvalidInput", "MorphError", "NotFlyable", "TrimNotFound", "UnsupportedRegime"]
 
 
 class NotFlyable(MorphError):

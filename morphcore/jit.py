@@ -15,27 +15,94 @@ With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the sa
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
 
 log = logging.getLogger(__name__)
 
 NO_CACHE = "no locator available"  # numba's words where it finds no folder for compiled code
 FAST_MATH = {"nsz"}
-WITHOUT_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-def compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
-    """Compile with the flags above and some more."""
-    decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
-        error_model="numpy", fastmath=FAST_MATH, nogil=True, **options
-    )
-    return decorate(function)
+class _PartOfEntries(JITCodeLibrary):
+    """The code of a kernel that only kernels call, for the linker: it is optimised with the entries.
+
+    Numba would optimise it, with all that it calls, and make machine code of it that nobody runs, at every
+    level of the calls; that is a quarter of the compiler's time.
+    """
+
+    def _optimize_final_module(self) -> None:
+        """Leave the optimisation to the entries."""
+
+    def _finalize_final_module(self) -> None:
+        """Make no machine code."""
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002 - there are no functions to call
+        """No address, as numba has it for a function without a wrapper for Python."""
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        """Itself, for `set_env`, the one thing that numba asks of it here."""
+        return self
+
+    def set_env(self, env_name: str, env: object) -> None:
+        """Do nothing: the environment is for errors and objects, which kernels have none of."""
+
+
+class _PartCompiler(Compiler):
+    """Numba's compiler, writing into a `_PartOfEntries`."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, args: Any, *rest: Any) -> None:
+        super().__init__(typingctx, targetctx, library, args, *rest)
+        self.state.library = _PartOfEntries(self.state.targetctx.codegen(), "kernel")
+
+
+class _SharedCache(FunctionCache):
+    """Numba's cache, safe for processes that compile the same entry for different types at the same time.
+
+    Numba reads the index of an entry, adds a line and writes it back: two processes that do so at once give
+    both pieces of code the same file.
+    """
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code while no other process does."""
+        with _locked(Path(self.cache_path)):
+            super().save_overload(sig, data)
+
+    @property
+    def filled(self) -> bool:
+        """Whether there is code of this version of the source."""
+        return bool(self._cache_file._load_index())  # noqa: SLF001 - a subclass
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock, where the file system has locks."""
+    with contextlib.ExitStack() as held:
+        if fcntl is not None:
+            with contextlib.suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+                file = held.enter_context((folder / "morphcore.lock").open("w"))
+                fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 class WithoutDoor(CPUDispatcher):
@@ -46,27 +113,65 @@ class WithoutDoor(CPUDispatcher):
         raise TypeError(f"{self.py_func.__name__} is called by kernels only (see tests/kernels.py)")
 
 
+class Inlined(CPUDispatcher):
+    """A function that is pasted into the kernels that call it. Python runs its Python."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function that was decorated."""
+        return self.py_func(*arguments)
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    """Compile with the flags above and some more."""
+    decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
+        error_model="numpy", fastmath=FAST_MATH, nogil=True, **options
+    )
+    return decorate(function)
+
+
+def _part(function: Callable[..., Any], python: type[CPUDispatcher], **options: Any) -> Callable[..., Any]:
+    found = compiled(
+        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **options
+    )
+    if isinstance(found, CPUDispatcher):  # else compilation is switched off
+        found.__class__ = python
+    return found
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
 
     It is cached as part of the entries that call it, and has no door for Python: doors would take a seventh
     of the time to compile them all. Tests make their own (tests/kernels.py).
     """
-    found = compiled(function, **WITHOUT_DOORS)
-    if isinstance(found, CPUDispatcher):  # else compilation is switched off
-        found.__class__ = WithoutDoor
-    return found
+    return _part(function, WithoutDoor)
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function that is pasted into the kernels that call it: short scalar ones, parts of a step.
+
+    LLVM does that. Numba's own ``inline="always"`` would infer the types of its lines anew in every kernel.
+    """
+    return _part(function, Inlined, forceinline=True)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that Python calls; cached where there is a folder to keep it in."""
-    try:
-        return compiled(function, cache=True)
-    except RuntimeError as error:
-        if NO_CACHE not in str(error):
-            raise
-        _warn_of_no_cache()
-        return compiled(function)
+    found: Any = compiled(function)
+    if isinstance(found, CPUDispatcher):
+        try:
+            vars(found)["_cache"] = _SharedCache(function)  # as cache=True does, with numba's own
+        except RuntimeError as error:
+            if NO_CACHE not in str(error):
+                raise
+            _warn_of_no_cache()
+    return found
+
+
+def is_kept(entry: Callable[..., Any]) -> bool | None:
+    """Whether the cache holds compiled code of an entry; None where nothing is compiled or kept."""
+    cache = getattr(entry, "_cache", None)
+    return cache.filled if isinstance(cache, _SharedCache) else None
 
 
 @functools.cache
@@ -75,8 +180,3 @@ def _warn_of_no_cache() -> None:
         "compiled kernels cannot be kept: they fit neither beside morphcore nor in a home folder. Each "
         "process compiles anew, for minutes; set NUMBA_CACHE_DIR to a folder that this user may write"
     )
-
-
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function that is pasted into the kernels that call it: short scalar ones, parts of a step."""
-    return compiled(function, inline="always")

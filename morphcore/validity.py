@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.atmosphere import standard_atmosphere
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.overlap import overlapping_surfaces
+from morphdata.atmosphere import standard_atmosphere
 
 Array = NDArray[np.float64]
 

@@ -7,27 +7,15 @@ import importlib
 import numpy as np
 
 from morphcore import evolution, swarm
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
-from morphcore.simulate.flight import simulate
+from morphcore.simulate.compilation import SMALL, compile_flights, tiny_aircraft
+from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
-
-_WING = {
-    "span_m": 1.0,
-    "chord_m": 0.2,
-    "thickness_m": 0.02,
-    "material": {"density_kg_m3": 500.0, "youngs_modulus_pa": 1e10},
-}
-
-
-_SMALL = LatticeSettings(chordwise=1, spanwise=4)
-_SIDES = (("right", 0.1), ("left", -0.1))
 
 
 def warm_up(threads: int | None = None) -> None:
@@ -38,9 +26,9 @@ def warm_up(threads: int | None = None) -> None:
     """
     if threads is not None:
         use_threads(threads)
-    aircraft, flight, sample = _tiny()
-    model = chain_model(aircraft, flight, 2, _SMALL)
-    cases = sample_cases(model, [sample])
+    compile_flights()
+    model = chain_model(*tiny_aircraft(), 2, SMALL)
+    cases = sample_cases(model, [_tiny_sample()])
     guess = physical_guess(model)
     costs(model, guess, cases, "trim")  # one lane, then blocks of them
     costs(model, guess.select(np.zeros(2, dtype=np.int64)), cases, "trim")
@@ -48,32 +36,23 @@ def warm_up(threads: int | None = None) -> None:
 
 def warm_up_further() -> None:
     """Fly with hinge torques and with beams: the kernels and packages of all other jobs are loaded too."""
-    aircraft, flight, sample = _tiny()
-    model = chain_model(aircraft, flight, 2, _SMALL)
-    held = flight_plan(model, [Hold()] * len(_SIDES), time_grid(sample.time_s))
+    aircraft, flight = tiny_aircraft()
+    sample = _tiny_sample()
+    model = chain_model(aircraft, flight, 2, SMALL)
+    held = flight_plan(model, [Hold()] * len(aircraft.surfaces), time_grid(sample.time_s))
     states = np.zeros((held.grid.steps + 1, model.state_rows))
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
-    simulate(aircraft, flight, sample, model="flexible", elements=1, lattice=_SMALL, step_s=0.01)
+    for _ in flight_steps(aircraft, flight, sample, model="flexible", elements=1, lattice=SMALL, step_s=0.01):
+        pass
     # packages that the searches load when they are first needed
     importlib.import_module("scipy.stats")
     evolution.strategies()
     swarm.operators()
 
 
-def _tiny() -> tuple[Aircraft, Flight, Trajectory]:
-    """A small aircraft and a flight of three rows."""
-    aircraft = aircraft_from_document(
-        {
-            "fuselage": {"length_m": 1.0, "width_m": 0.2, "height_m": 0.2, "density_kg_m3": 100.0},
-            "surfaces": [
-                {"name": side, "side": side, **_WING, "hinge": {"position_m": [0.0, y, 0.0], "axis": "z"}}
-                for side, y in _SIDES
-            ],
-        }
-    )
-    flight = flight_from_document({"airspeed_m_s": 30.0, "gravity_m_s2": 9.81})
+def _tiny_sample() -> Trajectory:
+    """A flight of four rows in which both wings turn."""
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
-    sample = Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
-    return aircraft, flight, sample
+    return Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from morphdata.fields import Angle, Length, Position, Strict, Text
+from morphdata.base import Angle, Document, Length, Position, Text
+from morphdata.faults import Fault
 
 HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
 MAX_SURFACES = 16
@@ -41,10 +44,14 @@ EXAMPLE_AIRCRAFT: dict[str, Any] = {
 
 Inertia = Annotated[float, Field(ge=-1e12, le=1e12)]
 Row3 = Annotated[list[Inertia], Field(min_length=3, max_length=3)]
+Matrix3 = list[list[float]]
 Stiffness = Annotated[float, Field(gt=0.0, le=1e15)]
+Chord = Annotated[float, Field(gt=0.0, le=50.0)]
+ROUND_OFF = 1e-9  # relative, of the terms of an inertia
+BOX = ("length_m", "width_m", "height_m", "density_kg_m3")
 
 
-class Fuselage(Strict):
+class Fuselage(Document):
     """A rigid body: a box of uniform density, or mass and inertia given outright."""
 
     shape: Literal["box"] | None = Field(
@@ -66,19 +73,85 @@ class Fuselage(Strict):
         default=None, description="From the reference point, body axes."
     )
 
+    def faults(self) -> Iterator[Fault]:
+        """A box is whole, or mass and inertia are both given; the inertia is that of a body."""
+        if self.mass_kg is None:
+            for name in BOX:
+                if getattr(self, name) is None:
+                    yield Fault(
+                        "missing",
+                        f"A box needs {name}.",
+                        f"/{name}",
+                        f"Add {name}, or give mass_kg and inertia_kg_m2 instead of a box.",
+                    )
+        elif self.inertia_kg_m2 is None:
+            yield Fault(
+                "missing",
+                "A given mass needs a given inertia.",
+                "/inertia_kg_m2",
+                "Add three diagonal terms or a 3 x 3 matrix about the centre of mass.",
+            )
+        if self.inertia_kg_m2 is not None and not _is_inertia(inertia_matrix(self.inertia_kg_m2)):
+            yield Fault(
+                "inertia_not_physical",
+                "This matrix is not the inertia of a body: it must be symmetric and positive definite, and "
+                "no principal moment may exceed the sum of the other two.",
+                "/inertia_kg_m2",
+                "Check signs and symmetry; products of inertia enter with their minus sign.",
+            )
 
-class Material(Strict):
+
+def inertia_matrix(given: Sequence[float | list[float]]) -> Matrix3:
+    """Return the 3 x 3 matrix of an inertia that is given so, or by its diagonal."""
+    return [
+        row if isinstance(row, list) else [row if column == number else 0.0 for column in range(3)]
+        for number, row in enumerate(given)
+    ]
+
+
+def _is_inertia(m: Matrix3) -> bool:
+    """Whether a matrix is symmetric, positive definite and keeps the triangle inequality.
+
+    Moments of inertia are J = tr(P) - P with the second moments P of the mass, which are not negative.
+    """
+    scale = max(abs(term) for row in m for term in row) or 1.0
+    if any(abs(m[i][j] - m[j][i]) > ROUND_OFF * scale for i in range(3) for j in range(i)):
+        return False
+    half = (m[0][0] + m[1][1] + m[2][2]) / 2.0 + ROUND_OFF * scale
+    return _is_positive(m) and _is_positive(
+        [[(half if i == j else 0.0) - m[i][j] for j in range(3)] for i in range(3)]
+    )
+
+
+def _is_positive(m: Matrix3) -> bool:
+    """Whether a symmetric matrix is positive definite, by Sylvester's leading minors."""
+    first = m[0][0]
+    second = m[0][0] * m[1][1] - m[0][1] * m[1][0]
+    third = (
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+        - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+        + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    )
+    return first > 0.0 and second > 0.0 and third > 0.0
+
+
+class Material(Document):
     """An isotropic material."""
 
     density_kg_m3: float = Field(gt=0.0, le=30_000.0)
     youngs_modulus_pa: float = Field(gt=0.0, le=2e12)
-    poisson_ratio: float = Field(default=0.3, gt=-1.0, le=0.5)
+    poisson_ratio: float = Field(default=0.3, ge=-0.99, le=0.5)
     stiffness_damping_s: float = Field(
         default=0.0, ge=0.0, le=10.0, description="Damping as a multiple of stiffness, c = beta k."
     )
 
+    @property
+    def shear_modulus_pa(self) -> float:
+        """G = E / (2 (1 + nu))."""
+        return self.youngs_modulus_pa / (2 * (1 + self.poisson_ratio))
 
-class Section(Strict):
+
+class Section(Document):
     """Section properties given outright, instead of those of a solid box."""
 
     ei_flap_n_m2: Stiffness
@@ -89,8 +162,18 @@ class Section(Strict):
         min_length=3, max_length=3, description="About x, y, z of the section's centre of mass."
     )
 
+    def faults(self) -> Iterator[Fault]:
+        """A section that twists has a moment of inertia about the span."""
+        if self.inertia_per_length_kg_m[1] == 0.0:
+            yield Fault(
+                "greater_than",
+                "The section has no moment of inertia about y, the span.",
+                "/inertia_per_length_kg_m/1",
+                "Give the moments about chord axis, span axis and normal; the second must be more than 0.",
+            )
 
-class Hinge(Strict):
+
+class Hinge(Document):
     """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence."""
 
     position_m: Position = Field(
@@ -104,18 +187,33 @@ class Hinge(Strict):
         default=HINGE_RANGE_RAD, description="Greatest angle; samples beyond it are refused."
     )
 
+    @property
+    def axis_index(self) -> int:
+        """0, 1 or 2 for x, y, z."""
+        return "xyz".index(self.axis)
 
-class Surface(Strict):
+    def faults(self) -> Iterator[Fault]:
+        """The range has a width."""
+        if self.min_rad >= self.max_rad:
+            yield Fault(
+                "range_upside_down",
+                f"min_rad {self.min_rad:g} is not below max_rad {self.max_rad:g}.",
+                "/min_rad",
+                "Swap them, or correct one.",
+            )
+
+
+class Surface(Document):
     """A lifting surface, hinged (it morphs) or fixed (a tail)."""
 
     name: Text
     side: Literal["right", "left"]
     span_m: Length
-    chord_m: Annotated[float, Field(gt=0.0, le=50.0)] | None = Field(
+    chord_m: Chord | None = Field(
         default=None, description="Uniform chord, or the chord where root or tip is not given."
     )
-    root_chord_m: Annotated[float, Field(gt=0.0, le=50.0)] | None = None
-    tip_chord_m: Annotated[float, Field(gt=0.0, le=50.0)] | None = None
+    root_chord_m: Chord | None = None
+    tip_chord_m: Chord | None = None
     thickness_m: Annotated[float, Field(gt=0.0, le=10.0)]
     material: Material
     section: Section | None = None
@@ -133,8 +231,44 @@ class Surface(Strict):
     )
     flexible: bool = True
 
+    @property
+    def root_and_tip_chord_m(self) -> tuple[float, float]:
+        """Chord at the root and at the tip."""
+        chords = [self.chord_m if chord is None else chord for chord in (self.root_chord_m, self.tip_chord_m)]
+        return float(chords[0] or 0.0), float(chords[1] or 0.0)
 
-class Aircraft(Strict):
+    @property
+    def root_m(self) -> list[float]:
+        """Where the root's mid-chord is in the unswept aircraft, body axes: at the hinge where not said."""
+        return self.position_m or (self.hinge.position_m if self.hinge else [0.0, 0.0, 0.0])
+
+    def faults(self) -> Iterator[Fault]:
+        """The chord is known, the surface is attached, its axes lie within reach of the chord."""
+        root, tip = self.root_and_tip_chord_m
+        if not (root and tip):
+            yield Fault(
+                "missing", "The chord is not given.", "/chord_m", "Add chord_m, or root and tip chord."
+            )
+            return
+        for name in ("elastic_axis_offset_m", "mass_axis_offset_m"):
+            offset = getattr(self, name)
+            if abs(offset) > root:
+                yield Fault(
+                    "axis_outside",
+                    f"{name} is {offset:g}, more than the chord of {root:g} m at the root.",
+                    f"/{name}",
+                    "It is counted from mid-chord, in m, aft positive.",
+                )
+        if self.hinge is None and self.position_m is None:
+            yield Fault(
+                "missing",
+                f"{self.name!r} is attached nowhere.",
+                "/hinge",
+                "Add a hinge, or position_m for a fixed surface.",
+            )
+
+
+class Aircraft(Document):
     """A fuselage with its lifting surfaces."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_AIRCRAFT]})
@@ -142,3 +276,27 @@ class Aircraft(Strict):
     name: Text = "aircraft"
     fuselage: Fuselage
     surfaces: list[Surface] = Field(min_length=1, max_length=MAX_SURFACES)
+
+    def faults(self) -> Iterator[Fault]:
+        """No two surfaces have one name."""
+        names: set[str] = set()
+        for number, surface in enumerate(self.surfaces):
+            if surface.name in names:
+                yield Fault(
+                    "name_not_unique",
+                    f"Two surfaces are called {surface.name!r}.",
+                    f"/surfaces/{number}/name",
+                    "Rename one.",
+                )
+            names.add(surface.name)
+
+
+def load_aircraft(path: str | Path) -> Aircraft:
+    """Read an aircraft from its JSON file.
+
+    Raises
+    ------
+    InvalidInput
+        Naming every fault, with pointers that begin with ``/aircraft``.
+    """
+    return Aircraft.load(path, "/aircraft")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from morphdata.fields import Strict
+from morphdata.base import Document
 
 MAX_PRIORITY = 100
 MAX_LABEL = 100
@@ -17,7 +17,7 @@ MAX_CHUNKS = 256
 Label = Annotated[str, Field(min_length=1, max_length=MAX_LABEL, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
-class Execution(Strict):
+class Execution(Document):
     """How the job is run; the result is the same whatever stands here."""
 
     priority: int = Field(
@@ -51,10 +51,19 @@ class SpreadExecution(Execution):
     )
 
 
-class Executed(Protocol):
-    """A request that says how it is run."""
+class Request(Document):
+    """Base of the requests for long work."""
 
-    @property
-    def execution(self) -> Execution:
-        """How."""
-        ...
+    execution: Execution = Execution()
+
+    def document(self) -> dict[str, Any]:
+        """Build the JSON document of this request; today's defaults are written out.
+
+        Parsed again, by a later version too, it is the same request. Aircraft and flight stand in it as they
+        came: they are documents of the user's own.
+        """
+        own = {"aircraft", "flight"} & type(self).model_fields.keys()
+        return {
+            **self.model_dump(exclude_none=True, exclude_unset=True, include=own),
+            **self.model_dump(exclude_none=True, exclude=own),
+        }

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from morphdata.fields import Strict, Vector3
+from morphdata.atmosphere import standard_atmosphere
+from morphdata.base import Document, Vector3
+from morphdata.faults import Fault
 
 MACH_LIMIT = 0.7  # Prandtl-Glauert's linear compressibility holds up to here
 # an enumeration of one: generated clients take a constant beside a number for the only choice
@@ -26,7 +30,7 @@ EXAMPLE_FLIGHT: dict[str, Any] = {
 }
 
 
-class Start(Strict):
+class Start(Document):
     """A measured start: attitude against the air and the constant force and moment that hold it."""
 
     alpha_rad: float = Field(ge=-0.5, le=0.5)
@@ -36,7 +40,7 @@ class Start(Strict):
     )
 
 
-class Flight(Strict):
+class Flight(Document):
     """Speed, air and start of every sample."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_FLIGHT]})
@@ -52,3 +56,39 @@ class Flight(Strict):
     )
     wind_n_m_s: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Velocity of the air, earth axes (NED).")
     start: Start | None = Field(default=None, description='Needed for `model.start = "given"`.')
+
+    @property
+    def mach_number(self) -> float | None:
+        """Mach number; None for incompressible flow."""
+        if self.mach != "auto":
+            return self.mach
+        return self.airspeed_m_s / standard_atmosphere(self.altitude_m).speed_of_sound_m_s
+
+    @property
+    def density_kg_m3(self) -> float:
+        """Density of the air, given or the standard atmosphere's."""
+        if self.air_density_kg_m3 is not None:
+            return self.air_density_kg_m3
+        return standard_atmosphere(self.altitude_m).density_kg_m3
+
+    def faults(self) -> Iterator[Fault]:
+        """A Mach number that follows from speed and altitude is one that the method holds for."""
+        mach = self.mach_number
+        if mach is not None and mach > MACH_LIMIT:
+            yield Fault(
+                "unsupported_regime",
+                f"{self.airspeed_m_s:g} m/s at {self.altitude_m:g} m is Mach {mach:.2f}.",
+                "/mach",
+                f"Linear compressibility ends at Mach {MACH_LIMIT}: fly slower, or leave mach out.",
+            )
+
+
+def load_flight(path: str | Path) -> Flight:
+    """Read a flight condition from its JSON file.
+
+    Raises
+    ------
+    InvalidInput
+        Naming every fault, with pointers that begin with ``/flight``.
+    """
+    return Flight.load(path, "/flight")

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.execution import Execution, SpreadExecution
-from morphdata.fields import Strict
+from morphdata.base import Document
+from morphdata.execution import Request, SpreadExecution
+from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import Lattice, Start, StepS
-from morphdata.parameters import MAX_LINKS
-from morphdata.samples import EXAMPLE_SAMPLE, Sample
-from morphdata.search import WEEK_S, SwarmSearch, WarmStart
+from morphdata.options import MODEL, SEARCH, VEHICLE, Option
+from morphdata.parameters import MAX_LINKS, parameters_in
+from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
+from morphdata.search import SwarmSearch, WarmStart
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
+MAX_TOTAL_ROWS = 200_000
+MAX_DECADES = 12.0  # of bounds: more is no knowledge at all, and spoils a logarithmic search
+MIN_EVOLUTION = 4  # models of a generation of CMA-ES: of fewer the best half is no sample
 
 Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
@@ -26,7 +34,26 @@ Range = Annotated[
 ]
 
 
-class Bounds(Strict):
+class BoundLimit(NamedTuple):
+    """What the bounds of a parameter may be: its physical range, SI units."""
+
+    low: float
+    high: float
+    positive: bool = False  # searched on a logarithmic scale: zero is no bound
+
+
+BOUND_LIMITS = {
+    "stiffness_nm_rad": BoundLimit(0.0, 1e12, positive=True),
+    "damping_nms_rad": BoundLimit(0.0, 1e10, positive=True),
+    "division": BoundLimit(0.0, 1.0),
+    "lift_factor": BoundLimit(0.0, 10.0, positive=True),
+    "centre_shift_m": BoundLimit(-50.0, 50.0),
+    "profile_drag": BoundLimit(0.0, 2.0),
+    "lag_s": BoundLimit(0.0, 10.0, positive=True),
+}
+
+
+class Bounds(Document):
     """Where the search may look; what is left out gets bounds from beam theory around the physical guess."""
 
     stiffness_nm_rad: Range | None = None
@@ -37,11 +64,51 @@ class Bounds(Strict):
     profile_drag: Range | None = None
     lag_s: Range | None = None
 
+    def given(self) -> dict[str, tuple[float, float]]:
+        """Collect the bounds that are given, SI units."""
+        return {name: (low, high) for name, (low, high) in self.model_dump(exclude_none=True).items()}
 
-class SoughtModel(Strict):
-    """A model whose parameters are sought: wings of rigid links with gimbal joints."""
+    def faults(self) -> Iterator[Fault]:
+        """Check that each pair rises, is physical and can be searched."""
+        for name, pair in self.given().items():
+            yield from _bound_faults(name, *pair, BOUND_LIMITS[name])
 
-    separate_wings: bool = Field(
+
+def _bound_faults(name: str, low: float, high: float, limit: BoundLimit) -> Iterator[Fault]:
+    if low >= high:
+        yield Fault(
+            "range_upside_down",
+            f"The lower bound {low:g} is not below the upper bound {high:g}.",
+            f"/{name}/0",
+            "Give [low, high] with low < high.",
+        )
+    elif limit.positive and low <= 0.0:
+        yield Fault(
+            "bound_not_positive",
+            f"{name} is searched on a logarithmic scale; {low:g} has no logarithm.",
+            f"/{name}/0",
+            "Give a small positive lower bound, or leave the bounds out: beam theory gives them.",
+        )
+    elif low < limit.low or high > limit.high:
+        yield Fault(
+            "bound_out_of_range",
+            f"[{low:g}, {high:g}] leaves what is physical, [{limit.low:g}, {limit.high:g}].",
+            f"/{name}/{0 if low < limit.low else 1}",
+            "Narrow the bounds, or leave them out: they follow from beam theory.",
+        )
+    elif low > 0.0 and math.log10(high / low) > MAX_DECADES:
+        yield Fault(
+            "bound_too_wide",
+            f"[{low:g}, {high:g}] spans {math.log10(high / low):.0f} decades.",
+            f"/{name}/1",
+            f"Narrow it to {MAX_DECADES:g} decades, or leave the bounds out: beam theory gives them.",
+        )
+
+
+class SoughtModel(Document):
+    """A model whose parameters are searched: wings of rigid links with gimbal joints."""
+
+    separate_wings: Annotated[bool, Option("--separate-wings", MODEL)] = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
     aero_coefficients: list[Correction] | None = Field(
@@ -51,40 +118,97 @@ class SoughtModel(Strict):
         "Left out: those that the training samples can tell, which are all, but `profile_drag` only if one "
         "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad).",
     )
-    bounds: Bounds | None = None
+    bounds: Annotated[Bounds | None, Option("--bounds", MODEL)] = Field(
+        default=None, description="Where the search may look."
+    )
     lattice: Lattice = Lattice()
     step_s: StepS | None = Field(
         default=None,
         description="Longest time step. Left out: the longest of 10, 5 and 2.5 ms that holds the training "
         "samples' attitude to 5e-5 rad with the physical guess; the result's `model` says which.",
     )
-    start: Start = Field(
+    start: Annotated[Start, Option("--start", MODEL)] = Field(
         default="trim", description="Trim each model by itself, or start from `flight.start`."
     )
 
+    def numbers_of_links(self) -> Sequence[int]:
+        """List the numbers of links per wing of all models that are searched."""
+        raise NotImplementedError
+
+    def faults(self) -> Iterator[Fault]:
+        """Check that corrections are named once, and that the links fit into the bounds of their lengths."""
+        yield from repeated_faults(
+            self.aero_coefficients or (), "/aero_coefficients", "Name each correction once."
+        )
+        division = None if self.bounds is None else self.bounds.division
+        if division is not None:
+            yield from _division_faults(self.numbers_of_links(), *division)
+
+
+def repeated_faults(items: Sequence[object], pointer: str, hint: str) -> Iterator[Fault]:
+    """Check that no item of a list comes twice."""
+    for number, item in enumerate(items):
+        if item in items[:number]:
+            yield Fault("name_not_unique", f"{item} appears twice.", f"{pointer}/{number}", hint)
+
+
+def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterator[Fault]:
+    """Check that links of lengths within the bounds can make up the span."""
+    for links in numbers:
+        if links > 1 and not low * links < 1.0 < high * links:
+            sum_bound = f"{links} x {low:g} = {links * low:g}" if low * links >= 1.0 else ""
+            sum_bound = sum_bound or f"{links} x {high:g} = {links * high:g}"
+            yield Fault(
+                "bounds_without_room",
+                f"The shares of {links} links add up to 1, and with these bounds to "
+                f"{'at least' if low * links >= 1.0 else 'at most'} {sum_bound}.",
+                f"/bounds/division/{0 if low * links >= 1.0 else 1}",
+                f"Give bounds with 1/{links} = {1 / links:.3g} between them.",
+            )
+            return
+
 
 class EquivalentModel(SoughtModel):
-    """The model whose parameters are sought: wings of rigid links with gimbal joints."""
+    """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
-    links_per_wing: int = Field(default=3, ge=1, le=MAX_LINKS)
+    links_per_wing: Annotated[int, Option("--links", MODEL)] = Field(
+        default=3, ge=1, le=MAX_LINKS, description="Links per wing."
+    )
+
+    def numbers_of_links(self) -> Sequence[int]:
+        """List the one number of links per wing."""
+        return (self.links_per_wing,)
 
 
 class Search(SwarmSearch):
-    """How the parameters are sought; what is left out depends on the method."""
+    """How the parameters are searched; what is left out depends on the method."""
 
-    method: Method = "hybrid"
-    particles: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    generations: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
-        default=None, description="Time budget of the search; the best so far is the result."
+    method: Annotated[Method, Option("--method", SEARCH)] = Field(
+        default="hybrid", description="How the parameters are searched."
     )
-    preset: Literal["paper"] | None = Field(
+    particles: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, Option("--particles", SEARCH)] = (
+        Field(default=None, description="Size of the swarm, or candidates of the other methods.")
+    )
+    generations: Annotated[
+        Annotated[int, Field(ge=1, le=100_000)] | None, Option("--generations", SEARCH)
+    ] = Field(default=None, description="Generations of the swarm, or iterations of the other methods.")
+    preset: Annotated[Literal["paper"] | None, Option("--preset", SEARCH)] = Field(
         default=None, description="`paper`: 2500 particles, c1 = c2 = 1, as published."
     )
 
+    def faults(self) -> Iterator[Fault]:
+        """Check that an evolution strategy has enough models to choose from."""
+        if self.method == "cma" and self.preset is None and (self.particles or MIN_EVOLUTION) < MIN_EVOLUTION:
+            yield Fault(
+                "greater_than_equal",
+                f"{self.particles} models a generation are too few for the method cma.",
+                "/particles",
+                f"Give at least {MIN_EVOLUTION}, or another method.",
+            )
+
 
 class IdentifySearch(Search):
-    """How the parameters are sought, and from where."""
+    """How the parameters are searched, and from where."""
 
     warm_start: WarmStart | None = Field(
         default=None,
@@ -102,15 +226,83 @@ EXAMPLE_REQUEST: dict[str, Any] = {
 }
 
 
-class SamplesRequest(Strict):
+class SamplesRequest(Request):
     """A request to fit models to sample flights."""
 
-    aircraft: Aircraft
-    flight: Flight
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SoughtModel
     search: Search = Search()
-    execution: Execution = Execution()
+
+    def inline_samples(self) -> dict[int, InlineSample]:
+        """Collect the samples whose rows are here, by their place in the list."""
+        return {
+            number: sample for number, sample in enumerate(self.samples) if isinstance(sample, InlineSample)
+        }
+
+    def faults(self) -> Iterator[Fault]:
+        """Check aircraft, flight and samples together."""
+        yield from start_faults(self.flight, self.model.start)
+        yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
+        yield from samples_faults(self.samples)
+        samples = self.inline_samples()
+        yield from total_rows_faults(sum(len(sample.time_s) for sample in samples.values()))
+        hinges = hinge_ranges(self.aircraft)
+        for number, sample in samples.items():
+            for side, hinge in hinges.items():
+                column = sample.sweep_left_rad if side == "left" else sample.sweep_right_rad
+                pointer = f"/samples/{number}/sweep_{side}_rad"
+                faults = (hinge.fault(side, angle, f"{pointer}/{row}") for row, angle in enumerate(column))
+                yield from (fault for fault in (next(filter(None, faults), None),) if fault is not None)
+
+
+def total_rows_faults(total: int) -> Iterator[Fault]:
+    """Check the rows of all samples together."""
+    if total > MAX_TOTAL_ROWS:
+        yield Fault(
+            "too_many_rows",
+            f"The samples have {total} rows together.",
+            "/samples",
+            f"At most {MAX_TOTAL_ROWS}: 10 ms between rows are enough.",
+        )
+
+
+class Named(Protocol):
+    """A sample flight as far as others must be told apart from it."""
+
+    @property
+    def name(self) -> str | None:
+        """Its name; None for that of the uploaded flight."""
+        ...
+
+    @property
+    def role(self) -> str:
+        """``train`` or ``held_out``."""
+        ...
+
+
+def samples_faults(samples: Sequence[Named]) -> Iterator[Fault]:
+    """Check that something can be fitted, and that every sample has a name of its own."""
+    if all(sample.role != "train" for sample in samples):
+        yield Fault(
+            "no_training_sample",
+            "Every sample is held out.",
+            "/samples/0/role",
+            'Give at least one sample the role "train".',
+        )
+    names: dict[str, int] = {}
+    for number, sample in enumerate(samples):
+        if sample.name is None:
+            continue
+        if sample.name in names:
+            yield Fault(
+                "name_not_unique",
+                f"Samples {names[sample.name]} and {number} are both called {sample.name!r}.",
+                f"/samples/{number}/name",
+                "Give every sample a name of its own: plots are named after it.",
+            )
+        names.setdefault(sample.name, number)
 
 
 class IdentifyRequest(SamplesRequest):
@@ -121,6 +313,32 @@ class IdentifyRequest(SamplesRequest):
     model: EquivalentModel = EquivalentModel()
     search: IdentifySearch = IdentifySearch()
     execution: SpreadExecution = SpreadExecution()
+
+    def faults(self) -> Iterator[Fault]:
+        """Check what belongs together, and that the model to begin from has the form that is searched."""
+        yield from super().faults()
+        warm_start = self.search.warm_start
+        known = None if warm_start is None else parameters_in(warm_start.parameters)
+        if known is None:
+            return
+        yield from model_surfaces_faults(self.aircraft, known, "/search/warm_start/parameters")
+        at, links = "/search/warm_start/parameters", self.model.links_per_wing
+        if known.links_per_wing != links:
+            yield Fault(
+                "links_differ",
+                f"The search is for {links} links per wing and would begin from a model with "
+                f"{known.links_per_wing}.",
+                at,
+                f"Begin from a model with {links}, or set model.links_per_wing to {known.links_per_wing}.",
+            )
+        elif known.separate_wings and not self.model.separate_wings:
+            yield Fault(
+                "wings_differ",
+                "The search is for wings that are alike and would begin from a model with wings of their "
+                "own.",
+                at,
+                "Set model.separate_wings, or begin from a model whose wings are alike.",
+            )
 
 
 class CostEstimate(BaseModel):

@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.execution import Execution
-from morphdata.fields import Angle, Strict
+from morphdata.base import Angle, Document
+from morphdata.execution import Request
+from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
-from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel
-from morphdata.search import WEEK_S, SwarmSearch
+from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
+from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
+from morphdata.search import SwarmSearch
 from morphdata.simulate import MAX_ELEMENTS
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
+SMALLEST_CHANGE_RAD = 1e-6
+MAX_FLIGHTS = 2_000_000  # of one search
+# nominal figures, to an order of magnitude: what a request leaves out is the solver's choice
+SWARM_PARTICLES, SWARM_GENERATIONS = 50, 100
+SCREEN, DESCENT_STARTS, DESCENT_ITERATIONS = 16, 3, 8
+SEARCHES = 2  # with the rigid model too
+DURATIONS_TRIED = 10  # on the way to the shortest
 
+Verify = Literal["flexible", "none"]
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
@@ -27,70 +40,160 @@ class SearchedModel(KnownModel):
     step_s: StepS | None = Field(default=None, description=OWN_OR_CHOSEN)
 
 
-class Morph(Strict):
+class Morph(Document):
     """The change of shape that is wanted; all hinges follow one schedule."""
 
-    initial_rad: Angle = 0.0
-    final_rad: Angle
-    duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S)] = Field(
-        description="Of the goals `minimum_time` and `pareto` the longest that is looked at."
+    initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
+        default=0.0, description="Sweep before the morph, rad."
     )
-    knots: int = Field(
-        default=6, ge=3, le=20, description="Of the spline, both ends included; the times between are sought."
+    final_rad: Annotated[Angle, Option("--final", MORPH)] = Field(
+        description="Sweep at the end of the morph, rad."
     )
-    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S)] = Field(
+    duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)] = Field(
+        description="Time that the morph takes, s; of the goals `minimum_time` and `pareto` the longest that "
+        "is looked at."
+    )
+    knots: Annotated[int, Option("--knots", MORPH)] = Field(
+        default=6,
+        ge=3,
+        le=20,
+        description="Of the spline, both ends included; the times between are searched.",
+    )
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S), Option("--settle", MORPH)] = Field(
         default=2.0,
         description="How long after `duration_s` the attitude still counts, of shorter morphs too.",
     )
-    free_values: bool = Field(default=False, description="Seek the angles at the knots too.")
-    goal: Literal["variation", "minimum_time", "pareto"] = Field(
+    free_values: Annotated[bool, Option("--free-values", MORPH)] = Field(
+        default=False, description="Search the angles at the knots too."
+    )
+    goal: Annotated[Literal["variation", "minimum_time", "pareto"], Option("--goal", MORPH)] = Field(
         default="variation",
         description="Least variation in the given duration, least duration under `max_variation_rad2`, or "
         "the front of both.",
     )
-    max_variation_rad2: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
-        default=None, description="Needed for the goal `minimum_time`."
+    max_variation_rad2: Annotated[
+        Annotated[float, Field(gt=0.0, le=1e6)] | None, Option("--max-variation", MORPH)
+    ] = Field(default=None, description="Largest variation; needed for the goal `minimum_time`.")
+    front_points: Annotated[int, Option("--front-points", MORPH)] = Field(
+        default=7, ge=2, le=50, description="Durations on the front of `pareto`."
     )
-    front_points: int = Field(default=7, ge=2, le=50, description="Durations on the front of `pareto`.")
+
+    @property
+    def change_rad(self) -> float:
+        """By how much the angle changes, rad, with its sign."""
+        return self.final_rad - self.initial_rad
+
+    def faults(self) -> Iterator[Fault]:
+        """Check that the angle changes, and that the goal has what it needs."""
+        if abs(self.change_rad) < SMALLEST_CHANGE_RAD:
+            yield Fault(
+                "nothing_to_morph",
+                f"The morph begins and ends at {self.final_rad:g} rad.",
+                "/final_rad",
+                "Give another final_rad.",
+            )
+        if self.goal == "minimum_time" and self.max_variation_rad2 is None:
+            yield Fault(
+                "missing",
+                "The least time is searched under a limit of the variation.",
+                "/max_variation_rad2",
+                "Add it; the variation of a result at constant rate tells its order of magnitude.",
+            )
+        elif self.goal != "minimum_time" and self.max_variation_rad2 is not None:
+            yield Fault(
+                "not_used",
+                f"The goal {self.goal!r} has no limit of the variation.",
+                "/max_variation_rad2",
+                'Leave it out, or use the goal "minimum_time".',
+            )
 
 
-class Limits(Strict):
+class Limits(Document):
     """What no schedule may exceed; what is left out is not limited."""
 
-    max_rate_rad_s: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
-    max_accel_rad_s2: Annotated[float, Field(gt=0.0, le=1e5)] | None = None
-    monotonic: bool = Field(default=True, description="The rate never changes its sign.")
-    max_hinge_torque_nm: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
-        default=None, description="Of any hinge's motor, in the model that is searched with."
+    max_rate_rad_s: Annotated[
+        Annotated[float, Field(gt=0.0, le=100.0)] | None, Option("--rate-limit", LIMITS)
+    ] = Field(default=None, description="Fastest sweep rate, rad/s.")
+    max_accel_rad_s2: Annotated[
+        Annotated[float, Field(gt=0.0, le=1e5)] | None, Option("--accel-limit", LIMITS)
+    ] = Field(default=None, description="Largest sweep acceleration, rad/s^2.")
+    monotonic: Annotated[bool, Option("--monotonic", LIMITS)] = Field(
+        default=True, description="The rate never changes its sign."
+    )
+    max_hinge_torque_nm: Annotated[
+        Annotated[float, Field(gt=0.0, le=1e9)] | None, Option("--torque-limit", LIMITS)
+    ] = Field(
+        default=None,
+        description="Largest torque of any hinge's motor, N m, in the model that is searched with.",
     )
 
+    def shortest_morph_s(self, change_rad: float) -> float:
+        """Compute the least time from rest to rest: full acceleration, full rate, full braking.
 
-class Weights(Strict):
-    """Weights of the angles' squared departures in what is minimised."""
+        Parameters
+        ----------
+        change_rad : float
+            Angle between, rad, without its sign.
+
+        Returns
+        -------
+        float
+            Seconds; 0 where nothing is limited.
+        """
+        rate = math.inf if self.max_rate_rad_s is None else self.max_rate_rad_s
+        accel = math.inf if self.max_accel_rad_s2 is None else self.max_accel_rad_s2
+        if rate * rate / accel < change_rad:
+            return change_rad / rate + rate / accel
+        return 2.0 * math.sqrt(change_rad / accel)
+
+
+class Weights(Document):
+    """Weights of the squared departures of roll, pitch and yaw in what is minimised."""
 
     phi: Weight = 1.0
     theta: Weight = 1.0
     psi: Weight = 1.0
 
+    def faults(self) -> Iterator[Fault]:
+        """Check that an angle counts."""
+        if self.phi == self.theta == self.psi == 0.0:
+            yield Fault("weights_all_zero", "No angle counts.", hint="Give one of them a weight.")
+
+
+def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
+    """Check that a goal that seeks a duration has a shortest one."""
+    if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
+        yield Fault(
+            "missing",
+            f"Without a limit the goal {morph.goal!r} has no shortest duration.",
+            "/limits",
+            "Give max_rate_rad_s or max_accel_rad_s2.",
+        )
+
 
 class ScheduleSearch(SwarmSearch):
-    """How the schedule is sought; what is left out depends on the method."""
+    """How the schedule is searched; what is left out depends on the method."""
 
-    method: Literal["hybrid", "pso"] = "hybrid"
-    particles: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    generations: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    max_seconds: Annotated[float, Field(gt=0.0, le=WEEK_S)] | None = Field(
-        default=None, description="Time budget of the searches; the best so far is the result."
+    method: Annotated[Literal["hybrid", "pso"], Option("--method", SEARCH)] = Field(
+        default="hybrid", description="How the schedule is searched."
     )
-    preset: Literal["paper"] | None = Field(
+    particles: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--particles", SEARCH)] = (
+        Field(default=None, description="Size of the swarm, or schedules among which `hybrid` starts.")
+    )
+    generations: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--generations", SEARCH)] = (
+        Field(default=None, description="Generations of the swarm, or iterations of `hybrid`.")
+    )
+    preset: Annotated[Literal["paper"] | None, Option("--preset", SEARCH)] = Field(
         default=None, description="`paper`: a swarm of 50 particles, c1 = c2 = 1, as published."
     )
 
 
-class VerifyingModel(Strict):
+class VerifyingModel(Document):
     """The flexible model in which the schedules are flown again."""
 
-    elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
+    elements: Annotated[int, Option("--elements", MODEL)] = Field(
+        default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing of the flexible model."
+    )
     lattice: Lattice | None = Field(default=None, description="As the equivalent model's when left out.")
 
 
@@ -105,23 +208,80 @@ EXAMPLE_OPTIMIZATION: dict[str, Any] = {
 }
 
 
-class OptimizeRequest(Strict):
+class OptimizeRequest(Request):
     """Aircraft, flight condition, an equivalent model, the morph that is wanted and its limits."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_OPTIMIZATION]})
 
-    aircraft: Aircraft
-    flight: Flight
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     model: SearchedModel
     morph: Morph
     limits: Limits = Limits()
-    weights: Weights = Weights()
+    weights: Annotated[Weights, Option("--weights", MORPH)] = Field(
+        default=Weights(), description="Weights of roll, pitch and yaw in the variation."
+    )
     search: ScheduleSearch = ScheduleSearch()
-    verify: Literal["flexible", "none"] = Field(
+    verify: Annotated[Verify, Option("--verify", MODEL)] = Field(
         default="flexible", description="Fly the schedules again in the flexible model: minutes."
     )
     flexible: VerifyingModel = VerifyingModel()
-    execution: Execution = Execution()
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of the search."""
+        return (self.morph.knots - 2) * (2 if self.morph.free_values else 1)
+
+    @property
+    def flights(self) -> int:
+        """Number of flights of the searches, of the rigid model too, to an order of magnitude."""
+        search, morph = self.search, self.morph
+        if search.method == "pso" or search.preset == "paper":
+            flights = (search.particles or SWARM_PARTICLES) * (search.generations or SWARM_GENERATIONS)
+        else:
+            iterations = search.generations or DESCENT_ITERATIONS
+            flights = (search.particles or SCREEN) + DESCENT_STARTS * iterations * (self.unknowns + 1)
+        durations = {"variation": 1, "minimum_time": DURATIONS_TRIED, "pareto": morph.front_points}
+        return flights * SEARCHES * durations[morph.goal]
+
+    def faults(self) -> Iterator[Fault]:
+        """Check aircraft, model and morph together, and the size of the search."""
+        yield from start_faults(self.flight, flown_with(self.model).start)
+        yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
+        yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
+        yield from self._hinge_faults()
+        yield from self._time_faults()
+        if self.flights > MAX_FLIGHTS:
+            yield Fault(
+                "too_much_work",
+                f"The search would fly {self.flights} flights.",
+                "/search/generations",
+                f"At most {MAX_FLIGHTS}: choose fewer particles, generations, knots or front_points.",
+            )
+
+    def _hinge_faults(self) -> Iterator[Fault]:
+        hinges = hinge_ranges(self.aircraft)
+        if not hinges:
+            yield Fault(
+                "nothing_to_morph", "No surface has a hinge.", "/aircraft/surfaces", "Give the wings hinges."
+            )
+        for name in ("initial_rad", "final_rad"):
+            angle, at = getattr(self.morph, name), f"/morph/{name}"
+            fault = next(filter(None, (hinge.fault(side, angle, at) for side, hinge in hinges.items())), None)
+            if fault is not None:
+                yield fault
+
+    def _time_faults(self) -> Iterator[Fault]:
+        morph, limits = self.morph, self.limits
+        least_s = limits.shortest_morph_s(abs(morph.change_rad))
+        if morph.duration_s <= least_s:
+            yield Fault(
+                "morph_too_short",
+                f"No motion within the limits takes {morph.duration_s:g} s or less.",
+                "/morph/duration_s",
+                f"Give more than {least_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
+            )
+        yield from goal_faults(morph, limits)
 
 
 class ScheduleCost(BaseModel):

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Protocol
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_serializer
 
-from morphdata.fields import Identifier, Strict
+from morphdata.base import Document, Identifier
+from morphdata.faults import Fault
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
+from morphdata.options import MODEL, Option
+from morphdata.refusals import escaped
 
 MAX_LINKS = 8
 MAX_WINGS = 16
 AXES = 3  # flap, torsion, lag
+SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
+RAGGED = -1  # length of rows that differ in length
 
 EXAMPLE_PARAMETERS: dict[str, Any] = {
     "links_per_wing": 2,
@@ -29,7 +36,7 @@ Joint = Annotated[list[Stiffness], Field(min_length=AXES, max_length=AXES)]
 Joints = Annotated[list[Joint], Field(max_length=MAX_LINKS - 1)]
 
 
-class Corrections(Strict):
+class Corrections(Document):
     """Aerodynamic corrections of an equivalent model."""
 
     lift_factor: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
@@ -40,7 +47,7 @@ class Corrections(Strict):
     lag_s: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
-class SurfaceParameters(Strict):
+class SurfaceParameters(Document):
     """Parameters of one flexible surface."""
 
     division: Shares
@@ -49,7 +56,7 @@ class SurfaceParameters(Strict):
     profile_drag: Annotated[float, Field(ge=0.0, le=10.0)]
 
 
-class MirroredParameters(Strict):
+class MirroredParameters(Document):
     """A surface with the parameters of its mirror image."""
 
     mirror_of: str = Field(description="Name of the surface whose parameters they are.")
@@ -66,7 +73,7 @@ OwnOrMirrored = Annotated[
 ]
 
 
-class Parameters(Strict):
+class Parameters(Document):
     """The `model` of an identification's result, as it stands there."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_PARAMETERS]})
@@ -96,8 +103,83 @@ class Parameters(Strict):
     step_s: StepS | None = None
     start: Start | None = None
 
+    @property
+    def divisions(self) -> list[list[float]]:
+        """One list of shares per wing, or one for all."""
+        return _rows(self.division)
 
-class WholeResult(Strict):
+    def faults(self) -> Iterator[Fault]:
+        """The lists have the lengths that the number of links asks for, and the shares make a whole span."""
+        yield from _structure_faults(self, self.links_per_wing)
+        surfaces = self.surfaces or {}
+        for name, own in surfaces.items():
+            at = f"/surfaces/{escaped(name)}"
+            if isinstance(own, SurfaceParameters):
+                yield from (fault.under(at) for fault in _structure_faults(own, self.links_per_wing))
+            elif isinstance(surfaces.get(own.mirror_of, own), MirroredParameters):
+                yield Fault(
+                    "mirrors_nothing",
+                    f"{name!r} mirrors {own.mirror_of!r}, which has no parameters.",
+                    f"{at}/mirror_of",
+                    "Name a surface with parameters of its own.",
+                )
+
+
+def _rows(division: list[float] | list[list[float]]) -> list[list[float]]:
+    shared = [share for share in division if isinstance(share, float)]
+    return [shared] if shared else [row for row in division if isinstance(row, list)]
+
+
+def _structure_faults(own: Parameters | SurfaceParameters, links: int) -> Iterator[Fault]:
+    rows = _rows(own.division)
+    shapes: dict[str, tuple[int, ...]] = {
+        "division": (len(rows), links),
+        "stiffness_nm_rad": (len(rows), links - 1, AXES),
+        "damping_nms_rad": (len(rows), links - 1, AXES),
+    }
+    for name, shape in shapes.items():
+        allowed = {shape, shape[1:]} if len(rows) == 1 else {shape}
+        if links == 1:  # no joints: [] and a [] per wing are the same
+            allowed |= {(0,), (len(rows), 0)}
+        if _shape(getattr(own, name)) not in allowed:
+            wanted = " x ".join(str(number) for number in (shape if len(rows) > 1 else shape[1:]))
+            yield Fault(
+                "wrong_shape",
+                f"{name} does not hold {wanted} numbers, as {links} links per wing ask.",
+                f"/{name}",
+                "Give the model of an identification's result as it stands there.",
+            )
+    for shares in rows:
+        if abs(sum(shares) - 1.0) > SUM_TOLERANCE:
+            yield Fault(
+                "division_not_whole",
+                f"The shares of the span add up to {sum(shares):g}.",
+                "/division",
+                "They must add up to 1.",
+            )
+            break
+
+
+def _shape(values: list[Any]) -> tuple[int, ...]:
+    """Shape of nested lists; `RAGGED` where rows differ in length."""
+    shape: tuple[int, ...] = (len(values),)
+    level = values
+    while level and isinstance(level[0], list):
+        lengths = {len(row) for row in level}
+        if len(lengths) > 1:
+            return (*shape, RAGGED)
+        shape = (*shape, lengths.pop())
+        level = [item for row in level for item in row]
+    return shape
+
+
+def has_flown(fit: Any) -> bool:
+    """Whether a model flies all samples to fit, by the fits of a result: where it does not, J is null."""
+    rows = [row for row in fit if isinstance(row, dict)] if isinstance(fit, list) else []
+    return not any(row.get("role") == "train" and row.get("J_identified", 0.0) is None for row in rows)
+
+
+class WholeResult(Document):
     """A whole result of an identification: only its `model` is looked at."""
 
     model: Parameters
@@ -107,6 +189,20 @@ class WholeResult(Strict):
     cost: Unread = None
     partial: Unread = None
     warnings: Unread = None
+
+    @model_serializer
+    def _only_the_model(self) -> Parameters:
+        return self.model
+
+    def faults(self) -> Iterator[Fault]:
+        """The model flies the samples that it was fitted to."""
+        if not has_flown(self.fit):
+            yield Fault(
+                "never_flown",
+                "The result holds no model that flies the samples it was fitted to.",
+                "/model",
+                "Its warnings say why; give the result of an identification that succeeded.",
+            )
 
 
 def _form(value: Any) -> str:
@@ -119,20 +215,93 @@ GivenParameters = Annotated[
 ]
 
 
-class KnownModel(Strict):
+def parameters_in(given: Parameters | WholeResult | None) -> Parameters | None:
+    """Return the parameters themselves, also of a whole result."""
+    return given.model if isinstance(given, WholeResult) else given
+
+
+class KnownModel(Document):
     """An equivalent model by its parameters, or by the id of an identified one.
 
     Lattice, step and start are those it was identified with where they are left out.
     """
 
-    parameters: GivenParameters | None = Field(
+    parameters: Annotated[GivenParameters | None, Option("--parameters", MODEL)] = Field(
         default=None, description="The `model` of an identification's result, or the whole result."
     )
-    model_id: Identifier | None = Field(
+    model_id: Annotated[Identifier | None, Option("--model-id", MODEL)] = Field(
         default=None,
         description="Instead of `parameters`: an identified model, see GET /models.",
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=OWN_OR_CHOSEN)
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
+
+    @property
+    def known(self) -> Parameters | None:
+        """The parameters, where the document holds them."""
+        return parameters_in(self.parameters)
+
+    def faults(self) -> Iterator[Fault]:
+        """The model is given once."""
+        if self.parameters is not None and self.model_id is not None:
+            yield Fault(
+                "given_twice",
+                "parameters and model_id are both given.",
+                "/model_id",
+                "Leave one of them out.",
+            )
+        elif self.parameters is None and self.model_id is None:
+            yield Fault(
+                "missing",
+                "An equivalent model needs parameters.",
+                "/parameters",
+                "Give the model of an identification's result, or the model_id of an identified one.",
+            )
+
+
+class FliesWith(Protocol):
+    """A model that may say how it is flown."""
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """Of every surface."""
+
+    @property
+    def step_s(self) -> float | None:
+        """Longest time step, s."""
+
+    @property
+    def start(self) -> Start | None:
+        """Of the flight."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlownWith:
+    """How a model is flown.
+
+    Attributes
+    ----------
+    lattice : Lattice
+    step_s : float or None
+        Longest time step, s; None for the flight's own choice.
+    start : Start
+    """
+
+    lattice: Lattice
+    step_s: float | None
+    start: Start
+
+
+def flown_with(model: FliesWith) -> FlownWith:
+    """Return how a model is flown: as it says, else as it was identified, else as all are."""
+    identified = model.known if isinstance(model, KnownModel) else None
+    said = [each for each in (model, identified) if each is not None]
+
+    def first(name: str) -> Any:
+        return next((value for each in said if (value := getattr(each, name)) is not None), None)
+
+    return FlownWith(first("lattice") or Lattice(), first("step_s"), first("start") or "trim")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from morphdata.fields import AngleSeries, Identifier, SampleName, Strict, TimeSeries
+from morphdata.base import AngleSeries, Document, Identifier, SampleName, TimeSeries
+from morphdata.faults import Fault
+from morphdata.samplefiles.fault import as_sentence
+from morphdata.samplefiles.flight import INLINE, flight_faults
 
 Role = Literal["train", "held_out"]
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
@@ -24,7 +28,7 @@ EXAMPLE_SAMPLE: dict[str, Any] = {
 }
 
 
-class TrajectoryColumns(Strict):
+class TrajectoryColumns(Document):
     """Columns of one flight, equally long; time rises, steps may be uneven."""
 
     time_s: TimeSeries
@@ -33,6 +37,18 @@ class TrajectoryColumns(Strict):
     phi_rad: AngleSeries = Field(description="Roll (z-y-x Euler angles, body FRD against earth NED).")
     theta_rad: AngleSeries = Field(description="Pitch.")
     psi_rad: AngleSeries = Field(description="Yaw.")
+
+    def faults(self) -> Iterator[Fault]:
+        """The columns are those of a flight."""
+        named = {name: getattr(self, field) for name, field in INLINE.items()}
+        for fault in flight_faults(named, INLINE):
+            row = "" if fault.row is None else f"/{fault.row}"
+            yield Fault(
+                fault.code,
+                as_sentence(fault.detail),
+                f"/{INLINE[fault.title or 't']}{row}",
+                as_sentence(fault.hint),
+            )
 
 
 class InlineSample(TrajectoryColumns):
@@ -47,7 +63,7 @@ class InlineSample(TrajectoryColumns):
     weight: Weight = 1.0
 
 
-class UploadedSample(Strict):
+class UploadedSample(Document):
     """A sample whose rows were uploaded with POST /trajectories."""
 
     trajectory_id: Identifier

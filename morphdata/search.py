@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from morphdata.fields import Identifier, Strict
+from morphdata.base import Document, Identifier
+from morphdata.faults import Fault
+from morphdata.options import SEARCH, Option
 from morphdata.parameters import GivenParameters
 
 MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
 WEEK_S = 7 * 86_400.0
 
 
-class WarmStart(Strict):
+class WarmStart(Document):
     """The model that a search begins from: of an earlier job, an identified one, or its parameters."""
 
     job_id: Identifier | None = Field(
@@ -26,11 +29,24 @@ class WarmStart(Strict):
         description="An identified model of yours.",
         examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
-    parameters: GivenParameters | None = None
+    parameters: Annotated[GivenParameters | None, Option("--warm-start", SEARCH)] = Field(
+        default=None, description="The `model` of an earlier result, or the whole result."
+    )
+
+    def faults(self) -> Iterator[Fault]:
+        """Check that there is one model to begin from."""
+        ways = ("job_id", "model_id", "parameters")
+        given = [name for name in ways if getattr(self, name) is not None]
+        if len(given) != 1:
+            yield Fault(
+                "given_twice" if given else "missing",
+                f"{' and '.join(given) or 'Nothing'} is given to begin from.",
+                hint=f"Give one of {', '.join(ways)}.",
+            )
 
 
-class SwarmSearch(Strict):
-    """The swarm's pulls and the seed; how large the swarm may be is each search's own."""
+class SwarmSearch(Document):
+    """Method, swarm, seed and time budget; how large the swarm may be is each search's own."""
 
     c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
         default=None, description="Pull to a particle's best."
@@ -39,4 +55,14 @@ class SwarmSearch(Strict):
         default=None, description="Pull to the swarm's best."
     )
     inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result.")
+    seed: Annotated[int, Option("--seed", SEARCH)] = Field(
+        default=1, ge=0, le=MAX_SEED, description="The same seed gives the same result."
+    )
+    max_seconds: Annotated[
+        Annotated[float, Field(gt=0.0, le=WEEK_S)] | None, Option("--max-seconds", SEARCH)
+    ] = Field(default=None, description="Time budget of the search; the best so far is the result.")
+
+    def swarm_settings(self) -> dict[str, Any]:
+        """Collect what is said about the swarm: size, generations, pulls, inertia."""
+        names = {"particles", "generations", "c1", "c2", "inertia"}
+        return self.model_dump(include=names, exclude_none=True)

@@ -2,35 +2,44 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.execution import Execution
-from morphdata.fields import Strict
+from morphdata.base import MAX_ROWS, MIN_ROWS, Document
+from morphdata.environment import Environment
+from morphdata.execution import Request
+from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
-from morphdata.parameters import KnownModel
-from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Moment, Schedules
-from morphdata.search import MAX_SEED
+from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
+from morphdata.parameters import KnownModel, flown_with
+from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 MAX_ELEMENTS = 100
+MAX_STEPS = {
+    "rigid": 1_200_000,
+    "equivalent": 1_200_000,
+    "flexible": 60_000,
+}  # about ten minutes of computing
+DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}
+ROUND_OFF = 1e-9  # of a number of rows or steps
 
-GustSpeed = Annotated[float, Field(ge=-100.0, le=100.0)]
-Direction = Annotated[
-    list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=3, max_length=3)
-]  # of any length
 
-
-class RigidModel(Strict):
+class RigidModel(Document):
     """Rigid wings, without aerodynamic corrections."""
 
     kind: Literal["rigid"]
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description=CHOSEN)
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
 
 class EquivalentFlightModel(KnownModel):
@@ -39,45 +48,21 @@ class EquivalentFlightModel(KnownModel):
     kind: Literal["equivalent"]
 
 
-class FlexibleModel(Strict):
+class FlexibleModel(Document):
     """Wings of geometrically exact beams: the reference, and hundreds of times slower."""
 
     kind: Literal["flexible"]
-    elements: int = Field(default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing.")
+    elements: Annotated[int, Option("--elements", MODEL)] = Field(
+        default=10, ge=1, le=MAX_ELEMENTS, description="Beam elements of each wing of the flexible model."
+    )
     lattice: Lattice | None = None
     step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
-    start: Start | None = None
+    start: Annotated[Start | None, Option("--start", MODEL)] = Field(
+        default=None, description="Trim each model by itself, or start from `flight.start`."
+    )
 
 
 FlightModel = Annotated[RigidModel | EquivalentFlightModel | FlexibleModel, Field(discriminator="kind")]
-
-
-class Gust(Strict):
-    """A gust of the shape 1 - cos (EASA CS-25.341): frozen in the air that the aircraft crosses."""
-
-    amplitude_m_s: GustSpeed
-    gradient_m: Annotated[float, Field(gt=0.0, le=1e4)] = Field(description="From the edge to the peak.")
-    start_s: Moment = Field(default=0.0, description="When the aircraft meets the edge.")
-    direction_n: Direction = Field(default=[0.0, 0.0, -1.0], description="Earth axes (NED); up by default.")
-
-
-class Turbulence(Strict):
-    """Dryden turbulence (MIL-F-8785C)."""
-
-    wind_20ft_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        default=0.0, description="Mean wind at 20 ft, which rules low altitudes: 7.7 is light, 15.4 moderate."
-    )
-    sigma_high_m_s: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
-        default=0.0, description="Standard deviation above 2000 ft."
-    )
-
-
-class Environment(Strict):
-    """Gust and turbulence on top of the flight's uniform wind."""
-
-    gust: Gust | None = None
-    turbulence: Turbulence | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
 
 
 EXAMPLE_SIMULATION: dict[str, Any] = {
@@ -89,21 +74,57 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 }
 
 
-class SimulateRequest(Strict):
+class SimulateRequest(Request):
     """Aircraft, flight condition, a model, and what the hinges do."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
 
-    aircraft: Aircraft
-    flight: Flight
+    aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
+    flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     model: FlightModel
     schedules: Schedules
     duration_s: Duration
     output_step_s: Annotated[float, Field(ge=0.0005, le=MAX_DURATION_S)] = Field(
         default=0.01, description="Between the rows of the trajectory."
     )
-    environment: Environment | None = None
-    execution: Execution = Execution()
+    environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
+        default=None, description="Gust and turbulence; still air without."
+    )
+
+    @property
+    def rows(self) -> int:
+        """Rows of the trajectory."""
+        return int(self.duration_s / self.output_step_s + ROUND_OFF) + 1
+
+    @property
+    def steps(self) -> int:
+        """Time steps: a whole number of them between two rows, none longer than the model's."""
+        longest_s = flown_with(self.model).step_s or DEFAULT_STEP_S[self.model.kind]
+        return math.ceil(self.output_step_s / longest_s - ROUND_OFF) * (self.rows - 1)
+
+    def faults(self) -> Iterator[Fault]:
+        """The flight can begin, its hinges stay in range, it is neither too short nor too long."""
+        yield from start_faults(self.flight, flown_with(self.model).start)
+        for fault in self.schedules.range_faults(hinge_ranges(self.aircraft)):
+            yield fault.under("/schedules")
+        if not MIN_ROWS <= self.rows <= MAX_ROWS:
+            yield Fault(
+                "too_many_rows" if self.rows > MAX_ROWS else "too_few_rows",
+                f"{self.duration_s:g} s in steps of {self.output_step_s:g} s make {self.rows} rows.",
+                "/output_step_s",
+                f"Choose duration_s and output_step_s for {MIN_ROWS} to {MAX_ROWS} rows.",
+            )
+        if self.steps > MAX_STEPS[self.model.kind]:
+            yield Fault(
+                "too_much_work",
+                f"The flight takes {self.steps} time steps of the {self.model.kind} model.",
+                "/duration_s",
+                f"At most {MAX_STEPS[self.model.kind]}: fly shorter, or choose a longer model.step_s.",
+            )
+        if self.model.kind != "rigid":
+            yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
+        if isinstance(self.model, KnownModel):
+            yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
 
 
 class FlightCost(BaseModel):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from morphdata.faults import Fault
 from morphdata.identify import (
     EXAMPLE_REQUEST,
     Angles,
@@ -13,7 +15,9 @@ from morphdata.identify import (
     SampleFit,
     SamplesRequest,
     SoughtModel,
+    repeated_faults,
 )
+from morphdata.options import MODEL, Option
 from morphdata.parameters import MAX_LINKS
 from morphdata.warnings import Warnings
 
@@ -25,13 +29,22 @@ EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": 
 class StudiedModels(SoughtModel):
     """The models that are compared: the same wings with different numbers of links."""
 
-    links_per_wing: list[Links] = Field(
+    links_per_wing: Annotated[list[Links], Option("--links", MODEL)] = Field(
         default=[1, 2, 3, 4, 5, 6],
         min_length=1,
         max_length=MAX_LINKS,
         description="Numbers of links to compare, all different; 1 is the rigid model with its aerodynamic "
-        "corrections sought.",
+        "corrections searched.",
     )
+
+    def numbers_of_links(self) -> Sequence[int]:
+        """List the numbers of links per wing that are compared."""
+        return self.links_per_wing
+
+    def faults(self) -> Iterator[Fault]:
+        """Check that each number of links is listed once, and what is checked of every such model."""
+        yield from repeated_faults(self.links_per_wing, "/links_per_wing", "List each number once.")
+        yield from super().faults()
 
 
 class StudyRequest(SamplesRequest):

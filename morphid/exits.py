@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from morphdata.samplefiles.fault import Pickled
+from morphdata.faults import Pickled
 
 
 class Exit(IntEnum):

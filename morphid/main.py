@@ -7,6 +7,7 @@ a port, a program or a writable directory; 130 Ctrl-C.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -16,15 +17,12 @@ from morphid.commands.audit import audit
 from morphid.commands.bench import bench
 from morphid.commands.database import database
 from morphid.commands.doctor import doctor, ready
-from morphid.commands.identify import identify
 from morphid.commands.jobs import jobs
 from morphid.commands.keys import keys
-from morphid.commands.optimize import optimize
+from morphid.commands.operations import operation_commands
 from morphid.commands.options import EXIT_CODES
 from morphid.commands.paper import paper
 from morphid.commands.serve import serve
-from morphid.commands.simulate import simulate
-from morphid.commands.study import study
 from morphid.several_values import SeveralValues
 from morphid.streams import flush_streams, prepare_streams
 
@@ -44,7 +42,7 @@ class Morphid(TyperGroup):
 def print_version(wanted: bool) -> None:
     """Print the version and end, where it is asked for."""
     if wanted:
-        from app.version import VERSION
+        from morphdata.version import VERSION
 
         typer.echo(f"morphid {VERSION}")
         raise typer.Exit
@@ -57,7 +55,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-for command in (serve, doctor, ready, identify, study, simulate, optimize, paper, bench):
+COMMANDS: list[Callable[..., None]] = [serve, doctor, ready, *operation_commands(), paper, bench]
+for command in COMMANDS:
     app.command(epilog=EXIT_CODES, cls=SeveralValues)(command)
 app.add_typer(jobs, name="jobs")
 app.add_typer(keys, name="keys")

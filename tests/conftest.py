@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from app import on_end  # noqa: F401 - tests end jobs by the store's own functions
 from tests import loopback_only
 from tests.compilation import compile_before
 from tests.live import LiveService

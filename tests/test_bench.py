@@ -14,10 +14,12 @@ from morphcore.bench import SECTIONS, Effort, benchmark_swarm, benchmark_table, 
 from morphcore.bench.requirements import judged
 from morphcore.bench.table import LINES
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import load_aircraft, load_flight
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.threads import thread_count
+from morphdata.aircraft import load_aircraft
+from morphdata.flight import load_flight
+from morphdata.lattice import Lattice
 
 SMALLEST = Effort(particles=17, rounds=1, singles=1, links=(1, 2), refinement=2)
 TIMED = ("batch", "single_flight", "growth_with_links", "step_error", "lattice")
@@ -90,10 +92,10 @@ def test_a_bound_is_held_or_not(value: float, holds: bool) -> None:  # noqa: FBT
 def test_swarm_is_the_same_every_time(examples: Path) -> None:
     """The benchmark's parameter sets depend on the seed alone, lie on the simplex and around the guess."""
     model = chain_model(
-        load_aircraft(examples / "aircraft.json"),
-        load_flight(examples / "flight.json"),
+        Aircraft.of(load_aircraft(examples / "aircraft.json")),
+        Flight.of(load_flight(examples / "flight.json")),
         3,
-        LatticeSettings(chordwise=1),
+        Lattice(chordwise=1),
     )
     one, same, other = (benchmark_swarm(model, 500, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one["stiffness_nm_rad"], same["stiffness_nm_rad"])

@@ -12,10 +12,12 @@ from morphcore.bench.stage import Course, Stages
 from morphcore.bench.steppers import FORMER, SHIPPED, STEPPERS
 from morphcore.bench.work_precision import work_precision, work_precision_plot, work_precision_table
 from morphcore.frames import euler_from_quaternion
-from morphcore.geometry.aircraft import load_aircraft, load_flight
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import physical_guess
 from morphcore.simulate.trajectory import load_trajectory
 from morphcore.simulate.trim import trim
+from morphdata.aircraft import load_aircraft
+from morphdata.flight import load_flight
 from tests.models.chains import Swing
 from tests.simulate.flights import example_model, fly_trimmed, plan_of
 
@@ -118,8 +120,8 @@ def test_diagram_and_table(examples: Path):
     """One stage in 10 ms errs by less than two do; counts are stages over time; the picture draws."""
     sample = load_trajectory(examples / "train_rate_0.8.csv")
     figures = work_precision(
-        load_aircraft(examples / "aircraft.json"),
-        load_flight(examples / "flight.json"),
+        Aircraft.of(load_aircraft(examples / "aircraft.json")),
+        Flight.of(load_flight(examples / "flight.json")),
         [sample],
         links=2,
         steppers={name: STEPPERS[name] for name in (SHIPPED, FORMER)},

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import morphcore
-from app.version import VERSION
+from morphdata.version import VERSION
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())

@@ -9,17 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore import Aircraft, Flight, Simulation, Trajectory, simulate
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore import Aircraft, Flight, Simulation, Trajectory
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.shown import Summary, brief
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from morphdata.lattice import Lattice
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
 from tests.optimise.morphs import last, optimisation
+from tests.simulate.flights import fly
 
 MOST_LINES = 40
 WIDEST = 160
-COARSE = ModelSettings(links_per_wing=2, lattice=LatticeSettings(1, 4), step_s=0.01)
+COARSE = ModelSettings(links_per_wing=2, lattice=Lattice(chordwise=1, spanwise=4), step_s=0.01)
 FLIGHTS = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric", "held_out"), 60)]
 QUICK = SearchSettings(method="least_squares", iterations=1)
 
@@ -46,8 +53,12 @@ def optimised() -> Any:
 
 def flown() -> Simulation:
     """A flight."""
-    return simulate(
-        reference_aircraft(), reference_flight(), FLIGHTS[0], lattice=LatticeSettings(1, 4), step_s=0.01
+    return fly(
+        reference_aircraft(),
+        reference_flight(),
+        FLIGHTS[0],
+        lattice=Lattice(chordwise=1, spanwise=4),
+        step_s=0.01,
     )
 
 
@@ -100,7 +111,7 @@ def test_a_result_fits_a_screen(name: str) -> None:
 
 def test_what_goes_in_fits_a_screen() -> None:
     """Aircraft, flight and sample: names instead of numbers, ranges instead of columns."""
-    aircraft, flight, sample = reference_aircraft(), reference_flight(), example("rate_0.8")
+    (aircraft, flight), sample = reference_documents(), example("rate_0.8")
     for value, kind, word in (
         (aircraft, Aircraft, "right wing"),
         (flight, Flight, "150"),

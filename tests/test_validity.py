@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore import simulate
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.flight import ModelChoice
 from morphcore.simulate.schedule import ConstantRate, Hold
@@ -20,10 +18,12 @@ from morphcore.validity import (
     error_warning,
     steep_warning,
 )
+from morphdata.lattice import Lattice
 from tests.identify.flights import example
 from tests.models.chains import example_aircraft, example_flight
+from tests.simulate.flights import fly
 
-COARSE = LatticeSettings(chordwise=1, spanwise=4)
+COARSE = Lattice(chordwise=1, spanwise=4)
 TIMES = np.linspace(0.0, 1.0, 101)
 UNSAID = replace(example_flight(), mach=None)  # whether the air is compressed
 SLOW = replace(UNSAID, airspeed_m_s=90.0)
@@ -74,7 +74,7 @@ def test_incidence_by_hand() -> None:
 def test_a_hinge_of_incidence_counts() -> None:
     """A wing turned nose up by its hinge meets the air at the body's angle and its own."""
     aircraft = example_aircraft()
-    turning = tuple(replace(s, hinge=replace(s.hinge, axis="y")) for s in aircraft.surfaces)  # type: ignore[type-var]
+    turning = tuple(replace(s, hinge=s.hinge.model_copy(update={"axis": "y"})) for s in aircraft.surfaces)  # type: ignore[type-var]
     found = air_motion(
         replace(aircraft, surfaces=turning), np.zeros(1), np.array([[0.0, 0.05, 0.0]]),
         np.array([[50.0, 0.0, 0.0]]), np.zeros((1, 3)), np.array([[0.0, 0.3]]),
@@ -119,11 +119,11 @@ def test_flights_of_all_models_warn(kind: str) -> None:
     options = {"model": models()[kind], "duration_s": 0.1, "lattice": COARSE, "step_s": 2e-3}
     still = [Hold(), Hold()]
     slow = replace(UNSAID, airspeed_m_s=75.0)
-    found = simulate(example_aircraft(), slow, still, **options)  # type: ignore[arg-type]
+    found = fly(example_aircraft(), slow, still, **options)  # type: ignore[arg-type]
     assert np.degrees(found.trim.alpha[0]) > 15.0
     assert codes(found.warnings) == ["large_alpha"]
-    assert simulate(example_aircraft(), example_flight(), still, **options).warnings == ()  # type: ignore[arg-type]
-    fast = simulate(example_aircraft(), UNSAID, still, **options)  # type: ignore[arg-type]
+    assert fly(example_aircraft(), example_flight(), still, **options).warnings == ()  # type: ignore[arg-type]
+    fast = fly(example_aircraft(), UNSAID, still, **options)  # type: ignore[arg-type]
     assert codes(fast.warnings) == ["compressible"]
 
 
@@ -137,5 +137,5 @@ def test_a_sweep_into_the_tail_warns() -> None:
     quiet = replace(example_flight(), mach=0.0)
     for final, expected in ((0.02, []), (1.0, ["surfaces_overlap"])):
         sweep = ConstantRate(0.0, final, 0.4)
-        found = simulate(whole, quiet, [sweep] * 3, duration_s=0.4, lattice=COARSE)
+        found = fly(whole, quiet, [sweep] * 3, duration_s=0.4, lattice=COARSE)
         assert codes(found.warnings) == expected

@@ -7,11 +7,12 @@ import time
 from collections.abc import Callable
 from enum import Enum
 
-from app.database import Database
+from app.database import Database, Session
 from app.jobs.chunks import Flown, flown, hand_out
 from app.jobs.records import Claim, JobStatus
-from app.jobs.store import finish_job, load_checkpoint, release_job, save_progress
-from worker.lease import StopReason, Vigil
+from app.jobs.store import finish_job, load_checkpoint, load_request, release_job, save_progress
+from worker.job_cache import JobCache
+from worker.lease import LeaseKeeper, StopReason
 from worker.numerics import Kernels
 from worker.operations import (
     Begin,
@@ -24,16 +25,14 @@ from worker.operations import (
     WorkInterrupted,
     WorkRefused,
 )
-from worker.patience import Patient, StaleClaim, StorageFull
 from worker.progress import Pace, rated
-from worker.telling import Phases
-from worker.works import Works
+from worker.retry import Retry, StaleClaim, StorageFull
+from worker.spans import PhaseSpans
 
 log = logging.getLogger(__name__)
 
-SAVE_EVERY_S = (
-    0.5  # a generation may take milliseconds; two writes a second serve the user's eye and the disk
-)
+# a generation may take milliseconds; two writes a second serve the user's eye and the disk
+SAVE_EVERY_S = 0.5
 
 
 class Ending(Enum):
@@ -58,43 +57,53 @@ ENDINGS = {
 }
 
 
-class Attempt(Patient):
+class Attempt:
     """The work on one claimed job.
 
     Parameters
     ----------
-    database : the job store.
-    claim : the right to write to the job.
-    vigil : keeps the claim alive and knows when to stop.
-    kernels : the compiled kernels of this process.
-    works : the work of the jobs that this process saw last.
-    clock : seconds that only rise.
-    sleep : waits a number of seconds.
+    database : Database
+        The job store.
+    claim : Claim
+        The right to write to the job.
+    keeper : LeaseKeeper
+        Keeps the claim alive and knows when to stop.
+    kernels : Kernels
+        The compiled kernels of this process.
+    cache : JobCache
+        The work of the jobs that this process saw last.
+    clock : callable
+        Seconds that only rise.
+    sleep : callable
+        Waits a number of seconds.
 
     Attributes
     ----------
-    handed_out : number of chunks that the job was given up for; publish as many messages.
+    handed_out : int
+        Number of chunks that the job was given up for; publish as many messages.
     """
 
     def __init__(
         self,
         database: Database,
         claim: Claim,
-        vigil: Vigil,
+        keeper: LeaseKeeper,
         kernels: Kernels,
-        works: Works | None = None,
+        cache: JobCache | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        super().__init__(database, vigil, claim.job_id, clock=clock, sleep=sleep)
         self._claim = claim
+        self._keeper = keeper
         self._kernels = kernels
-        self._works = works or Works()
+        self._cache = cache or JobCache()
+        self._clock = clock
+        self._store = Retry(database, keeper, clock=clock, sleep=sleep)
         self.handed_out = 0
         self._chunks = 0
         self._pace = Pace(clock)
-        self._phases = Phases(clock=clock)
+        self._phases = PhaseSpans(clock=clock)
         self._work: Work | None = None
         self._checkpoint: bytes | None = None
         self._unsaved: Document | None = None  # progress of the last step
@@ -107,35 +116,35 @@ class Attempt(Patient):
         except StaleClaim:
             return Ending.ABANDONED
         except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
-            return self._fail(told_error(error, self._claim.job_id))
+            return self._fail(error_document(error, self._claim.job_id))
         finally:
             self._phases.close()
 
     def give_up(self, find_operation: Callable[[str], Begin], error: Document) -> Ending:
         """End the job as failed: a chunk of it has shown that it cannot be done."""
         try:
-            self._checkpoint, _ = self._patiently(self._load)
+            self._checkpoint, _ = self._store.read(self._load)
             self._begin(find_operation)
         except StaleClaim:
             return Ending.ABANDONED
         except Exception:
-            log.exception("job %s: no result at its last checkpoint", self._job_id)
+            log.exception("job %s: no result at its last checkpoint", self._claim.job_id)
         return self._fail(error)
 
     def _run(self, find_operation: Callable[[str], Begin]) -> Ending:
-        self._checkpoint, flown = self._patiently(self._load)
+        self._checkpoint, flown = self._store.read(self._load)
         if not self._prepare_kernels():
             return self._stopped()
         work = self._begin(find_operation)
         if self._chunks:
-            self._vigil.look()  # it may have been taken over to end
-            if self._vigil.should_stop():
+            self._keeper.look()  # it may have been taken over to end
+            if self._keeper.should_stop():
                 return self._stopped()
-            self._hear(flown)
+            self._take_outcomes(flown)
         try:
             if self._hand_out():
                 return Ending.HANDED_OUT
-            for step in work.steps(self._checkpoint, self._vigil.should_stop):
+            for step in work.steps(self._checkpoint, self._keeper.should_stop):
                 self._note(step)
                 if self._hand_out():
                     return Ending.HANDED_OUT
@@ -144,24 +153,21 @@ class Attempt(Patient):
             self._save_unsaved()
             outcome = work.outcome(self._checkpoint)
         except WorkInterrupted:
-            self._vigil.heed()
+            self._keeper.note_work_ended()
             return self._stopped()
-        self._vigil.heed()
+        self._keeper.note_work_ended()
         return self._finish(JobStatus.SUCCEEDED, outcome=outcome)
 
-    def _load(self) -> tuple[bytes | None, Flown | None]:
-        with self._database.read() as connection:
-            return load_checkpoint(connection, self._claim), flown(connection, self._claim)
+    def _load(self, session: Session) -> tuple[bytes | None, Flown | None]:
+        return load_checkpoint(session, self._claim), flown(session, self._claim)
 
     def _begin(self, find_operation: Callable[[str], Begin]) -> Work:
-        prepared = self._works.prepared(
-            self._job_id,
-            lambda: find_operation(self._claim.operation),
-            self._request,
-            self._kernels.threads,
+        self._work, self._chunks = self._cache.prepared(
+            self._claim.job_id,
+            lambda: self._store.read(lambda session: load_request(session, self._claim.job_id)),
+            lambda request: find_operation(self._claim.operation)(request, self._kernels.threads),
         )
-        self._work, self._chunks = prepared.work, prepared.chunks
-        return prepared.work
+        return self._work
 
     def _prepare_kernels(self) -> bool:
         if self._kernels.ready:
@@ -169,7 +175,7 @@ class Attempt(Patient):
         if self._checkpoint is None:  # what has come further shows how far
             message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
             self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
-        return self._kernels.wait(self._vigil.should_stop)
+        return self._kernels.wait(self._keeper.should_stop)
 
     # a generation over several workers
 
@@ -181,11 +187,11 @@ class Attempt(Patient):
         if tasks is None or len(tasks) < 2:  # one part is flown as well here
             return False
         checkpoint, progress = self._checkpoint, self._unsaved
-        self._persist(lambda connection: hand_out(connection, self._claim, tasks, checkpoint, progress))
+        self._store.write(lambda session: hand_out(session, self._claim, tasks, checkpoint, progress))
         self._unsaved, self.handed_out = None, len(tasks)
         return True
 
-    def _hear(self, flown: Flown | None) -> None:
+    def _take_outcomes(self, flown: Flown | None) -> None:
         """Take the step that the outcomes of all chunks make; without them the chunks are handed out anew."""
         if flown is None or self._checkpoint is None or not isinstance(self._work, SpreadWork):
             return
@@ -210,15 +216,15 @@ class Attempt(Patient):
             self._unsaved, self._saved_at = None, self._clock()
 
     def _save(self, progress: Document, checkpoint: bytes | None) -> None:
-        self._persist(lambda connection: save_progress(connection, self._claim, progress, checkpoint))
+        self._store.write(lambda session: save_progress(session, self._claim, progress, checkpoint))
 
     # ends
 
     def _stopped(self) -> Ending:
-        reason = self._vigil.reason
+        reason = self._keeper.reason
         if reason is StopReason.SHUTDOWN:
             self._save_unsaved()
-            self._persist(lambda connection: release_job(connection, self._claim))
+            self._store.write(lambda session: release_job(session, self._claim))
             return Ending.RELEASED
         if reason is StopReason.CANCEL:
             return self._end(JobStatus.CANCELLED)
@@ -233,7 +239,7 @@ class Attempt(Patient):
 
     def _fail(self, error: Document) -> Ending:
         log.warning("job %s failed: %s", self._claim.job_id, error)
-        self._vigil.heed()
+        self._keeper.note_work_ended()
         try:
             return self._end(JobStatus.FAILED, error)
         except (StaleClaim, StorageFull):
@@ -272,9 +278,9 @@ class Attempt(Patient):
         error: Document | None = None,
         even_if_full: bool = False,
     ) -> Ending:
-        self._persist(
-            lambda connection: finish_job(
-                connection,
+        self._store.write(
+            lambda session: finish_job(
+                session,
                 self._claim,
                 status,
                 result=None if outcome is None else outcome.document,
@@ -286,8 +292,8 @@ class Attempt(Patient):
         return ENDINGS[status]
 
 
-def told_error(error: Exception, job_id: str) -> Document:
-    """Say to the user what went wrong."""
+def error_document(error: Exception, job_id: str) -> Document:
+    """Return what the user is shown of an error."""
     if isinstance(error, WorkRefused):
         return _error(error.code, error.detail, hint=error.hint, pointer=error.pointer)
     if isinstance(error, MemoryError):

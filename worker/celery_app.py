@@ -21,12 +21,13 @@ from celery.signals import (
 )
 from kombu.exceptions import OperationalError
 
+from app.jobs.queue import QUEUE
 from app.jobs.transport import celery_broker
 from app.observability.logs import configure_logging
 from app.observability.tracing import stop_tracing
 from app.settings import Settings, doubtful_variables, settings_or_exit
 from worker import numerics, shutdown
-from worker.hints import QUEUE, REAP
+from worker.hints import REAP
 from worker.presence import Presence
 from worker.row_watch import RowWatch
 

@@ -2,90 +2,96 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable
 
 from app.database import Database
-from app.jobs.chunks import ChunkClaim, finish_chunk, give_back_chunk
-from worker.attempt import Ending, told_error
-from worker.lease import StopReason, Vigil
+from app.jobs.chunks import finish_chunk, give_back_chunk
+from app.jobs.records import ChunkClaim
+from app.jobs.store import load_request
+from worker.attempt import Ending, error_document
+from worker.job_cache import JobCache
+from worker.lease import LeaseKeeper, StopReason
 from worker.numerics import Kernels
 from worker.operations import Begin, Document, SpreadWork, WorkInterrupted
-from worker.patience import Patient, StaleClaim
-from worker.works import Works
-
-log = logging.getLogger(__name__)
+from worker.retry import Retry, StaleClaim
 
 
-class ChunkFlight(Patient):
+class ChunkFlight:
     """The work on one claimed chunk.
 
     Parameters
     ----------
-    database : the job store.
-    chunk : the right to store its outcome.
-    vigil : keeps the claim alive and knows when to stop.
-    kernels : the compiled kernels of this process.
-    works : the work of the jobs that this process saw last.
-    clock : seconds that only rise.
+    database : Database
+        The job store.
+    chunk : ChunkClaim
+        The right to store its outcome.
+    keeper : LeaseKeeper
+        Keeps the claim alive and knows when to stop.
+    kernels : Kernels
+        The compiled kernels of this process.
+    cache : JobCache
+        The work of the jobs that this process saw last.
+    clock : callable
+        Seconds that only rise.
 
     Attributes
     ----------
-    error : why the whole job cannot be done, if the flight has shown that.
+    error : dict or None
+        Why the whole job cannot be done, if the flight has shown that.
     """
 
     def __init__(
         self,
         database: Database,
         chunk: ChunkClaim,
-        vigil: Vigil,
+        keeper: LeaseKeeper,
         kernels: Kernels,
-        works: Works,
+        cache: JobCache,
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        super().__init__(database, vigil, chunk.job_id, clock=clock)
         self._chunk = chunk
+        self._keeper = keeper
         self._kernels = kernels
-        self._works = works
+        self._cache = cache
+        self._store = Retry(database, keeper, clock=clock)
         self.error: Document | None = None
 
     def run(self, find_operation: Callable[[str], Begin]) -> Ending:
         """Fly the chunk and store what comes of it."""
         try:
             outcome = self._outcome(find_operation)
-            self._vigil.heed()
-            self._persist(lambda connection: finish_chunk(connection, self._chunk, outcome))
+            self._keeper.note_work_ended()
+            self._store.write(lambda session: finish_chunk(session, self._chunk, outcome))
         except WorkInterrupted:
-            self._vigil.heed()
+            self._keeper.note_work_ended()
             return self._stopped()
         except StaleClaim:
             return Ending.ABANDONED
         except Exception as error:  # noqa: BLE001 - whatever it is, the job says so
-            self.error = told_error(error, self._job_id)
+            self.error = error_document(error, self._chunk.job_id)
             return Ending.FAILED
         return Ending.CHUNK_STORED
 
     def _outcome(self, find_operation: Callable[[str], Begin]) -> bytes:
-        if not self._kernels.wait(self._vigil.should_stop):
+        if not self._kernels.wait(self._keeper.should_stop):
             raise WorkInterrupted
-        prepared = self._works.prepared(
-            self._job_id,
-            lambda: find_operation(self._chunk.operation),
-            self._request,
-            self._kernels.threads,
+        work, _ = self._cache.prepared(
+            self._chunk.job_id,
+            lambda: self._store.read(lambda session: load_request(session, self._chunk.job_id)),
+            lambda request: find_operation(self._chunk.operation)(request, self._kernels.threads),
         )
-        if not isinstance(prepared.work, SpreadWork):
+        if not isinstance(work, SpreadWork):
             raise TypeError(f"operation {self._chunk.operation!r} cannot be spread")
-        return prepared.work.fly(self._chunk.task, self._vigil.should_stop)
+        return work.fly(self._chunk.task, self._keeper.should_stop)
 
     def _stopped(self) -> Ending:
         """Leave the chunk: to the next worker, or alone if its job is ending."""
-        if self._vigil.reason is not StopReason.SHUTDOWN:
+        if self._keeper.reason is not StopReason.SHUTDOWN:
             return Ending.ABANDONED
         try:
-            self._persist(lambda connection: give_back_chunk(connection, self._chunk))
+            self._store.write(lambda session: give_back_chunk(session, self._chunk))
         except StaleClaim:
             return Ending.ABANDONED
         return Ending.RELEASED

@@ -16,8 +16,8 @@ from uuid import uuid4
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, TypeAdapter
 
-QUEUE = "morphid"
-RUN_JOB = "morphid.run_job"
+from app.jobs.queue import QUEUE, RUN_JOB
+
 REAP = "morphid.reap"
 LONGEST_BYTES = 16_384  # ours have about a thousand
 

@@ -1,4 +1,4 @@
-"""The vigil over one running job: renews its lease and learns, soon, that it should stop."""
+"""Keep the lease of a claim on a job or a chunk, and learn soon that its work should stop."""
 
 from __future__ import annotations
 
@@ -17,16 +17,14 @@ from typing import Self
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
-from app.jobs.chunks import ChunkClaim, look_at_chunk, renew_chunk
-from app.jobs.records import Claim, LeaseState
+from app.jobs.records import ChunkClaim, Claim, LeaseState
 from app.jobs.store import look_at_lease, renew_lease
 
 log = logging.getLogger(__name__)
 
 STUCK_AFTER_S = 120.0  # work looks at its stop signal every second; if not, a kernel never returned
-LOOK_EVERY_S = (
-    0.25  # a cancelled job must end within two seconds: one for a chunk of work, one for its result
-)
+# a cancelled job must end within two seconds: one for a chunk of work, one for its result
+LOOK_EVERY_S = 0.25
 
 
 class StopReason(Enum):
@@ -43,21 +41,27 @@ def end_process() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-class Vigil:
+class LeaseKeeper:
     """A thread that keeps one claim alive while kernels run (they release the GIL).
 
     Use as a context manager around the work, and hand `should_stop` to it.
 
     Parameters
     ----------
-    database : the job store.
-    claim : what to keep alive.
-    lease_s : how long each renewal lasts, s.
-    heartbeat_s : time between renewals, s.
-    shutting_down : tells that this worker is asked to end.
-    look_every_s : time between two looks, s.
-    on_stuck : called when the work has not heeded its stop signal for `stuck_after_s`.
-    stuck_after_s : patience with work that was asked to stop, s.
+    database : Database
+        The job store.
+    claim : Claim or ChunkClaim
+        What to keep alive.
+    lease_s, heartbeat_s : float
+        How long each renewal lasts, and the time between two, s.
+    shutting_down : callable
+        Whether this worker was asked to end.
+    look_every_s : float
+        Time between two looks at the row, s.
+    on_stuck : callable
+        Called when the work has ignored its stop signal for `stuck_after_s`.
+    stuck_after_s : float
+        Patience with work that was asked to stop, s.
     """
 
     def __init__(
@@ -80,13 +84,13 @@ class Vigil:
         self._look_every_s = min(look_every_s, heartbeat_s)
         self._on_stuck = on_stuck
         self._stuck_after_s = stuck_after_s
-        self._heeded = False
+        self._work_ended = False
         self._over = threading.Event()
         self._reason: StopReason | None = None
         self._thread = threading.Thread(
-            target=copy_context().run,  # its lines say whose job it watches
+            target=copy_context().run,  # its lines say whose job it is
             args=(self._watch,),
-            name=f"vigil-{claim.job_id}",
+            name=f"lease-{claim.job_id}",
             daemon=True,
         )
 
@@ -109,13 +113,9 @@ class Vigil:
         """Whether the work should stop; cheap enough to ask between chunks."""
         return self._reason is not None
 
-    def lose(self) -> None:
-        """Note that a write was refused: the claim is stale."""
-        self._reason = StopReason.LOST
-
-    def heed(self) -> None:
+    def note_work_ended(self) -> None:
         """Note that the work itself has stopped: its end is written as soon as the store lets it."""
-        self._heeded = True
+        self._work_ended = True
 
     def look(self) -> None:
         """Look at once, in the caller's thread; what cannot be looked at is looked at later."""
@@ -136,31 +136,27 @@ class Vigil:
             except SQLAlchemyError as error:
                 # The claim is not lost by that: nobody can take the job while the job store is away for all,
                 # and if it is away only for us, the fence keeps our writes out.
-                log.warning("job %s: lease not looked after: %s", self._claim.job_id, type(error).__name__)
+                log.warning("job %s: lease not renewed: %s", self._claim.job_id, type(error).__name__)
             if self._reason is None and self._shutting_down():
                 self._reason = StopReason.SHUTDOWN
             if self._reason is StopReason.LOST:
                 break
-            if self._reason is not None and not self._heeded:
+            if self._reason is not None and not self._work_ended:
                 asked_at = now if asked_at is None else asked_at
                 if now - asked_at > self._stuck_after_s:
                     break
         patience_s = self._stuck_after_s if self._reason is StopReason.LOST else 0.0
         if not self._over.wait(patience_s):
-            log.critical("job %s does not heed its stop signal; ending this process", self._claim.job_id)
+            log.critical("job %s ignores its stop signal; ending this process", self._claim.job_id)
             self._on_stuck()
 
     def _look(self) -> LeaseState:
-        with self._database.read() as connection:
-            if isinstance(self._claim, ChunkClaim):
-                return look_at_chunk(connection, self._claim)
-            return look_at_lease(connection, self._claim)
+        with self._database.read() as session:
+            return look_at_lease(session, self._claim)
 
     def _renew(self) -> LeaseState:
-        with self._database.write() as connection:
-            if isinstance(self._claim, ChunkClaim):
-                return renew_chunk(connection, self._claim, self._lease_s)
-            return renew_lease(connection, self._claim, self._lease_s)
+        with self._database.write() as session:
+            return renew_lease(session, self._claim, self._lease_s)
 
     def _judge(self, state: LeaseState) -> None:
         if not state.held:

@@ -27,7 +27,7 @@ from app.health.presence import Sign, note_seen, note_started, note_stopped
 from app.observability.counters import count
 from app.observability.job_counts import MESSAGES_DROPPED
 from app.settings import load_settings
-from app.version import VERSION
+from morphdata.version import VERSION
 from worker.row_watch import RowWatch
 from worker.transport import dropped
 
@@ -38,8 +38,8 @@ UNABLE_AFTER_S = 15.0  # free children that have not looked at the rows for so l
 IDLE_STATES = frozenset("TtZXx")  # stopped, traced, zombie, dead (proc(5))
 
 
-def worker_name() -> str:
-    """Name this process among all workers of the service: the parent's, not a pool child's."""
+def process_name() -> str:
+    """Name this process among all processes of workers."""
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
@@ -82,7 +82,7 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         settings = load_settings()
         self._every_s = settings.worker_seen_every_s
         self._engine = brief_engine(settings.database_url)
-        self._name = worker_name()
+        self._name = process_name()  # the parent's, not a pool child's
         self._timers: list[Any] = []
         self._known = False
         self._told = True

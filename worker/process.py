@@ -9,10 +9,8 @@ from __future__ import annotations
 import sys
 from typing import Final
 
-# imported before Celery looks for its tasks: what is loaded already is not looked for in the working folder
-from worker import tasks  # noqa: F401
-from worker.celery_app import app
-from worker.hints import QUEUE
+from app.jobs.queue import QUEUE
+from worker.tasks import run_job
 
 COMMANDS: Final = {
     "worker": ("worker", "--queues", QUEUE, "--prefetch-multiplier", "1"),
@@ -33,7 +31,8 @@ def main(arguments: list[str] | None = None) -> int:
     if role not in COMMANDS:
         sys.stderr.write(f"unknown role {role!r}: one of {', '.join(COMMANDS)}\n")
         return 2
-    code: int | None = app.start(["--quiet", *COMMANDS[role], *options])
+    # of a task, not of `worker.celery_app`: tasks that are loaded are not looked for in the working folder
+    code: int | None = run_job.app.start(["--quiet", *COMMANDS[role], *options])
     return code or 0
 
 

@@ -17,7 +17,8 @@ from celery.utils.functional import noop
 from celery.worker import state
 from kombu.message import Message
 
-from worker.hints import RUN_JOB, Hint
+from app.jobs.queue import RUN_JOB
+from worker.hints import Hint
 
 log = logging.getLogger(__name__)
 

@@ -7,19 +7,20 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import app.on_end  # noqa: F401 - workers end jobs
 from app.database import Database, Session
 from app.jobs.chunk_rows import Unit, UnitKind
-from app.jobs.chunks import ChunkClaim, claim_chunk, must_be_taken_over, take_over
-from app.jobs.records import Claim
+from app.jobs.chunks import claim_chunk, must_be_taken_over, take_over
+from app.jobs.records import ChunkClaim, Claim
 from app.jobs.store import claim_job
 from app.jobs.turns import next_unit
 from worker.attempt import Attempt, Ending
 from worker.chunk import ChunkFlight
-from worker.lease import Vigil
+from worker.job_cache import JobCache
+from worker.lease import LeaseKeeper
 from worker.numerics import Kernels
 from worker.operations import Begin, Document, find_operation
-from worker.telling import told
-from worker.works import Works
+from worker.spans import attempt_span
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +34,7 @@ def tell_nobody(_job_id: str, _count: int) -> None:
 
 
 def never() -> bool:
-    """Tell that nobody asked this worker to end."""
+    """Return False: no shutdown requested."""
     return False
 
 
@@ -52,7 +53,7 @@ class Runner:
     clock : seconds that only rise.
     publish : sends a number of wake-up messages for a job.
     chunk_lease_s : life of a claim on a chunk, s: shorter, for a lost one holds up its whole generation.
-    works : the work of the jobs that this process saw last.
+    cache : the work of the jobs that this process saw last.
     """
 
     database: Database
@@ -65,7 +66,7 @@ class Runner:
     clock: Callable[[], float] = time.monotonic
     publish: Callable[[str, int], None] = tell_nobody
     chunk_lease_s: float = CHUNK_LEASE_S
-    works: Works = field(default_factory=Works)
+    cache: JobCache = field(default_factory=JobCache)
 
     def run_next(self) -> tuple[Ending, str | None]:
         """Do what should be done next: a message only says that there is work, the rows say which.
@@ -77,27 +78,27 @@ class Runner:
         claim = None if self.shutting_down() else self._claim()
         if claim is None:
             return Ending.NOTHING_QUEUED, None
-        with told(claim):
+        with attempt_span(claim):
             if isinstance(claim, ChunkClaim):
                 ending, error = self._fly(claim)
             else:
                 return self._attempt(claim), claim.job_id
         taken = None if ending is Ending.RELEASED else self._taken_over(claim.job_id, error)
         if taken is not None:
-            with told(taken):
+            with attempt_span(taken):
                 ending = self._attempt(taken, error)
         return ending, claim.job_id
 
     def _fly(self, chunk: ChunkClaim) -> tuple[Ending, Document | None]:
-        vigil = Vigil(
+        keeper = LeaseKeeper(
             self.database,
             chunk,
             lease_s=self.chunk_lease_s,
             heartbeat_s=self.chunk_lease_s / HEARTBEATS_PER_LEASE,
             shutting_down=self.shutting_down,
         )
-        with vigil:
-            flight = ChunkFlight(self.database, chunk, vigil, self.kernels, self.works, clock=self.clock)
+        with keeper:
+            flight = ChunkFlight(self.database, chunk, keeper, self.kernels, self.cache, clock=self.clock)
             ending = flight.run(self.find_operation)
         log.debug("job %s: chunk %d.%d %s", chunk.job_id, chunk.generation, chunk.number, ending.value)
         return ending, flight.error
@@ -113,15 +114,15 @@ class Runner:
 
     def _attempt(self, claim: Claim, error: Document | None = None) -> Ending:
         log.info("job %s: attempt %d of %d", claim.job_id, claim.attempt, claim.max_attempts)
-        vigil = Vigil(
+        keeper = LeaseKeeper(
             self.database,
             claim,
             lease_s=self.lease_s,
             heartbeat_s=self.heartbeat_s,
             shutting_down=self.shutting_down,
         )
-        with vigil:
-            attempt = Attempt(self.database, claim, vigil, self.kernels, self.works, clock=self.clock)
+        with keeper:
+            attempt = Attempt(self.database, claim, keeper, self.kernels, self.cache, clock=self.clock)
             if error is None:
                 ending = attempt.run(self.find_operation)
             else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import socket
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database
 from app.database_errors import trouble_of
-from app.jobs.queue import messages_waiting
+from app.jobs.queue import RUN_JOB, messages_waiting
 from app.jobs.queue import publish as send_hint
 from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
@@ -26,7 +25,8 @@ from app.settings import load_settings
 from worker import numerics, shutdown
 from worker.attempt import Ending
 from worker.celery_app import app, threads_per_job
-from worker.hints import REAP, RUN_JOB
+from worker.hints import REAP
+from worker.presence import process_name
 from worker.runner import CHUNK_LEASE_S, Runner
 
 log = logging.getLogger(__name__)
@@ -48,7 +48,7 @@ class Process:
         self.runner = Runner(
             database=self.database,
             kernels=self.kernels,
-            worker_name=f"{socket.gethostname()}:{os.getpid()}",
+            worker_name=process_name(),
             lease_s=self.settings.lease_s,
             heartbeat_s=self.settings.heartbeat_s,
             shutting_down=shutdown.announced,

@@ -14,7 +14,7 @@ from app.health.service import Health
 from app.http.context import demands
 from app.http.problems import documented
 from app.keys.records import Scope
-from app.version import VERSION
+from morphdata.version import VERSION
 
 router = APIRouter(tags=["health"])
 

@@ -15,7 +15,7 @@ from app.health.records import Snapshot
 from app.observability import job_counts
 from app.observability.counters import Counted
 from app.observability.request_metrics import REGISTRY
-from app.version import VERSION
+from morphdata.version import VERSION
 
 FRESH_S = 2.0  # scrapers that come at once share one look at the rows
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from dataclasses import asdict
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -41,16 +42,7 @@ def worker_state(counts: WorkerCounts | None) -> WorkerState:
         status = "ok"
     else:
         status = "stalled" if counts.stalled else "none"
-    found = counts or NO_WORKERS
-    return WorkerState.model_validate(
-        {
-            "status": status,
-            "alive": found.alive,
-            "stalled": found.stalled,
-            "slots": found.slots,
-            "busy": found.busy,
-        }
-    )
+    return WorkerState.model_validate({"status": status, **asdict(counts or NO_WORKERS)})
 
 
 class Health:

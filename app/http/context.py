@@ -9,7 +9,7 @@ from fastapi import Depends, Request, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
 from starlette.types import Scope as AsgiScope
 
-from app.afterwards import Afterwards
+from app.background_writer import BackgroundWriter
 from app.database import Database
 from app.errors import MissingScope, Unauthorized
 from app.jobs.queue import Publisher
@@ -52,7 +52,7 @@ class Service:
     queue: QueueView
     keys: KeyRing
     key_watch: KeyWatch
-    afterwards: Afterwards
+    background: BackgroundWriter
     parsers: ParserPool
     webhook_policy: AddressPolicy
     reads: OwnerTurns

@@ -13,15 +13,17 @@ from app.http.problems import MEDIA_TYPE, problem_document
 LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
 
 
+def closing_answer(error: ServiceError, path: str) -> tuple[dict[str, str], bytes]:
+    """Headers and content of a problem document after which the connection closes."""
+    content = json.dumps(problem_document(error, path)).encode()
+    length = str(len(content))
+    headers = {"Content-Type": MEDIA_TYPE, "Content-Length": length, **error.headers, "Connection": "close"}
+    return headers, content
+
+
 async def answer_early(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
     """Answer with a problem document; what the client still sends is thrown away for `LINGER_S`."""
-    content = json.dumps(problem_document(error, scope["path"])).encode()
-    headers = {
-        "Content-Type": MEDIA_TYPE,
-        "Content-Length": str(len(content)),
-        **error.headers,
-        "Connection": "close",
-    }
+    headers, content = closing_answer(error, scope["path"])
     start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
     await send({"type": "http.response.start", "status": error.status, "headers": start})
     await send({"type": "http.response.body", "body": content, "more_body": True})

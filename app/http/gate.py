@@ -19,7 +19,7 @@ from app.audit.records import Action
 from app.errors import DatabaseAway, ServiceError, TooManyRefusals, Unauthorized
 from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
 from app.http.early_answer import answer_early
-from app.http.origins import Doors, refusal
+from app.http.origins import Boundary, refusal
 from app.http.request_id import current_request_id
 from app.keys.keyring import Refusal
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
@@ -46,7 +46,7 @@ class Gate:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
-        self._doors = Doors.of(settings)
+        self._boundary = Boundary.of(settings)
         self._demands_keys = settings.demands_keys
         self._limit = RefusalLimit()
 
@@ -55,7 +55,7 @@ class Gate:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        error = refusal(scope, self._doors)
+        error = refusal(scope, self._boundary)
         if error is not None:
             await answer_early(error, scope, receive, send)
             return
@@ -120,7 +120,7 @@ class Gate:
 
 def _note_refused(service: Service, address: str, prefix: str, refused: Refusal) -> None:
     logger.warning("an API key was refused: %s, prefix %r, from %s", refused.value, prefix, address)
-    service.afterwards.put(
+    service.background.put(
         partial(
             audit.insert_entry,
             action=Action.AUTH_REFUSED,

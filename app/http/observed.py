@@ -6,6 +6,7 @@ import logging
 import time
 from dataclasses import dataclass
 
+from opentelemetry.trace import StatusCode
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -82,10 +83,10 @@ class Observed:
                 route = _route(scope)
                 if exchange.status == 0:
                     exchange.answer(scope, CLIENT_WENT)
-                traced.rename(f"{scope['method']} {route}")
-                traced.note({"http.route": route, "http.response.status_code": exchange.status})
+                traced.update_name(f"{scope['method']} {route}")
+                traced.set_attributes({"http.route": route, "http.response.status_code": exchange.status})
                 if exchange.status >= 500:
-                    traced.fail(str(exchange.status))
+                    traced.set_status(StatusCode.ERROR, str(exchange.status))
                 _tell(scope, exchange, route)
 
 

@@ -23,8 +23,8 @@ OWN_SITES = frozenset({"same-origin", "none"})  # none: typed, or a bookmark
 
 
 @dataclass(frozen=True, slots=True)
-class Doors:
-    """What is let in.
+class Boundary:
+    """What is let in from outside.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class Doors:
     loopback_only: bool
 
     @classmethod
-    def of(cls, settings: Settings) -> Doors:
-        """The doors that the settings open.
+    def of(cls, settings: Settings) -> Boundary:
+        """The boundary that the settings draw.
 
         With keys a foreign page gains nothing by a name of its own: it has no key. So names are then
         restricted only on request.
@@ -50,15 +50,15 @@ class Doors:
         return cls(hosts=named | {settings.host.lower()}, loopback_only=not settings.allow_open)
 
 
-def refusal(scope: Scope, doors: Doors) -> ServiceError | None:
+def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
     """Return why a request is not even looked at; None when it may be."""
     headers = Headers(scope=scope)
-    if doors.loopback_only and not _came_over_loopback(scope):
+    if boundary.loopback_only and not _came_over_loopback(scope):
         return WrongHost(
             "The service was started for its own machine only.",
             hint="Set MORPHID_HOST to the address that it listens on; it then demands API keys.",
         )
-    if doors.hosts is not None and not _answers_for(headers.get("host", ""), doors.hosts):
+    if boundary.hosts is not None and not _answers_for(headers.get("host", ""), boundary.hosts):
         return WrongHost(
             "The service does not go by the name in the Host header.",
             "#header/Host",

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import logging
 import re
 import resource
@@ -24,7 +23,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
 from app.errors import ServiceBusy, ServiceError
-from app.http.problems import MEDIA_TYPE, problem_document
+from app.http.early_answer import closing_answer
 from app.observability.logs import configure_logging
 from app.settings import Settings, doubtful_variables, settings_or_exit
 
@@ -271,13 +270,7 @@ class GuardedProtocol(H11Protocol):
 
 
 def _answer(error: ServiceError) -> bytes:
-    content = json.dumps(problem_document(error, "")).encode()
-    headers = {
-        "Content-Type": MEDIA_TYPE,
-        "Content-Length": str(len(content)),
-        **error.headers,
-        "Connection": "close",
-    }
+    headers, content = closing_answer(error, "")
     lines = [f"HTTP/1.1 {error.status} ", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
     return "\r\n".join(lines).encode() + content
 

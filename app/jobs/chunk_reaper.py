@@ -10,9 +10,10 @@ from sqlalchemy import ColumnElement, Row, and_, func, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
-from app.jobs.chunk_rows import HANDED_OUT, OPEN, RUNNING, must_go_on
+from app.jobs.chunk_rows import CHUNKS, HANDED_OUT, OPEN, RUNNING, must_go_on
 from app.jobs.records import HELD, JobStatus
-from app.jobs.rows import transition
+from app.jobs.rows import JOBS
+from app.leases import Note
 from app.observability.counters import count
 from app.observability.job_counts import CHUNK_LEASES_LOST
 from app.tables import job_chunks, jobs
@@ -62,7 +63,7 @@ def _lost_chunks(session: Session, clock: ColumnElement[float]) -> list[Row[*tup
             jobs.c.fence.label("job_fence"),
         )
         .join(jobs, jobs.c.id == job_chunks.c.job_id)
-        .where(job_chunks.c.status == RUNNING, job_chunks.c.lease_until < clock, jobs.c.status.in_(HELD))
+        .where(CHUNKS.lost(clock), jobs.c.status.in_(HELD))
         .order_by(job_chunks.c.job_id, job_chunks.c.number)
         .limit(ROUND_LIMIT)
     )
@@ -74,19 +75,9 @@ def _given_up(row: Row[*tuple[Any, ...]]) -> bool:
 
 
 def _reopen(session: Session, row: Row[*tuple[Any, ...]]) -> bool:
-    changed = session.execute(
-        update(job_chunks)
-        .where(
-            job_chunks.c.job_id == row.job_id,
-            job_chunks.c.generation == row.generation,
-            job_chunks.c.number == row.number,
-            job_chunks.c.fence == row.fence,
-            job_chunks.c.status == RUNNING,
-        )
-        .values(status=OPEN, worker=None, lease_until=None, at=database_time())
-        .returning(job_chunks.c.number)
-    )
-    return changed.one_or_none() is not None
+    key = (row.job_id, row.generation, row.number)
+    still = job_chunks.c.status == RUNNING
+    return CHUNKS.reap(session, key, row.fence, still, status=OPEN) is not None
 
 
 def _fail(session: Session, row: Row[*tuple[Any, ...]]) -> bool:
@@ -114,15 +105,13 @@ def _cancel(session: Session, row: Row[*tuple[Any, ...]]) -> bool:
 
 
 def _end(session: Session, job_id: str, fence: int, status: JobStatus, more: Document) -> bool:
-    ended = transition(
+    ended = JOBS.reap(
         session,
-        jobs.c.id == job_id,
-        jobs.c.fence == fence,
+        (job_id,),
+        fence,
         HANDED_OUT,
-        event=status.value,
-        payload={"reason": "lease_lost", **more} if more else None,
+        note=Note(status.value, {"reason": "lease_lost", **more} if more else None),
         status=status.value,
-        fence=jobs.c.fence + 1,
         finished_at=database_time(),
         **more,
     )

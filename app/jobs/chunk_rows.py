@@ -15,9 +15,21 @@ from sqlalchemy import ColumnElement, Row, and_, exists, or_, select
 
 from app.database import Session, database_time
 from app.jobs.records import HELD, JobStatus
+from app.leases import Key, LeasedTable
 from app.tables import job_chunks, jobs
 
 OPEN, RUNNING, DONE = "open", "running", "done"  # states of a chunk
+CHUNKS = LeasedTable(
+    job_chunks,
+    key=(job_chunks.c.job_id, job_chunks.c.generation, job_chunks.c.number),
+    lease=job_chunks.c.lease_until,
+    waiting=OPEN,
+    held=(RUNNING,),
+    ends=(DONE,),
+    returning=(job_chunks.c.owner, job_chunks.c.fence, job_chunks.c.attempt),
+    unheld={"worker": None, "lease_until": None},
+    dated={"at": database_time()},
+)
 UNFINISHED = job_chunks.c.status.in_((OPEN, RUNNING))
 
 # handed out: running, and in no single worker's hands
@@ -42,6 +54,12 @@ class Unit:
     job_id: str
     generation: int = 0
     number: int = 0
+
+    @property
+    def key(self) -> Key:
+        """The row's key: a chunk's, or the job's."""
+        place = (self.generation, self.number) if self.kind is UnitKind.CHUNK else ()
+        return (self.job_id, *place)
 
 
 def deadline_passed() -> ColumnElement[bool]:

@@ -10,42 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from sqlalchemy import ColumnElement, delete, insert, select, update
+from sqlalchemy import delete, insert, select
 
 from app.database import Session, database_time
 from app.documents import Document
-from app.jobs.chunk_rows import DONE, HANDED_OUT, OPEN, RUNNING, Unit, must_go_on
-from app.jobs.records import HELD, Claim, LeaseState
-from app.jobs.rows import transition
-from app.jobs.store import (
-    LEASE_COLUMNS,
-    claim_from_row,
-    held_by,
-    lease_state,
-    replace_checkpoint,
-    save_progress,
-)
+from app.jobs.chunk_rows import CHUNKS, DONE, HANDED_OUT, OPEN, Unit, must_go_on
+from app.jobs.records import ChunkClaim, Claim
+from app.jobs.rows import JOBS
+from app.jobs.store import claim_from_row, replace_checkpoint, save_progress
 from app.jobs.turns import note_served
 from app.tables import job_checkpoints, job_chunks, jobs
-
-
-@dataclass(frozen=True, slots=True)
-class ChunkClaim:
-    """A worker's right to store the outcome of one chunk."""
-
-    job_id: str
-    owner: str
-    operation: str
-    generation: int
-    number: int
-    fence: int
-    attempt: int
-    worker: str
-    task: bytes
-    request_id: str | None = None
-    traceparent: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +60,7 @@ def hand_out(
     """
     if progress is not None and not save_progress(session, claim, progress, None):
         return False
-    row = transition(
-        session,
-        *held_by(claim),
-        event=None,
-        spread=True,
-        worker=None,
-        lease_until=None,
-        published_at=database_time(),
-    )
+    row = JOBS.settle(session, claim, spread=True, published_at=database_time(), **JOBS.unheld)
     if row is None:
         return False
     replace_checkpoint(session, claim, checkpoint)
@@ -123,23 +90,14 @@ def hand_out(
 
 def claim_chunk(session: Session, unit: Unit, worker_name: str, lease_s: float) -> ChunkClaim | None:
     """Take an open chunk; None when it is not open any more."""
-    row = session.execute(
-        update(job_chunks)
-        .where(*_place(unit.job_id, unit.generation, unit.number), job_chunks.c.status == OPEN)
-        .values(
-            status=RUNNING,
-            attempt=job_chunks.c.attempt + 1,
-            fence=job_chunks.c.fence + 1,
-            worker=worker_name,
-            lease_until=database_time() + lease_s,
-            at=database_time(),
-        )
-        .returning(job_chunks.c.owner, job_chunks.c.fence, job_chunks.c.attempt, job_chunks.c.task)
-    ).one_or_none()
+    lease_until = database_time() + lease_s
+    row = CHUNKS.claim(session, unit.key, lease_until=lease_until, worker=worker_name)
     if row is None:
         return None
     job = session.execute(
-        select(jobs.c.operation, jobs.c.request_id, jobs.c.traceparent).where(jobs.c.id == unit.job_id)
+        select(jobs.c.operation, jobs.c.request_id, jobs.c.traceparent, job_chunks.c.task)
+        .join(job_chunks, job_chunks.c.job_id == jobs.c.id)
+        .where(*CHUNKS.at(unit.key))
     ).one()
     note_served(session, row.owner)
     return ChunkClaim(
@@ -151,60 +109,20 @@ def claim_chunk(session: Session, unit: Unit, worker_name: str, lease_s: float) 
         fence=row.fence,
         attempt=row.attempt,
         worker=worker_name,
-        task=bytes(row.task),
+        task=bytes(job.task),
         request_id=job.request_id,
         traceparent=job.traceparent,
     )
 
 
-def _place(job_id: str, generation: int, number: int) -> tuple[ColumnElement[bool], ...]:
-    return (
-        job_chunks.c.job_id == job_id,
-        job_chunks.c.generation == generation,
-        job_chunks.c.number == number,
-    )
-
-
-def _held(chunk: ChunkClaim) -> tuple[ColumnElement[bool], ...]:
-    place = _place(chunk.job_id, chunk.generation, chunk.number)
-    return (*place, job_chunks.c.fence == chunk.fence, job_chunks.c.status == RUNNING)
-
-
-def look_at_chunk(session: Session, chunk: ChunkClaim) -> LeaseState:
-    """Learn whether to stop, writing nothing."""
-    return lease_state(
-        session.execute(
-            select(*LEASE_COLUMNS)
-            .join(job_chunks, jobs.c.id == job_chunks.c.job_id)
-            .where(*_held(chunk), jobs.c.status.in_(HELD))
-        ).one_or_none()
-    )
-
-
-def renew_chunk(session: Session, chunk: ChunkClaim, lease_s: float) -> LeaseState:
-    """The heartbeat: push the chunk's lease out and learn whether to stop."""
-    session.execute(update(job_chunks).where(*_held(chunk)).values(lease_until=database_time() + lease_s))
-    return look_at_chunk(session, chunk)
-
-
 def finish_chunk(session: Session, chunk: ChunkClaim, outcome: bytes) -> bool:
     """Store what came of a chunk; False when it is another's now, or forgotten."""
-    return _leave(session, chunk, status=DONE, outcome=outcome)
+    return CHUNKS.settle(session, chunk, status=DONE, outcome=outcome, **CHUNKS.unheld) is not None
 
 
 def give_back_chunk(session: Session, chunk: ChunkClaim) -> bool:
     """Let another worker fly the chunk (graceful stop); the attempt is not counted."""
-    return _leave(session, chunk, status=OPEN, attempt=job_chunks.c.attempt - 1)
-
-
-def _leave(session: Session, chunk: ChunkClaim, **values: Any) -> bool:
-    left = (
-        update(job_chunks)
-        .where(*_held(chunk))
-        .values(worker=None, lease_until=None, at=database_time(), **values)
-        .returning(job_chunks.c.number)
-    )
-    return session.execute(left).one_or_none() is not None
+    return CHUNKS.give_back(session, chunk) is not None
 
 
 def must_be_taken_over(session: Session, job_id: str) -> bool:
@@ -226,14 +144,12 @@ def take_over(
     Claim or None
         None when another worker has it, or nothing is to be done.
     """
-    row = transition(
+    row = JOBS.take(
         session,
         jobs.c.id == job_id,
         HANDED_OUT if whatever else must_go_on(),
-        event=None,
-        fence=jobs.c.fence + 1,
-        worker=worker_name,
         lease_until=database_time() + lease_s,
+        worker=worker_name,
     )
     return None if row is None else replace(claim_from_row(row, worker_name), waited_s=0.0)
 

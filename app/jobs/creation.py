@@ -11,8 +11,9 @@ from app.documents import Document, Sealed, finite, sealed
 from app.errors import IdempotencyConflict
 from app.identifiers import new_identifier
 from app.jobs.records import Job, JobStatus
-from app.jobs.rows import JOB_COLUMNS, get_job, insert_event, job_from_row
+from app.jobs.rows import JOB_COLUMNS, JOBS, job_from_row, write_event
 from app.keys import quota
+from app.leases import Note
 from app.tables import idempotency_keys, job_requests, jobs, owners
 
 
@@ -105,8 +106,9 @@ def create_job(
     size_bytes = len(document.data)
     quota.charge(session, origin.key_id, flights=flights_estimated, size_bytes=size_bytes)
     starts_by = None if terms.expires_in_s is None else database_time() + terms.expires_in_s
-    session.execute(
-        insert(jobs).values(
+    row = session.execute(
+        insert(jobs)
+        .values(
             id=job_id,
             owner=owner,
             operation=operation,
@@ -130,13 +132,14 @@ def create_job(
             flights_estimated=flights_estimated,
             size_bytes=size_bytes,
         )
-    )
+        .returning(*JOBS.returning)
+    ).one()
     session.execute(
         insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256)
     )
-    insert_event(session, job_id, 1, "queued", JobStatus.QUEUED.value, 0, None)
+    write_event(session, row, Note("queued"))
     session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
-    return get_job(session, owner, job_id)
+    return job_from_row(row)
 
 
 def _take_idempotency_key(

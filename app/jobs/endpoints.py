@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
@@ -30,9 +30,10 @@ from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
 from app.jobs.results import JobResult
-from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, Operation
+from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, OperationName
 from app.keys.records import Scope
 from morphdata.execution import Label
+from morphdata.operations import OPERATIONS
 
 router = APIRouter(tags=["jobs"])
 
@@ -58,15 +59,14 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
     204: {"description": "The job has ended and every event was seen: do not connect again."},
 }
 
-# by reference: the forms of the four bodies are in the document already
+# by reference: the forms of the bodies are in the document already
 REQUEST: dict[str, Any] = {
     "description": "The request, in the form that `POST /{operation}` takes.",
     "content": {
         "application/json": {
             "schema": {
                 "anyOf": [
-                    {"$ref": f"#/components/schemas/{operation.capitalize()}Request"}
-                    for operation in get_args(Operation)
+                    {"$ref": f"#/components/schemas/{operation.request.__name__}"} for operation in OPERATIONS
                 ]
             }
         }
@@ -81,7 +81,7 @@ def as_json(answer: BaseModel) -> Response:
 
 def _wanted(
     status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
-    operation: Annotated[Operation | None, Query()] = None,
+    operation: Annotated[OperationName | None, Query()] = None,
     label: Annotated[Label | None, Query(description="The `execution.label` of the request.")] = None,
     created_after: Annotated[AwareDatetime | None, Query(description="From this moment on.")] = None,
     created_before: Annotated[AwareDatetime | None, Query(description="Before this moment.")] = None,

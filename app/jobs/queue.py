@@ -10,8 +10,8 @@ from typing import Any
 
 from app.settings import load_settings
 
-TASK_NAME = "morphid.run_job"
-QUEUE_NAME = "morphid"
+RUN_JOB = "morphid.run_job"
+QUEUE = "morphid"
 WARM_UP_AFTER_S = 1.0  # the start of the process comes first
 
 logger = logging.getLogger(__name__)
@@ -40,7 +40,7 @@ def publish(job_id: str, broker_url: str | None = None) -> bool:
     """
     url = broker_url or load_settings().broker_url
     try:
-        _client(url).send_task(TASK_NAME, args=[job_id], queue=QUEUE_NAME, retry=False)
+        _client(url).send_task(RUN_JOB, args=[job_id], queue=QUEUE, retry=False)
     except Exception as error:  # noqa: BLE001 - whatever a broker does, the row is safe and the caller goes on
         logger.warning("wake-up message for %s not sent (%s); the reaper will repeat it", job_id, error)
         return False
@@ -51,7 +51,7 @@ def messages_waiting(broker_url: str) -> int | None:
     """Count the wake-up messages that no worker has taken yet; None when the broker cannot be asked."""
     try:
         with _client(broker_url).connection_for_write() as connection:
-            return int(connection.default_channel.queue_declare(queue=QUEUE_NAME).message_count)
+            return int(connection.default_channel.queue_declare(queue=QUEUE).message_count)
     except Exception as error:  # noqa: BLE001 - as in `publish`
         logger.warning("the broker does not say how many messages wait (%s)", error)
         return None

@@ -14,8 +14,9 @@ from app.database import Session, database_time
 from app.documents import Document
 from app.jobs.chunk_reaper import reap_chunks
 from app.jobs.records import HELD, JobStatus, ReapReport
-from app.jobs.rows import transition
+from app.jobs.rows import JOBS
 from app.jobs.waiting import idle_slots
+from app.leases import Note
 from app.tables import jobs
 
 DEADLINE_GRACE_S = (
@@ -54,16 +55,13 @@ def reap(
     done: dict[str, list[str]] = {"requeued": [], "failed": [], "cancelled": [], "expired": []}
     for row in _overdue(session, clock, deadline_grace_s):
         kind, event, values = _verdict(row)
-        changed = transition(
+        error = {"error": values["error"]} if "error" in values else {}
+        changed = JOBS.reap(
             session,
-            jobs.c.id == row.id,
-            jobs.c.fence == row.fence,
+            (row.id,),
+            row.fence,
             jobs.c.status == row.status,
-            event=event,
-            payload={"reason": row.reason, **({"error": values["error"]} if "error" in values else {})},
-            fence=jobs.c.fence + 1,  # a stalled worker that wakes up now writes in vain
-            lease_until=None,
-            worker=None,
+            note=Note(event, {"reason": row.reason, **error}),
             **values,
         )
         if changed is not None:
@@ -88,9 +86,8 @@ def log_ends(report: ReapReport) -> None:
 
 def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> list[Row[Any]]:
     """Jobs whose lease ran out, or whose deadline has passed."""
-    held = jobs.c.status.in_(HELD)
-    lease_lost = held & (jobs.c.lease_until < clock)
-    overrun = held & (jobs.c.deadline_at + grace_s < clock)
+    lease_lost = JOBS.lost(clock)
+    overrun = jobs.c.status.in_(HELD) & (jobs.c.deadline_at + grace_s < clock)
     waited_too_long = (jobs.c.status == JobStatus.QUEUED.value) & (jobs.c.deadline_at < clock)
     rows = session.execute(
         select(

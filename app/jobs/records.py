@@ -87,6 +87,33 @@ class Claim:
     traceparent: str | None = None
     waited_s: float = 0.0  # since the job was made
 
+    @property
+    def key(self) -> tuple[str]:
+        """Key of the job's row."""
+        return (self.job_id,)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkClaim:
+    """A worker's right to store the outcome of one chunk."""
+
+    job_id: str
+    owner: str
+    operation: str
+    generation: int
+    number: int
+    fence: int
+    attempt: int
+    worker: str
+    task: bytes
+    request_id: str | None = None
+    traceparent: str | None = None
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """Key of the chunk's row."""
+        return (self.job_id, self.generation, self.number)
+
 
 @dataclass(frozen=True, slots=True)
 class LeaseState:

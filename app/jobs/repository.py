@@ -13,6 +13,7 @@ from app.documents import unpacked_json
 from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
 from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
+from app.pages import read_page
 from app.tables import (
     STATUSES,
     artifacts,
@@ -76,26 +77,27 @@ class JobFilter:
 
 
 def list_jobs(
-    session: Session, owner: str, wanted: JobFilter, *, before: str | None, limit: int
-) -> list[Job]:
-    """Newest jobs first, older than the id `before` when given."""
-    places = [] if before is None else [jobs.c.id < before]
+    session: Session, owner: str, wanted: JobFilter, *, cursor: str | None, limit: int
+) -> tuple[list[Job], str | None]:
+    """One page of the owner's jobs, and the cursor of the next page; None on the last."""
+    places = [] if cursor is None else [jobs.c.id < cursor]
     times = list(wanted.times())
     if times:
         ends = session.execute(
             select(func.min(jobs.c.id), func.max(jobs.c.id)).where(jobs.c.owner == owner, *places, *times)
         ).one()
         if ends[0] is None:
-            return []
+            return [], None
         # ids rise with time but for what two hosts' clocks differ: between these there is hardly another job
         places = [jobs.c.id.between(*ends), *times]
     matches = [jobs.c.owner == owner, *wanted.kinds(), *places]
     if len(wanted.ranges) > 1:
-        matches = [jobs.c.id.in_(_newest_ids(session, wanted.ranges, matches, limit))]
+        matches = [jobs.c.id.in_(_newest_ids(session, wanted.ranges, matches, limit + 1))]
     elif wanted.ranges != EVERY_STATUS:
         matches.append(jobs.c.status == wanted.ranges[0])
-    rows = session.execute(select(*JOB_COLUMNS).where(*matches).order_by(jobs.c.id.desc()).limit(limit))
-    return [job_from_row(row) for row in rows]
+    query = select(*JOB_COLUMNS).where(*matches)
+    rows, next_cursor = read_page(session, query, jobs.c.id, cursor=None, limit=limit)  # it is in `places`
+    return [job_from_row(row) for row in rows], next_cursor
 
 
 def _newest_ids(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from morphdata.identify import IdentifyResult
-from morphdata.optimize import OptimizeResult
-from morphdata.simulate import SimulateResult
-from morphdata.study import StudyResult
+from typing import TYPE_CHECKING, Any, Union
 
-JobResult = IdentifyResult | StudyResult | SimulateResult | OptimizeResult
+from morphdata.operations import OPERATIONS
+
+if TYPE_CHECKING:
+    JobResult = Any
+else:
+    JobResult = Union[tuple(operation.result for operation in OPERATIONS)]  # noqa: UP007 - of a list

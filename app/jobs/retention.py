@@ -14,7 +14,7 @@ from app.database import Session, database_time
 from app.jobs.records import FINISHED
 from app.settings import Settings
 from app.tables import idempotency_keys, jobs, trajectories
-from app.webhooks.outbox import forget_before
+from app.webhooks.outbox import forget_ended
 
 DAY_S = 86_400.0
 ROUND_LIMIT = 100  # rows of a table in one round: their files may be megabytes each
@@ -67,7 +67,7 @@ def forget(session: Session, keep: Keep) -> Forgotten:
     return Forgotten(
         jobs=forget_jobs(session, keep.jobs) if keep.jobs else 0,
         trajectories=_forget_trajectories(session, keep.trajectories) if keep.trajectories else 0,
-        deliveries=forget_before(session, _now(session) - keep.deliveries * DAY_S) if keep.deliveries else 0,
+        deliveries=forget_ended(session, keep.deliveries * DAY_S) if keep.deliveries else 0,
         audit=prune(session, keep.audit * DAY_S) if keep.audit else 0,
     )
 
@@ -93,7 +93,3 @@ def _some(session: Session, table: Table, old: ColumnElement[bool]) -> list[str]
     """Ids of some old rows that no other process is just deleting."""
     query = select(table.c.id).where(old).limit(ROUND_LIMIT).with_for_update(skip_locked=True)
     return list(session.scalars(query))
-
-
-def _now(session: Session) -> float:
-    return float(session.scalar(select(database_time())) or 0.0)

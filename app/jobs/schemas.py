@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,9 +11,13 @@ from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.waiting import QueuePlace as Place
 from app.keys.schemas import Quotas
+from morphdata.operations import OPERATIONS
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
-Operation = Literal["identify", "study", "simulate", "optimize"]
+if TYPE_CHECKING:
+    OperationName = str
+else:
+    OperationName = Literal[tuple(operation.name for operation in OPERATIONS)]
 
 
 class Progress(BaseModel):
@@ -57,9 +61,9 @@ class SampleSummary(BaseModel):
 
 
 class RequestSummary(BaseModel):
-    """The small facts of a job's request."""
+    """The small facts of a job's request; which there are depends on the operation."""
 
-    model_config = ConfigDict(extra="ignore")
+    model_config = ConfigDict(extra="allow")
 
     aircraft: str | None = None
     links_per_wing: int | None = Field(default=None, description="Of the equivalent model.")

@@ -20,12 +20,8 @@ def shown(session: Session, queue: QueueView, job: StoredJob) -> Job:
 
 def page(session: Session, owner: str, wanted: JobFilter, *, cursor: str | None, limit: int) -> JobPage:
     """One page of the owner's jobs, newest first."""
-    found = repository.list_jobs(session, owner, wanted, before=cursor, limit=limit + 1)
-    shown_jobs = found[:limit]
-    return JobPage(
-        jobs=[Job.of(job) for job in shown_jobs],
-        next_cursor=shown_jobs[-1].id if len(found) > limit else None,
-    )
+    found, next_cursor = repository.list_jobs(session, owner, wanted, cursor=cursor, limit=limit)
+    return JobPage(jobs=[Job.of(job) for job in found], next_cursor=next_cursor)
 
 
 def event_page(

@@ -1,31 +1,28 @@
 """The life of a job as rows: created, claimed, kept alive, finished.
 
 The row is the truth, messages are hints. Every function takes a `Session` and leaves the commit to its caller
-(a worker, or an endpoint's transaction). Every change of state passes through `transition`: a compare-and-set
-that writes its event in the same transaction. Writes of a worker carry its claim's fence; a stale one changes
-nothing and answers False.
+(a worker, or an endpoint's transaction). Jobs are leased work (`app.leases`): every change of state is a
+compare-and-set that writes its event in the same transaction. Writes of a worker carry its claim's fence; a
+stale one changes nothing and returns False.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
-from sqlalchemy import ColumnElement, Row, case, delete, insert, literal, or_, select, update
+from sqlalchemy import case, delete, insert, literal, or_, select
 
 from app.database import Session, database_time
 from app.documents import Document, finite, packed, unpacked
 from app.errors import JobNotFound
-from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
-from app.jobs.chunk_rows import at_rest, deadline_passed, in_time
+from app.jobs.chunk_rows import CHUNKS, at_rest, deadline_passed, in_time
 from app.jobs.creation import create_job
-from app.jobs.records import FINISHED, HELD, Claim, Job, JobStatus, LeaseState
-from app.jobs.rows import get_job, job_from_row, thin_events, transition
+from app.jobs.records import FINISHED, HELD, ChunkClaim, Claim, Job, JobStatus, LeaseState
+from app.jobs.rows import JOBS, get_job, job_from_row, thin_events
 from app.jobs.turns import note_served
-from app.models.left_models import left_model
-from app.models.repository import insert_model
-from app.tables import job_checkpoints, job_requests, job_results, jobs
+from app.leases import LeasedRow, Note
+from app.tables import job_checkpoints, job_chunks, job_requests, job_results, jobs
 
 __all__ = [
     "claim_job",
@@ -40,9 +37,6 @@ __all__ = [
     "request_cancel",
     "save_progress",
 ]
-
-# the database's clock judges deadlines: a worker's may be an hour wrong
-LEASE_COLUMNS = (jobs.c.status, deadline_passed().label("deadline_passed"))
 
 
 def load_request(session: Session, job_id: str) -> Document:
@@ -63,20 +57,16 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
     first, or it was cancelled) or its time is over.
     """
     now = database_time()
-    row = transition(
+    first = jobs.c.started_at.is_(None)
+    row = JOBS.claim(
         session,
-        jobs.c.id == job_id,
-        jobs.c.status == JobStatus.QUEUED.value,
+        (job_id,),
         in_time(),
-        event="started",
-        payload={"worker": worker_name},
-        status=JobStatus.RUNNING.value,
-        fence=jobs.c.fence + 1,
-        attempt=jobs.c.attempt + 1,
-        worker=worker_name,
         lease_until=now + lease_s,
-        started_at=case((jobs.c.started_at.is_(None), now), else_=jobs.c.started_at),
-        deadline_at=case((jobs.c.started_at.is_(None), now + jobs.c.max_seconds), else_=jobs.c.deadline_at),
+        note=Note("started", {"worker": worker_name}),
+        worker=worker_name,
+        started_at=case((first, now), else_=jobs.c.started_at),
+        deadline_at=case((first, now + jobs.c.max_seconds), else_=jobs.c.deadline_at),
     )
     if row is None:
         return None
@@ -84,7 +74,7 @@ def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 
     return claim_from_row(row, worker_name)
 
 
-def claim_from_row(row: Row[Any], worker_name: str) -> Claim:
+def claim_from_row(row: LeasedRow, worker_name: str) -> Claim:
     """Turn the row of a job that was just claimed into the claim."""
     return Claim(
         job_id=row.id,
@@ -101,30 +91,24 @@ def claim_from_row(row: Row[Any], worker_name: str) -> Claim:
     )
 
 
-def held_by(claim: Claim) -> Sequence[ColumnElement[bool]]:
-    """Tell the row of a claim as long as the claim holds."""
-    return (jobs.c.id == claim.job_id, jobs.c.fence == claim.fence, jobs.c.status.in_(HELD))
-
-
-def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> LeaseState:
+def renew_lease(session: Session, claim: Claim | ChunkClaim, lease_s: float = 60.0) -> LeaseState:
     """The heartbeat: push the lease out and learn whether to stop."""
-    return lease_state(
-        session.execute(
-            update(jobs)
-            .where(*held_by(claim))
-            .values(lease_until=database_time() + lease_s)
-            .returning(*LEASE_COLUMNS)
-        ).one_or_none()
-    )
+    (CHUNKS if isinstance(claim, ChunkClaim) else JOBS).renew(session, claim, lease_s)
+    return look_at_lease(session, claim)
 
 
-def look_at_lease(session: Session, claim: Claim) -> LeaseState:
-    """Learn whether to stop, writing nothing: cheap enough to ask several times a second."""
-    return lease_state(session.execute(select(*LEASE_COLUMNS).where(*held_by(claim))).one_or_none())
+def look_at_lease(session: Session, claim: Claim | ChunkClaim) -> LeaseState:
+    """Learn whether to stop, writing nothing: cheap enough to ask several times a second.
 
-
-def lease_state(row: Row[Any] | None) -> LeaseState:
-    """Turn a held job's `LEASE_COLUMNS` into the answer to a heartbeat; None when it is not held any more."""
+    The database's clock judges deadlines: a worker's may be an hour wrong.
+    """
+    query = select(jobs.c.status, deadline_passed().label("deadline_passed"))
+    if isinstance(claim, ChunkClaim):
+        query = query.join(job_chunks, job_chunks.c.job_id == jobs.c.id).where(jobs.c.status.in_(HELD))
+        query = query.where(*CHUNKS.held_by(claim))
+    else:
+        query = query.where(*JOBS.held_by(claim))
+    row = session.execute(query).one_or_none()
     if row is None:
         return LeaseState(held=False)
     return LeaseState(
@@ -152,7 +136,7 @@ def save_progress(session: Session, claim: Claim, progress: Document, checkpoint
     values: Document = {"progress": clean}
     if clean.get("flights") is not None:
         values["flights"] = int(clean["flights"])
-    row = transition(session, *held_by(claim), event="progress", payload=clean, **values)
+    row = JOBS.settle(session, claim, note=Note("progress", clean), **values)
     if row is None:
         return False
     thin_events(session, row.id, row.event_seq)
@@ -216,19 +200,14 @@ def finish_job(
     }
     if error is not None:
         values["error"] = finite(error)
-    succeeded = ending == JobStatus.SUCCEEDED.value
-    identified = left_model(claim.operation, result) if succeeded and result is not None else None
-    if identified is not None:
-        values["model_id"] = new_identifier("model")
     payload = {"error": values["error"]} if error is not None else None
-    if succeeded:
+    if ending == JobStatus.SUCCEEDED.value:
         # work that counts no flights has flown once
         values["flights"] = case((jobs.c.flights > 0, jobs.c.flights), else_=1)
     document = None if result is None else packed({**result, "partial": True} if partial else result)
     files = artifacts or {}
     values["size_bytes"] = jobs.c.size_bytes + len(document or b"") + sum(map(len, files.values()))
-    row = transition(session, *held_by(claim), event=ending, payload=payload, **values)
-    if row is None:
+    if JOBS.settle(session, claim, note=Note(ending, payload, result), **values) is None:
         return False
     if document is not None:
         session.execute(
@@ -237,16 +216,6 @@ def finish_job(
             )
         )
     store_artifacts(session, claim.job_id, files)
-    if identified is not None:
-        insert_model(
-            session,
-            model_id=row.model_id,
-            owner=row.owner,
-            job_id=row.id,
-            key_id=row.key_id,
-            request=load_request(session, row.id),
-            identified=identified,
-        )
     return True
 
 
@@ -256,16 +225,12 @@ def release_job(session: Session, claim: Claim) -> bool:
     A job that was being cancelled ends as cancelled instead. Publish the id after the commit.
     """
     cancelling = jobs.c.status == JobStatus.CANCELLING.value
-    row = transition(
+    row = JOBS.give_back(
         session,
-        *held_by(claim),
-        event="released",
-        payload={"worker": claim.worker},
+        claim,
+        note=Note("released", {"worker": claim.worker}),
         status=case((cancelling, literal(JobStatus.CANCELLED.value)), else_=literal(JobStatus.QUEUED.value)),
         finished_at=case((cancelling, database_time()), else_=None),
-        attempt=jobs.c.attempt - 1,
-        lease_until=None,
-        worker=None,
         published_at=database_time(),
     )
     return row is not None
@@ -282,23 +247,20 @@ def request_cancel(session: Session, owner: str, job_id: str) -> Job:
     JobNotFound
         When `owner` has no such job.
     """
-    row = transition(
+    mine = (jobs.c.id == job_id, jobs.c.owner == owner)
+    row = JOBS.change(
         session,
-        jobs.c.id == job_id,
-        jobs.c.owner == owner,
+        *mine,
         or_(jobs.c.status == JobStatus.QUEUED.value, at_rest()),
-        event="cancelled",
+        note=Note("cancelled"),
         status=JobStatus.CANCELLED.value,
         fence=jobs.c.fence + 1,
         finished_at=database_time(),
+    ) or JOBS.change(
+        session,
+        *mine,
+        jobs.c.status == JobStatus.RUNNING.value,
+        note=Note("cancelling"),
+        status=JobStatus.CANCELLING.value,
     )
-    if row is None:
-        row = transition(
-            session,
-            jobs.c.id == job_id,
-            jobs.c.owner == owner,
-            jobs.c.status == JobStatus.RUNNING.value,
-            event="cancelling",
-            status=JobStatus.CANCELLING.value,
-        )
     return get_job(session, owner, job_id) if row is None else job_from_row(row)

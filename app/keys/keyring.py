@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 
-from app.afterwards import Afterwards
+from app.background_writer import BackgroundWriter
 from app.database import Database
 from app.keys.records import ApiKey
 from app.keys.repository import StoredKey, find_key, note_use
@@ -41,17 +41,17 @@ class KeyRing:
     Parameters
     ----------
     database : Database
-    afterwards : Afterwards
+    background : BackgroundWriter
         Takes the note of a key's last use, which no request waits for.
     clock
         Seconds that only rise.
     """
 
     def __init__(
-        self, database: Database, afterwards: Afterwards, clock: Callable[[], float] = time.monotonic
+        self, database: Database, background: BackgroundWriter, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._database = database
-        self._afterwards = afterwards
+        self._background = background
         self._clock = clock
         self._remembered: OrderedDict[str, _Remembered] = OrderedDict()
 
@@ -74,7 +74,7 @@ class KeyRing:
             return Refusal.EXPIRED
         if known.use_is_due:
             known.use_is_due = False
-            self._afterwards.put(partial(note_use, key_id=key.id))
+            self._background.put(partial(note_use, key_id=key.id))
         return key
 
     def _read(self, prefix: str) -> _Remembered | None:

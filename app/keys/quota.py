@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 from sqlalchemy import ColumnElement, case, func, select, update
 
-from app.database import Session, database_time, insert_new
+from app.database import Session, current_time, insert_new
 from app.errors import QuotaExceeded
 from app.jobs.records import FINISHED
 from app.keys.records import Quota, Usage
+from app.leases import LeasedRow, Note
 from app.tables import (
     STATUSES,
     api_keys,
@@ -75,32 +76,22 @@ def charge_bytes(session: Session, key_id: str | None, size_bytes: int) -> None:
     _charge(session, key_id, _Asked(jobs=0, flights=0, size_bytes=size_bytes))
 
 
-def settle(session: Session, key_id: str | None, *, estimated: int, flown: int, day: int) -> None:
-    """Replace the estimate of a job by what it flew; call it once, when the job ends.
-
-    Parameters
-    ----------
-    estimated : int
-        What `charge` was told, ``jobs.flights_estimated``.
-    flown : int
-        ``jobs.flights``.
-    day : int
-        The day it was charged to: ``usage_day(jobs.created_at)``.
-    """
-    if key_id is None or estimated == flown:
+def settle(session: Session, job: LeasedRow, _note: Note) -> None:
+    """Replace the estimate of a job that has ended by what it flew, on the day that it was charged to."""
+    if job.key_id is None or job.flights_estimated == job.flights:
         return
-    corrected = key_usage.c.flights + (flown - estimated)
+    corrected = key_usage.c.flights + (job.flights - job.flights_estimated)
     session.execute(
         update(key_usage)
-        .where(key_usage.c.key_id == key_id, key_usage.c.day == day)
-        # never below nothing: a job posted in the millisecond of midnight was charged to the day before
+        .where(key_usage.c.key_id == job.key_id, key_usage.c.day == usage_day(job.created_at))
+        # never below zero: a job posted in the millisecond of midnight was charged to the day before
         .values(flights=case((corrected > 0, corrected), else_=0))
     )
 
 
 def usage(session: Session, key_id: str) -> Usage:
     """Count what a key uses now."""
-    today = usage_day(_now(session))
+    today = usage_day(current_time(session))
     return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
 
 
@@ -114,11 +105,11 @@ def _charge(session: Session, key_id: str | None, asked: _Asked) -> None:
     if row is not None:
         _refuse_excess(session, key_id, Quota(*row), asked)
     if asked.flights:
-        _add_flights(session, key_id, usage_day(_now(session)), asked.flights)
+        _add_flights(session, key_id, usage_day(current_time(session)), asked.flights)
 
 
 def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -> None:
-    now = _now(session)
+    now = current_time(session)
     if quota.max_jobs_in_flight is not None and asked.jobs:
         _compare("jobs_in_flight", quota.max_jobs_in_flight, _jobs_in_flight(session, key_id), 1, SOON_S)
     if quota.max_flights_per_day is not None and asked.flights:
@@ -133,10 +124,6 @@ def _refuse_excess(session: Session, key_id: str, quota: Quota, asked: _Asked) -
 def _compare(name: str, limit: int, used: int, asked: int, retry_after_s: int) -> None:
     if used + asked > limit:
         raise QuotaExceeded(name, limit=limit, used=used, asked=asked, retry_after_s=retry_after_s)
-
-
-def _now(session: Session) -> float:
-    return float(session.scalar(select(database_time())) or 0.0)
 
 
 def _jobs_in_flight(session: Session, key_id: str) -> int:

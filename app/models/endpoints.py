@@ -14,7 +14,7 @@ from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.problems import documented
 from app.keys.records import Scope
-from app.models import repository, service
+from app.models import repository
 from app.models.schemas import IdentifiedModel, ModelPage
 
 router = APIRouter(tags=["models"])
@@ -35,7 +35,7 @@ def list_models(
 ) -> ModelPage:
     """Your identified models, newest first."""
     with app.database.read() as session:
-        return service.page(session, owner, cursor=cursor, limit=limit)
+        return repository.list_models(session, owner, cursor=cursor, limit=limit)
 
 
 @router.get(
@@ -50,7 +50,8 @@ def get_model(
 ) -> IdentifiedModel:
     """Return parameters, fit, aircraft and flight of one model."""
     with app.database.read() as session:
-        return service.get(session, owner, model_id)
+        summary, document = repository.get_model(session, owner, model_id)
+    return IdentifiedModel(**summary.model_dump(), **document)
 
 
 @router.delete(

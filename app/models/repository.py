@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Row, delete, insert, select, update
@@ -12,22 +10,13 @@ from app.database import Session, database_time
 from app.documents import Document, packed, unpacked
 from app.errors import ModelNotFound
 from app.jobs.records import moment
+from app.models.schemas import ModelPage, ModelSummary
+from app.pages import read_page
 from app.tables import jobs, models
 
 NAME_LENGTH = 200
 
 SUMMARY_COLUMNS = (models.c.id, models.c.name, models.c.job_id, models.c.links_per_wing, models.c.created_at)
-
-
-@dataclass(frozen=True, slots=True)
-class ModelSummary:
-    """One identified model without its document."""
-
-    id: str
-    name: str
-    job_id: str | None
-    links_per_wing: int | None
-    created_at: datetime
 
 
 def insert_model(
@@ -49,7 +38,7 @@ def insert_model(
     request
         Of the job that identified it; its aircraft, flight and options are kept.
     identified
-        The ``model`` and its ``fit``, see `app.models.left_models`.
+        The ``model`` and its ``fit``, see `app.models.extraction`.
     """
     model = identified.get("model") or {}
     aircraft = request.get("aircraft") or {}
@@ -80,15 +69,20 @@ def insert_model(
 
 
 def _summary(row: Row[*tuple[Any, ...]]) -> ModelSummary:
-    return ModelSummary(row.id, row.name, row.job_id, row.links_per_wing, moment(row.created_at))
+    return ModelSummary(
+        id=row.id,
+        name=row.name,
+        links_per_wing=row.links_per_wing,
+        job_id=row.job_id,
+        created_at=moment(row.created_at),
+    )
 
 
-def list_models(session: Session, owner: str, *, before: str | None, limit: int) -> list[ModelSummary]:
-    """Newest models of `owner` first, older than `before` when given."""
-    query = select(*SUMMARY_COLUMNS).where(models.c.owner == owner).order_by(models.c.id.desc()).limit(limit)
-    if before is not None:
-        query = query.where(models.c.id < before)
-    return [_summary(row) for row in session.execute(query)]
+def list_models(session: Session, owner: str, *, cursor: str | None, limit: int) -> ModelPage:
+    """One page of the owner's models."""
+    query = select(*SUMMARY_COLUMNS).where(models.c.owner == owner)
+    rows, next_cursor = read_page(session, query, models.c.id, cursor=cursor, limit=limit)
+    return ModelPage(models=[_summary(row) for row in rows], next_cursor=next_cursor)
 
 
 def delete_model(session: Session, owner: str, model_id: str) -> None:

@@ -1,4 +1,4 @@
-"""What the life of jobs adds to the counters; called by `app.jobs.rows.transition`, in its transaction.
+"""What changes of jobs add to the counters, in their transaction.
 
 How long jobs wait and take are histograms over all processes, kept as counters: one per bucket, not yet added
 up.
@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Mapping
-from typing import Any
-
-from sqlalchemy import Row
 
 from app.database import Session
+from app.jobs.records import FINISHED as JOB_ENDS
+from app.leases import LeasedRow, Note
 from app.observability.counters import count_all, written
 
-FINAL = frozenset({"succeeded", "failed", "cancelled", "expired"})
 BUCKETS_S = (0.5, 1.0, 2.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0, 14400.0)  # of seconds a job waits or takes
 
 ATTEMPTS = "job_attempts"
@@ -32,17 +30,10 @@ BUCKET = "_bucket"
 MILLISECONDS = "_milliseconds"
 
 
-def note_transition(
-    session: Session, row: Row[tuple[Any, ...]], event: str | None, payload: Mapping[str, Any] | None
-) -> None:
-    """Count a change of a job.
-
-    Parameters
-    ----------
-    row : the job after the change.
-    event, payload : what the history says of it; a change without an event counts for nothing.
-    """
-    if event is None or event == "progress":
+def count_change(session: Session, row: LeasedRow, note: Note) -> None:
+    """Count a change of a job; progress counts for nothing."""
+    event = note.event
+    if event == "progress":
         return
     labels = {"operation": row.operation}
     rises: dict[str, int] = {}
@@ -52,9 +43,9 @@ def note_transition(
             rises |= _observed(WAIT_TIME, labels, row.started_at - row.created_at)
     if event == "released":
         rises[RELEASED] = 1
-    if (payload or {}).get("reason") == "lease_lost":
+    if (note.payload or {}).get("reason") == "lease_lost":
         rises[LEASES_LOST] = 1
-    if row.status in FINAL:
+    if row.status in JOB_ENDS:
         rises[written(FINISHED, {**labels, "status": row.status})] = 1
         rises[written(FLIGHTS, labels)] = row.flights
         if row.started_at is not None and row.finished_at is not None:

@@ -1,18 +1,23 @@
 """Traces from the request to the worker (OpenTelemetry), where the operator asks for them.
 
 Asked for by ``MORPHID_TRACES=http://collector:4318`` or by OpenTelemetry's ``OTEL_EXPORTER_OTLP_ENDPOINT``.
-Otherwise nothing of OpenTelemetry is imported and every function here does nothing.
+Otherwise nothing of OpenTelemetry's SDK is imported, and its API's tracer records nothing.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Literal
 from urllib.parse import urlsplit
+
+from opentelemetry.context import Context
+from opentelemetry.trace import NoOpTracer, Span, SpanKind, Tracer, get_current_span
+from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
 
 from app.loopback import is_loopback
 
@@ -28,10 +33,10 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class _Tracing:
-    """What is there once tracing has begun in this process."""
+    """The tracer of this process; one that records nothing as long as there is no provider."""
 
     provider: Any = None
-    tracer: Any = None
+    tracer: Tracer = NoOpTracer()  # noqa: RUF009 - it has no state
 
 
 _tracing = _Tracing()
@@ -66,7 +71,7 @@ def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
     except ImportError:
         log.warning("traces are asked for but OpenTelemetry is missing: pip install 'morphid[telemetry]'")
         return False
-    from app.version import VERSION
+    from morphdata.version import VERSION
 
     stop_tracing()
     resource = Resource.create(
@@ -97,7 +102,8 @@ def _session_for(traces: str) -> Any:
 
 def stop_tracing() -> None:
     """Send what waits, for `FLUSH_MS` at most, and trace no more."""
-    provider, _tracing.provider, _tracing.tracer = _tracing.provider, None, None
+    provider = _tracing.provider
+    forget_tracing()
     if provider is not None:
         provider.force_flush(FLUSH_MS)
         provider.shutdown()
@@ -105,49 +111,16 @@ def stop_tracing() -> None:
 
 def forget_tracing() -> None:
     """Leave a parent's tracing alone in its forked child: its threads do not live here."""
-    _tracing.provider = _tracing.tracer = None
+    _tracing.provider, _tracing.tracer = None, NoOpTracer()
 
 
-class Span:
-    """The part of a span that the service uses; this one is not recorded anywhere."""
-
-    def rename(self, name: str) -> None:
-        """Give the span its final name."""
-
-    def note(self, attributes: Attributes) -> None:
-        """Add attributes."""
-
-    def fail(self, reason: str) -> None:
-        """Mark it as failed."""
-
-
-NO_SPAN = Span()
-
-
-class _RecordedSpan(Span):
-    def __init__(self, span: Any) -> None:
-        self._span = span
-
-    def rename(self, name: str) -> None:
-        self._span.update_name(name)
-
-    def note(self, attributes: Attributes) -> None:
-        self._span.set_attributes(dict(attributes))
-
-    def fail(self, reason: str) -> None:
-        from opentelemetry.trace import Status, StatusCode
-
-        self._span.set_status(Status(StatusCode.ERROR, reason))
-
-
-@contextmanager
 def span(
     name: str,
     *,
     kind: Kind = "internal",
     traceparent: str | None = None,
     attributes: Attributes | None = None,
-) -> Iterator[Span]:
+) -> AbstractContextManager[Span]:
     """Trace a block of work.
 
     Parameters
@@ -155,58 +128,33 @@ def span(
     traceparent : W3C context of another process's span that this one belongs to; else it belongs to the span
         that is current here.
     """
-    if _tracing.tracer is None:
-        yield NO_SPAN
-        return
-    from opentelemetry.trace import SpanKind
-
-    with _tracing.tracer.start_as_current_span(
-        name,
-        context=_context_of(traceparent),
-        kind=SpanKind[kind.upper()],
-        attributes=dict(attributes or {}),
-        record_exception=True,
-    ) as current:
-        yield _RecordedSpan(current)
+    return _tracing.tracer.start_as_current_span(
+        name, context=_context_of(traceparent), kind=SpanKind[kind.upper()], attributes=dict(attributes or {})
+    )
 
 
 def past_span(name: str, *, seconds: float, ago_s: float = 0.0, traceparent: str | None = None) -> None:
     """Trace something that lasted `seconds` and ended `ago_s` ago."""
-    if _tracing.tracer is None:
-        return
-    from time import time_ns
-
-    ended = time_ns() - int(ago_s * 1e9)
+    ended = time.time_ns() - int(ago_s * 1e9)
     began = ended - int(max(seconds, 0.0) * 1e9)
     _tracing.tracer.start_span(name, context=_context_of(traceparent), start_time=began).end(ended)
 
 
 def current_traceparent() -> str | None:
     """W3C trace context of the span that is current here, to be handed to another process."""
-    context = _current_context()
-    if context is None:
-        return None
-    return f"00-{context.trace_id:032x}-{context.span_id:016x}-{int(context.trace_flags):02x}"
+    carrier: dict[str, str] = {}
+    TraceContextTextMapPropagator().inject(carrier)
+    return carrier.get("traceparent")
 
 
 def current_trace_id() -> str | None:
     """Id of the trace that is current here."""
-    context = _current_context()
-    return None if context is None else f"{context.trace_id:032x}"
-
-
-def _current_context() -> Any:
-    if _tracing.tracer is None:
-        return None
-    from opentelemetry.trace import get_current_span
-
     context = get_current_span().get_span_context()
-    return context if context.is_valid else None
+    return f"{context.trace_id:032x}" if context.is_valid else None
 
 
-def _context_of(traceparent: str | None) -> Any:
-    if not traceparent:
+def _context_of(traceparent: str | None) -> Context | None:
+    # the tracer that records nothing would pass a caller's trace on all the same
+    if not traceparent or _tracing.provider is None:
         return None
-    from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
-
     return TraceContextTextMapPropagator().extract({"traceparent": traceparent})

@@ -91,7 +91,7 @@ def _refuse_unstorable(document: Any) -> None:
                 "Leave it out; write characters beyond U+FFFF as they are or as a whole pair.",
             )
         if isinstance(value, dict):
-            waiting += [(f"{pointer}/{_token(key)}", item) for key, item in value.items()]
+            waiting += [(f"{pointer}/{token(key)}", item) for key, item in value.items()]
         elif isinstance(value, list):
             waiting += [
                 (f"{pointer}/{number}", item)
@@ -100,6 +100,6 @@ def _refuse_unstorable(document: Any) -> None:
             ]
 
 
-def _token(key: str) -> str:
+def token(key: str) -> str:
     """One token of a JSON pointer (RFC 6901)."""
     return key[:60].replace("~", "~0").replace("/", "~1")

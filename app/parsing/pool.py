@@ -21,8 +21,9 @@ from app.owner_turns import OwnerTurns
 from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
+from app.parsing.json_text import token
+from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
-from morphdata.fields import MAX_ROWS
 from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -127,14 +128,10 @@ def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMedia
     detail, hint = as_sentence(fault.detail), as_sentence(fault.hint)
     if fault.code in FORMAT_FAULTS:
         return UnsupportedMediaType(detail, pointer, hint)
-    place = "".join(f"/{part}" for part in (fault.row, _token(fault.title)) if part not in (None, ""))
+    place = "".join(f"/{part}" for part in (fault.row, token(fault.title)) if part not in (None, ""))
     if fault.title and fault.row is None and fault.title != TITLES:
-        place = f"/{_token(fault.title)}"
+        place = f"/{token(fault.title)}"
     return InvalidRequest.of([Fault(fault.code, detail, f"{pointer}{place}", hint)])
-
-
-def _token(title: str) -> str:
-    return title[:60].replace("~", "~0").replace("/", "~1")
 
 
 def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:

@@ -6,8 +6,6 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.exceptions import RequestValidationError
-from pydantic import ValidationError
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
@@ -24,7 +22,7 @@ from app.errors import (
 from app.http.context import CallerDep, OwnerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, is_json, json_document, media_type
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
-from app.http.problems import documented, escaped
+from app.http.problems import documented
 from app.keys.records import Scope
 from app.trajectories import repository, service
 from app.trajectories.schemas import (
@@ -33,6 +31,7 @@ from app.trajectories.schemas import (
     TrajectorySummary,
     TrajectoryUpload,
 )
+from morphdata.refusals import escaped
 
 router = APIRouter(tags=["trajectories"])
 
@@ -81,9 +80,9 @@ async def upload_trajectory(
     """Store a flight once and refer to it from any number of requests as `{"trajectory_id": ...}`."""
     kind = media_type(request)
     if kind == "multipart/form-data":
-        upload, pointer = await _from_form(request, app, caller.owner), "/file"
+        upload = await _from_form(request, app, caller.owner)
     elif is_json(kind):
-        upload, pointer = _checked(await json_document(request)), ""
+        upload = TrajectoryUpload.parse(await json_document(request))
     else:
         raise UnsupportedMediaType(
             f"The body is announced as {kind[:60] or 'nothing'!r}.",
@@ -93,13 +92,13 @@ async def upload_trajectory(
 
     caller.key.must_open()  # the body and its reader may have taken a minute
 
-    def store() -> repository.StoredTrajectory:
+    def store() -> TrajectorySummary:
         with app.database.write() as session:
-            return service.store_trajectory(session, caller, upload, pointer)
+            return service.store_trajectory(session, caller, upload)
 
     stored = await run_in_threadpool(store)
     response.headers["Location"] = f"/trajectories/{stored.id}"
-    return _summary(stored)
+    return stored
 
 
 async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUpload:
@@ -128,24 +127,6 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
         await form.close()
 
 
-def _checked(document: Any) -> TrajectoryUpload:
-    try:
-        return TrajectoryUpload.model_validate(document)
-    except ValidationError as error:
-        items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors(include_url=False)]
-        raise RequestValidationError(items, body=document) from None
-
-
-def _summary(stored: repository.StoredTrajectory) -> TrajectorySummary:
-    return TrajectorySummary(
-        id=stored.id,
-        name=stored.name,
-        rows=stored.rows,
-        duration_s=stored.duration_s,
-        created_at=stored.created_at,
-    )
-
-
 @router.get(
     "/trajectories",
     dependencies=[demands(Scope.DATA_READ)],
@@ -161,9 +142,7 @@ def list_trajectories(
 ) -> TrajectoryPage:
     """Your uploaded flights without their rows, newest first."""
     with app.database.read() as session:
-        found = repository.list_trajectories(session, owner, before=cursor, limit=limit + 1)
-    shown = [_summary(stored) for stored in found[:limit]]
-    return TrajectoryPage(trajectories=shown, next_cursor=shown[-1].id if len(found) > limit else None)
+        return repository.list_trajectories(session, owner, cursor=cursor, limit=limit)
 
 
 @router.get(
@@ -183,7 +162,7 @@ def get_trajectory(
     with app.database.read() as session:
         stored, columns = repository.get_trajectory_json(session, owner, trajectory_id)
     # the rows go out as they are stored: to parse and write a long flight would hold up the other requests
-    text = _summary(stored).model_dump_json().encode()[:-1] + b"," + columns[1:]
+    text = stored.model_dump_json().encode()[:-1] + b"," + columns[1:]
     return Response(text, media_type="application/json")
 
 

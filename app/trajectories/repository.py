@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Row, delete, insert, select
@@ -14,8 +12,9 @@ from app.documents import packed, unpacked, unpacked_json
 from app.errors import TrajectoryNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment
+from app.pages import read_page
 from app.tables import trajectories
-from app.trajectories.schemas import TrajectoryUpload
+from app.trajectories.schemas import TrajectoryPage, TrajectorySummary, TrajectoryUpload
 
 Columns = dict[str, list[float]]
 
@@ -28,17 +27,6 @@ SUMMARY_COLUMNS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class StoredTrajectory:
-    """One uploaded flight without its rows."""
-
-    id: str
-    name: str
-    rows: int
-    duration_s: float
-    created_at: datetime
-
-
 def stored_form(columns: Columns) -> bytes:
     """The columns as they are stored; this takes longer than all the rest, so it is done once."""
     return packed(columns)
@@ -46,7 +34,7 @@ def stored_form(columns: Columns) -> bytes:
 
 def insert_trajectory(
     session: Session, owner: str, key_id: str | None, flight: TrajectoryUpload, document: bytes
-) -> StoredTrajectory:
+) -> TrajectorySummary:
     """Store a flight whose columns were checked; `document` is their stored form."""
     time_s = flight.time_s
     row = session.execute(
@@ -67,19 +55,21 @@ def insert_trajectory(
     return _summary(row)
 
 
-def _summary(row: Row[*tuple[Any, ...]]) -> StoredTrajectory:
-    return StoredTrajectory(row.id, row.name, row.rows, row.duration_s, moment(row.created_at))
+def _summary(row: Row[*tuple[Any, ...]]) -> TrajectorySummary:
+    return TrajectorySummary(
+        id=row.id,
+        name=row.name,
+        rows=row.rows,
+        duration_s=row.duration_s,
+        created_at=moment(row.created_at),
+    )
 
 
-def list_trajectories(
-    session: Session, owner: str, *, before: str | None, limit: int
-) -> list[StoredTrajectory]:
-    """Newest flights of `owner` first, older than `before` when given."""
+def list_trajectories(session: Session, owner: str, *, cursor: str | None, limit: int) -> TrajectoryPage:
+    """One page of the owner's flights."""
     query = select(*SUMMARY_COLUMNS).where(trajectories.c.owner == owner)
-    if before is not None:
-        query = query.where(trajectories.c.id < before)
-    rows = session.execute(query.order_by(trajectories.c.id.desc()).limit(limit))
-    return [_summary(row) for row in rows]
+    rows, next_cursor = read_page(session, query, trajectories.c.id, cursor=cursor, limit=limit)
+    return TrajectoryPage(trajectories=[_summary(row) for row in rows], next_cursor=next_cursor)
 
 
 def delete_trajectory(session: Session, owner: str, trajectory_id: str) -> None:
@@ -109,7 +99,7 @@ def row_counts(session: Session, owner: str, ids: Iterable[str]) -> dict[str, in
     return {row.id: row.rows for row in found}
 
 
-def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, Columns]:
+def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[TrajectorySummary, Columns]:
     """Read one flight with its rows.
 
     Raises
@@ -121,7 +111,7 @@ def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[St
     return _summary(row), unpacked(row.document)
 
 
-def get_trajectory_json(session: Session, owner: str, trajectory_id: str) -> tuple[StoredTrajectory, bytes]:
+def get_trajectory_json(session: Session, owner: str, trajectory_id: str) -> tuple[TrajectorySummary, bytes]:
     """Read one flight with its rows as the JSON text that is stored.
 
     Raises

@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from morphdata.fields import SampleName
+from morphdata.base import SampleName
 from morphdata.samples import EXAMPLE_SAMPLE, TrajectoryColumns
 
 

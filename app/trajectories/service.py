@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from pydantic import ValidationError
-
 from app.audit.records import Action
 from app.audit.service import note
 from app.database import Session
@@ -13,12 +11,11 @@ from app.errors import InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge_bytes
 from app.parsing.pool import refusal
-from app.trajectories.checks import columns_faults, file_faults
-from app.trajectories.repository import StoredTrajectory, insert_trajectory, stored_form
-from app.trajectories.schemas import TrajectoryUpload
-from morphdata.faults import Fault
-from morphdata.samplefiles.fault import FileFault
-from morphdata.samplefiles.flight import INLINE
+from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
+from morphdata.faults import Fault, InvalidInput
+from morphdata.samplefiles.fault import FileFault, as_sentence
+from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import kind_of
 
 
@@ -53,40 +50,36 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
     InvalidRequest
         Naming row and column.
     """
-    faults = file_faults(columns, "/file")
+    faults = [
+        Fault(fault.code, as_sentence(fault.detail), f"/file{_place(fault)}", as_sentence(fault.hint))
+        for fault in flight_faults(columns)  # before the document is made, which has other names for them
+    ]
     if faults:
         raise InvalidRequest.of(faults)
     named = {INLINE[key]: values for key, values in columns.items()}
     try:
         return TrajectoryUpload(name=name_from_file(filename) if name is None else name, **named)
-    except ValidationError as error:
-        faults = [
-            Fault(
-                item["type"],
-                f"{item['msg']}.",
-                "/name" if item["loc"][0] == "name" else f"/file/{item['loc'][-1]}/{item['loc'][0]}",
-                "Check the name, and the units of the columns.",
-            )
-            for item in error.errors(include_url=False)
-        ]
-        raise InvalidRequest.of(faults) from None
+    except InvalidInput as error:
+        raise InvalidRequest.of(
+            [fault if fault.pointer == "/name" else fault.under("/file") for fault in error.faults]
+        ) from None
 
 
-def store_trajectory(
-    session: Session, caller: Caller, upload: TrajectoryUpload, pointer: str
-) -> StoredTrajectory:
-    """Check and store a flight.
+def _place(fault: FileFault) -> str:
+    """Where in a file: a time by its column, an angle by its row."""
+    column = f"/{INLINE[fault.title]}" if fault.title else ""
+    row = "" if fault.row is None else f"/{fault.row}"
+    return f"{column}{row}" if fault.title == "t" else f"{row}{column}"
+
+
+def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload) -> TrajectorySummary:
+    """Store a flight.
 
     Raises
     ------
-    InvalidRequest
-        When columns differ in length or time does not rise.
     QuotaExceeded
         When the caller's key may not store that much more.
     """
-    faults = columns_faults(upload, pointer)
-    if faults:
-        raise InvalidRequest.of(faults)
     document = stored_form(upload.model_dump(exclude={"name"}))
     charge_bytes(session, caller.key_id, len(document))
     stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from html import escape
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -10,7 +12,10 @@ from fastapi.responses import FileResponse, HTMLResponse, Response
 from starlette.applications import Starlette
 from starlette.staticfiles import StaticFiles
 
+from morphdata.operations import OPERATIONS
+
 STATIC = Path(__file__).parent / "static"
+PAGE = Path(__file__).parent / "page.html"
 PLAIN_DOCS = (
     "<!doctype html><title>MorphID API</title><p>The interactive documentation needs the package "
     "<code>fastapi-offline</code>. The OpenAPI document is at <a href='/openapi.json'>/openapi.json</a>."
@@ -26,9 +31,18 @@ router = APIRouter(include_in_schema=False)
 
 
 @router.get("/")
-async def page() -> FileResponse:
+async def page() -> HTMLResponse:
     """Return the page."""
-    return FileResponse(STATIC / "index.html", headers={"Content-Security-Policy": PAGE_POLICY})
+    return HTMLResponse(_page_text(), headers={"Content-Security-Policy": PAGE_POLICY})
+
+
+@cache
+def _page_text() -> str:
+    """Build the page: the operations' names and what they do come from their descriptors."""
+    names = " ".join(operation.name for operation in OPERATIONS)
+    lines = (f"<dt>{escape(item.name)}</dt><dd>{escape(item.help)}</dd>" for item in OPERATIONS)
+    text = PAGE.read_text(encoding="utf-8").replace("{operation_names}", escape(names))
+    return text.replace("{operations_help}", "\n        ".join(lines))
 
 
 @router.get("/docs")

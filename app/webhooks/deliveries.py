@@ -20,6 +20,7 @@ from sqlalchemy import ColumnElement, Row, select, update
 
 from app.database import Session, database_time
 from app.documents import Document
+from app.leases import LeasedTable
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks.outbox import CHALLENGE_EVENT, DELIVERED, GIVEN_UP, WAITING
 from app.webhooks.posting import Answer
@@ -33,6 +34,22 @@ DISABLED = "The webhook was disabled."
 NEVER_SETTLED = "Every sender ended before it knew what became of its try."
 MAX_CLAIMS = MAX_TRIES + 5  # more: senders die over this delivery
 MAX_ERROR = 300
+
+DELIVERIES = LeasedTable(
+    webhook_deliveries,
+    key=(webhook_deliveries.c.id,),
+    lease=webhook_deliveries.c.next_at,  # a delivery whose lease has ended is due again: nobody need reap it
+    waiting=WAITING,
+    held=(WAITING,),
+    ends=(DELIVERED, GIVEN_UP),
+    returning=(
+        webhook_deliveries.c.webhook_id,
+        webhook_deliveries.c.type,
+        webhook_deliveries.c.payload,
+        webhook_deliveries.c.attempt,
+        webhook_deliveries.c.fence,
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +84,11 @@ class Dispatch:
     tries: int
     fence: int
     at: float
+
+    @property
+    def key(self) -> tuple[str]:
+        """Key of the delivery's row."""
+        return (self.id,)
 
     @property
     def challenge(self) -> str | None:
@@ -131,26 +153,13 @@ def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatc
     hooks = _locked(session, seen.owner, seen.destination)
     now = float(session.scalar(select(clock())) or 0.0)
     free = [hook.id for hook in hooks.values() if max(hook.sending_until, hook.paused_until) <= now]
-    row = session.execute(
-        update(webhook_deliveries)
-        .where(
-            webhook_deliveries.c.id == seen.id,
-            webhook_deliveries.c.fence == seen.fence,
-            webhook_deliveries.c.status == WAITING,
-            webhook_deliveries.c.webhook_id.in_(free),
-        )
-        .values(
-            fence=seen.fence + 1,
-            attempt=webhook_deliveries.c.attempt + 1,
-            next_at=now + lease_s,
-        )
-        .returning(
-            webhook_deliveries.c.webhook_id,
-            webhook_deliveries.c.type,
-            webhook_deliveries.c.payload,
-            webhook_deliveries.c.attempt,
-        )
-    ).one_or_none()
+    row = DELIVERIES.claim(
+        session,
+        (seen.id,),
+        webhook_deliveries.c.fence == seen.fence,
+        webhook_deliveries.c.webhook_id.in_(free),
+        lease_until=now + lease_s,
+    )
     if row is None:
         return None
     hook = hooks[row.webhook_id]
@@ -169,7 +178,7 @@ def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatc
         secret=hook.secret,
         payload=row.payload,
         tries=row.attempt,
-        fence=seen.fence + 1,
+        fence=row.fence,
         at=now,
     )
 
@@ -186,7 +195,9 @@ def settle(
     """
     hooks = _locked(session, dispatch.owner, dispatch.destination)
     hook = hooks.get(dispatch.webhook_id)
-    held = select(webhook_deliveries.c.id).where(*_held(dispatch))
+    held = select(webhook_deliveries.c.id).where(
+        *DELIVERIES.at(dispatch.key), webhook_deliveries.c.fence == dispatch.fence
+    )
     if hook is not None and session.scalar(held) is None:
         return None  # the destination, too, is another sender's now
     _set_hooks(session, hooks, sending_until=0.0)
@@ -223,17 +234,8 @@ def _locked(session: Session, owner: str, destination: str) -> dict[str, Row[Any
 def release(session: Session, dispatch: Dispatch, clock: Clock = database_time) -> None:
     """Give a claim back: the sender stops before it knows the answer. The try is not counted."""
     hooks = _locked(session, dispatch.owner, dispatch.destination)
-    given_back = session.execute(
-        update(webhook_deliveries)
-        .where(*_held(dispatch), webhook_deliveries.c.status == WAITING)
-        .values(next_at=clock(), attempt=webhook_deliveries.c.attempt - 1)
-    )
-    if given_back.rowcount:
+    if DELIVERIES.give_back(session, dispatch, next_at=clock()) is not None:
         _set_hooks(session, hooks, sending_until=0.0)
-
-
-def _held(dispatch: Dispatch) -> tuple[ColumnElement[bool], ...]:
-    return webhook_deliveries.c.id == dispatch.id, webhook_deliveries.c.fence == dispatch.fence
 
 
 def _write(
@@ -246,18 +248,17 @@ def _write(
 ) -> bool:
     # a success counts even where the delivery was given up meanwhile: the receiver has it
     former = (WAITING, GIVEN_UP) if status == DELIVERED else (WAITING,)
-    changed = session.execute(
-        update(webhook_deliveries)
-        .where(*_held(dispatch), webhook_deliveries.c.status.in_(former))
-        .values(
-            status=status,
-            next_at=next_at,
-            response_status=answer.status,
-            error=None if answer.error is None else answer.error[:MAX_ERROR],
-            finished_at=None if status == WAITING else clock(),
-        )
+    changed = DELIVERIES.settle(
+        session,
+        dispatch,
+        *former,
+        status=status,
+        next_at=next_at,
+        response_status=answer.status,
+        error=None if answer.error is None else answer.error[:MAX_ERROR],
+        finished_at=None if status == WAITING else clock(),
     )
-    return changed.rowcount == 1
+    return changed is not None
 
 
 def _count_failure(

@@ -66,7 +66,7 @@ def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) 
 def list_webhooks(app: ServiceDep, owner: OwnerDep) -> WebhookList:
     """Your webhooks, newest first."""
     with app.database.read() as session:
-        return service.listing(session, owner)
+        return WebhookList(webhooks=repository.list_webhooks(session, owner))
 
 
 @router.get(
@@ -78,7 +78,7 @@ def list_webhooks(app: ServiceDep, owner: OwnerDep) -> WebhookList:
 def get_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Webhook:
     """Address, events, and why it is disabled if it is."""
     with app.database.read() as session:
-        return service.get(session, owner, webhook_id)
+        return repository.get_webhook(session, owner, webhook_id)
 
 
 @router.delete(
@@ -140,7 +140,7 @@ def list_webhook_deliveries(
 ) -> DeliveryPage:
     """Messages with the fate of their last try, newest first."""
     with app.database.read() as session:
-        return service.delivery_page(session, owner, webhook_id, cursor=cursor, limit=limit)
+        return repository.list_deliveries(session, owner, webhook_id, cursor=cursor, limit=limit)
 
 
 messages = APIRouter(tags=["webhooks"])  # not served: what receivers are sent, for the OpenAPI document

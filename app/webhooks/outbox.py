@@ -1,20 +1,20 @@
 """The outbox: a job's end and its deliveries are written in one transaction.
 
-Imported by the job store, and so by workers: nothing here speaks HTTP.
+Workers import it: nothing here speaks HTTP.
 """
 
 from __future__ import annotations
 
 import secrets
-from typing import Any
 
-from sqlalchemy import Row, delete, insert, select
+from sqlalchemy import delete, insert, select
 
-from app.database import Session, database_time, insert_new
+from app.database import Session, current_time, database_time, insert_new
 from app.documents import Document
 from app.identifiers import new_identifier
 from app.jobs.records import FINISHED, moment
-from app.tables import webhook_deliveries, webhooks
+from app.leases import LeasedRow, Note
+from app.tables import models, webhook_deliveries, webhooks
 
 WAITING = "waiting"
 DELIVERED = "delivered"
@@ -27,16 +27,8 @@ CHALLENGE_BYTES = 24
 MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
 
 
-def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
-    """Write one delivery for each of the owner's webhooks that wants to know how the job ended.
-
-    Parameters
-    ----------
-    row
-        The job's row after the change; one that has not ended is left alone.
-    """
-    if row.status not in FINISHED:
-        return
+def note_end(session: Session, row: LeasedRow, _note: Note) -> None:
+    """Write one delivery for each of the owner's webhooks that wants to know how the job ended."""
     event = f"job.{row.status}"
     # key share: a webhook that is being deleted at this moment must not take the job's end down with it
     hooks = session.execute(
@@ -53,7 +45,7 @@ def note_end(session: Session, row: Row[*tuple[Any, ...]]) -> None:
         if event in hook.events:
             session.execute(
                 insert_new(session, webhook_deliveries)
-                .values(new_delivery(hook.id, event, _ended(event, row), job_id=row.id))
+                .values(new_delivery(hook.id, event, _ended(session, event, row), job_id=row.id))
                 .on_conflict_do_nothing()
             )
 
@@ -85,23 +77,24 @@ def note_challenge(session: Session, webhook_id: str) -> str:
 
 
 def _note(session: Session, webhook_id: str, event: str, data: Document) -> str:
-    at = moment(session.execute(select(database_time())).scalar_one())
+    at = moment(current_time(session))
     payload = {"type": event, "timestamp": at.isoformat(), "data": {"webhook_id": webhook_id, **data}}
     values = new_delivery(webhook_id, event, payload)
     session.execute(insert(webhook_deliveries).values(values))
     return str(values["id"])
 
 
-def forget_before(session: Session, time: float) -> int:
-    """Delete deliveries that ended before `time` (s since 1970 UTC); return how many there were."""
+def forget_ended(session: Session, older_than_s: float) -> int:
+    """Delete deliveries that ended longer ago; return how many there were."""
     return session.execute(
         delete(webhook_deliveries).where(
-            webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)), webhook_deliveries.c.finished_at < time
+            webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)),
+            webhook_deliveries.c.finished_at < database_time() - older_than_s,
         )
     ).rowcount
 
 
-def _ended(event: str, row: Row[*tuple[Any, ...]]) -> Document:
+def _ended(session: Session, event: str, row: LeasedRow) -> Document:
     at = f"/jobs/{row.id}"
     return {
         "type": event,
@@ -111,7 +104,7 @@ def _ended(event: str, row: Row[*tuple[Any, ...]]) -> Document:
             "operation": row.operation,
             "status": row.status,
             "error": _small(row.error),
-            "model_id": row.model_id,
+            "model_id": session.scalar(select(models.c.id).where(models.c.job_id == row.id)),
             "links": {"self": at, "result": f"{at}/result", "artifacts": f"{at}/artifacts"},
         },
     }

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from app.version import VERSION
 from app.webhooks.addresses import AddressPolicy, AddressRefused, Target
 from app.webhooks.retries import parse_retry_after
+from morphdata.version import VERSION
 
 if TYPE_CHECKING:
     import httpx

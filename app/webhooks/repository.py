@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Column, ColumnElement, Row, delete, func, insert, select, update
@@ -12,10 +10,12 @@ from app.database import Session, database_time, insert_new
 from app.errors import WebhookNotFound
 from app.identifiers import new_identifier
 from app.jobs.records import moment, optional_moment
+from app.pages import read_page
 from app.tables import owners, webhook_deliveries, webhooks
 from app.webhooks.addresses import destination_of
 from app.webhooks.deliveries import give_up_waiting, lock_waiting
 from app.webhooks.outbox import WAITING
+from app.webhooks.schemas import Delivery, DeliveryPage, Webhook, WebhookStatus
 
 REOPENED = "A new challenge took its place."
 
@@ -31,50 +31,24 @@ COLUMNS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class StoredWebhook:
-    """One webhook without its secret."""
-
-    id: str
-    url: str
-    events: list[str]
-    failures: int
-    verified_at: datetime | None
-    disabled_at: datetime | None
-    disabled_reason: str | None
-    created_at: datetime
-
-
-@dataclass(frozen=True, slots=True)
-class StoredDelivery:
-    """One delivery without its payload."""
-
-    id: str
-    type: str
-    job_id: str | None
-    status: str
-    attempt: int
-    response_status: int | None
-    error: str | None
-    created_at: datetime
-    next_at: datetime | None
-    finished_at: datetime | None
-
-
-def _webhook(row: Row[*tuple[Any, ...]]) -> StoredWebhook:
-    return StoredWebhook(
+def _webhook(row: Row[*tuple[Any, ...]]) -> Webhook:
+    status: WebhookStatus = "pending" if row.verified_at is None else "enabled"
+    if row.disabled_at is not None:
+        status = "disabled"
+    return Webhook(
         id=row.id,
         url=row.url,
         events=row.events,
-        failures=row.failures,
-        verified_at=optional_moment(row.verified_at),
+        status=status,
+        enabled=status == "enabled",
         disabled_at=optional_moment(row.disabled_at),
         disabled_reason=row.disabled_reason,
+        failures=row.failures,
         created_at=moment(row.created_at),
     )
 
 
-def insert_webhook(session: Session, owner: str, url: str, events: list[str], secret: str) -> StoredWebhook:
+def insert_webhook(session: Session, owner: str, url: str, events: list[str], secret: str) -> Webhook:
     """Store a webhook whose address was checked and whose receiver has not answered yet."""
     destination = destination_of(url)
     others = (webhooks.c.owner == owner, webhooks.c.destination == destination)
@@ -109,13 +83,13 @@ def count_webhooks(session: Session, owner: str) -> int:
     return count or 0
 
 
-def list_webhooks(session: Session, owner: str) -> list[StoredWebhook]:
+def list_webhooks(session: Session, owner: str) -> list[Webhook]:
     """Every webhook of `owner`, newest first."""
     rows = session.execute(select(*COLUMNS).where(webhooks.c.owner == owner).order_by(webhooks.c.id.desc()))
     return [_webhook(row) for row in rows]
 
 
-def get_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebhook:
+def get_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
     """Read one webhook.
 
     Raises
@@ -148,7 +122,7 @@ def delete_webhook(session: Session, owner: str, webhook_id: str) -> None:
     session.execute(delete(webhooks).where(webhooks.c.id == webhook_id, webhooks.c.owner == owner))
 
 
-def reopen_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebhook:
+def reopen_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
     """Forget a webhook's failures and its receiver's answer; what still waits for it is given up.
 
     Raises
@@ -169,9 +143,9 @@ def reopen_webhook(session: Session, owner: str, webhook_id: str) -> StoredWebho
 
 
 def list_deliveries(
-    session: Session, owner: str, webhook_id: str, *, before: str | None, limit: int
-) -> list[StoredDelivery]:
-    """Newest deliveries of a webhook first, older than the id `before` when given.
+    session: Session, owner: str, webhook_id: str, *, cursor: str | None, limit: int
+) -> DeliveryPage:
+    """One page of a webhook's deliveries.
 
     Raises
     ------
@@ -179,29 +153,27 @@ def list_deliveries(
         When `owner` has no such webhook.
     """
     get_webhook(session, owner, webhook_id)
-    table = webhook_deliveries
-    query = select(table).where(table.c.webhook_id == webhook_id).order_by(table.c.id.desc()).limit(limit)
-    if before is not None:
-        query = query.where(table.c.id < before)
-    return [_delivery(row) for row in session.execute(query)]
+    query = select(webhook_deliveries).where(webhook_deliveries.c.webhook_id == webhook_id)
+    rows, next_cursor = read_page(session, query, webhook_deliveries.c.id, cursor=cursor, limit=limit)
+    return DeliveryPage(deliveries=[_delivery(row) for row in rows], next_cursor=next_cursor)
 
 
-def get_delivery(session: Session, delivery_id: str) -> StoredDelivery:
+def get_delivery(session: Session, delivery_id: str) -> Delivery:
     """Read a delivery that this very transaction has written."""
     row = session.execute(select(webhook_deliveries).where(webhook_deliveries.c.id == delivery_id)).one()
     return _delivery(row)
 
 
-def _delivery(row: Row[*tuple[Any, ...]]) -> StoredDelivery:
-    return StoredDelivery(
+def _delivery(row: Row[*tuple[Any, ...]]) -> Delivery:
+    return Delivery(
         id=row.id,
         type=row.type,
         job_id=row.job_id,
         status=row.status,
-        attempt=row.attempt,
+        tries=row.attempt,
         response_status=row.response_status,
         error=row.error,
         created_at=moment(row.created_at),
-        next_at=optional_moment(row.next_at) if row.status == WAITING else None,
+        next_try_at=optional_moment(row.next_at) if row.status == WAITING else None,
         finished_at=optional_moment(row.finished_at),
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from app.jobs.schemas import EXAMPLE_ID
-from morphdata.fields import Strict
+from morphdata.base import Document
 
 EXAMPLE_WEBHOOK = "hook_01k0c3v9fh8x2m4n6p8q0r2s4t"
 EXAMPLE_CHALLENGE = "pJ5mXw0cQ1l3nR8tZ2vB7dK4sY6uE9hA"
@@ -19,7 +19,7 @@ DeliveryStatus = Literal["waiting", "delivered", "given_up"]
 EVERY_EVENT: list[JobEvent] = ["job.succeeded", "job.failed", "job.cancelled", "job.expired"]
 
 
-class WebhookRequest(Strict):
+class WebhookRequest(Document):
     """Where to tell which ends of jobs."""
 
     model_config = ConfigDict(

@@ -7,55 +7,11 @@ from app.errors import InvalidRequest, TooManyWebhooks, WebhookDisabled, Webhook
 from app.webhooks import repository
 from app.webhooks.addresses import AddressPolicy, AddressRefused
 from app.webhooks.outbox import note_challenge, note_test
-from app.webhooks.repository import StoredDelivery, StoredWebhook
-from app.webhooks.schemas import (
-    Delivery,
-    DeliveryPage,
-    NewWebhook,
-    Webhook,
-    WebhookList,
-    WebhookRequest,
-    WebhookStatus,
-)
+from app.webhooks.schemas import Delivery, NewWebhook, Webhook, WebhookRequest
 from app.webhooks.signature import new_secret
 from morphdata.faults import Fault
 
 MAX_WEBHOOKS = 20  # of one owner
-
-
-def _shown(hook: StoredWebhook) -> Webhook:
-    return Webhook(
-        id=hook.id,
-        url=hook.url,
-        events=hook.events,
-        status=_status(hook),
-        enabled=_status(hook) == "enabled",
-        disabled_at=hook.disabled_at,
-        disabled_reason=hook.disabled_reason,
-        failures=hook.failures,
-        created_at=hook.created_at,
-    )
-
-
-def _status(hook: StoredWebhook) -> WebhookStatus:
-    if hook.disabled_at is not None:
-        return "disabled"
-    return "pending" if hook.verified_at is None else "enabled"
-
-
-def _shown_delivery(delivery: StoredDelivery) -> Delivery:
-    return Delivery(
-        id=delivery.id,
-        type=delivery.type,
-        job_id=delivery.job_id,
-        status=delivery.status,
-        tries=delivery.attempt,
-        response_status=delivery.response_status,
-        error=delivery.error,
-        created_at=delivery.created_at,
-        next_try_at=delivery.next_at,
-        finished_at=delivery.finished_at,
-    )
 
 
 def check_address(policy: AddressPolicy, url: str) -> None:
@@ -83,26 +39,16 @@ def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
     secret = new_secret()
     stored = repository.insert_webhook(session, owner, request.url, list(request.events), secret)
     note_challenge(session, stored.id)
-    return NewWebhook(**_shown(stored).model_dump(), secret=secret)
-
-
-def listing(session: Session, owner: str) -> WebhookList:
-    """Every webhook of the owner."""
-    return WebhookList(webhooks=[_shown(hook) for hook in repository.list_webhooks(session, owner)])
-
-
-def get(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """One webhook."""
-    return _shown(repository.get_webhook(session, owner, webhook_id))
+    return NewWebhook(**stored.model_dump(), secret=secret)
 
 
 def enable(session: Session, owner: str, webhook_id: str) -> Webhook:
     """Challenge the receiver of a disabled or pending webhook anew; leave an enabled one as it is."""
     hook = repository.get_webhook(session, owner, webhook_id)
-    if _status(hook) != "enabled":
+    if not hook.enabled:
         hook = repository.reopen_webhook(session, owner, webhook_id)
         note_challenge(session, webhook_id)
-    return _shown(hook)
+    return hook
 
 
 def test(session: Session, owner: str, webhook_id: str) -> Delivery:
@@ -112,22 +58,9 @@ def test(session: Session, owner: str, webhook_id: str) -> Delivery:
     ------
     WebhookDisabled, WebhookPending
     """
-    status = _status(repository.get_webhook(session, owner, webhook_id))
+    status = repository.get_webhook(session, owner, webhook_id).status
     if status == "disabled":
         raise WebhookDisabled(webhook_id)
     if status == "pending":
         raise WebhookPending(webhook_id)
-    delivery_id = note_test(session, webhook_id)
-    return _shown_delivery(repository.get_delivery(session, delivery_id))
-
-
-def delivery_page(
-    session: Session, owner: str, webhook_id: str, *, cursor: str | None, limit: int
-) -> DeliveryPage:
-    """One page of a webhook's deliveries, newest first."""
-    found = repository.list_deliveries(session, owner, webhook_id, before=cursor, limit=limit + 1)
-    shown = found[:limit]
-    return DeliveryPage(
-        deliveries=[_shown_delivery(delivery) for delivery in shown],
-        next_cursor=shown[-1].id if len(found) > limit else None,
-    )
+    return repository.get_delivery(session, note_test(session, webhook_id))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import base64
-import hashlib
-import hmac
 import secrets
+from datetime import UTC, datetime
 
-PREFIX = "whsec_"
+from standardwebhooks import Webhook
+
 SECRET_BYTES = 32  # the standard asks for 24 to 64
 
 
 def new_secret() -> str:
     """Make a secret in the form that the standard's libraries take."""
-    return PREFIX + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
+    return "whsec_" + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
 
 
 def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
@@ -28,12 +28,9 @@ def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) 
     timestamp : float
         Of this try, s since 1970 UTC.
     """
-    seconds = str(int(timestamp))
-    key = base64.b64decode(secret.removeprefix(PREFIX))
-    signed = b".".join((message_id.encode(), seconds.encode(), body))
-    signature = base64.b64encode(hmac.digest(key, signed, hashlib.sha256)).decode()
+    moment = datetime.fromtimestamp(int(timestamp), UTC)
     return {
         "webhook-id": message_id,
-        "webhook-timestamp": seconds,
-        "webhook-signature": f"v1,{signature}",
+        "webhook-timestamp": str(int(timestamp)),
+        "webhook-signature": Webhook(secret).sign(message_id, moment, body.decode()),
     }

@@ -7,13 +7,12 @@ flight starts due north, so u, v, w of the turbulence lie along north, east and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Flight
+from morphdata.environment import Environment, Gust, Turbulence
 
 Array = NDArray[np.float64]
 
@@ -24,73 +23,6 @@ LOWEST_ALTITUDE_FT = 10.0  # the low-altitude scales shrink to nothing at the gr
 HIGH_SCALE_FT = 1750.0  # MIL-F-8785C, section 3.7.2.1: all three scales of the Dryden form
 LOW_INTENSITY = 0.1  # MIL-F-8785C, section 3.7.3.4: sigma_w over the mean wind at 20 ft
 SLOW, FAST = np.sqrt(3.0), 1.0 - np.sqrt(3.0)  # (1 + sqrt3 s) / (1 + s)^2 = SLOW / (1 + s) + FAST / (1 + s)^2
-
-
-@dataclass(frozen=True)
-class CosineGust:
-    """Discrete gust of EASA CS-25.341(a)(2): U/2 (1 - cos(pi s / H)) over 0 <= s <= 2 H.
-
-    Attributes
-    ----------
-    amplitude_m_s : U, the largest gust velocity.
-    gradient_m : H, the distance from the gust's edge to its peak.
-    start_s : time at which the reference point meets the edge.
-    direction_N : (3,) direction of the gust velocity, of any length; up by default.
-    """
-
-    amplitude_m_s: float
-    gradient_m: float
-    start_s: float = 0.0
-    direction_N: tuple[float, float, float] = (0.0, 0.0, -1.0)
-
-    def __post_init__(self) -> None:
-        _require(
-            np.isfinite(self.amplitude_m_s), "gust/amplitude_m_s", "the amplitude is not finite", "give m/s"
-        )
-        _require(
-            self.gradient_m > 0.0,
-            "gust/gradient_m",
-            "the gradient distance is not above 0",
-            "give 9 to 107 m",
-        )
-        _require(
-            np.any(self.direction_N),
-            "gust/direction_N",
-            "the gust has no direction",
-            "give (0, 0, -1) for up",
-        )
-
-
-@dataclass(frozen=True)
-class DrydenTurbulence:
-    """Continuous turbulence of MIL-F-8785C, section 3.7, Dryden form.
-
-    Attributes
-    ----------
-    wind_20ft_m_s : mean wind at 20 ft, which sets the intensity below 1000 ft: 7.7 light, 15.4 moderate, 23.1
-        severe.
-    sigma_high_m_s : standard deviation above 2000 ft: about 1.5 light, 3 moderate, 6 severe, depending on
-        altitude.
-    """
-
-    wind_20ft_m_s: float
-    sigma_high_m_s: float
-
-    def __post_init__(self) -> None:
-        hint = "give m/s, 0 for none"
-        for name, value in vars(self).items():
-            _require(0.0 <= value < np.inf, f"turbulence/{name}", f"{name} is {value:g}", hint)
-
-
-@dataclass(frozen=True)
-class Environment:
-    """Gust and turbulence on top of the flight's uniform wind; none by default."""
-
-    gust: CosineGust | None = None
-    turbulence: DrydenTurbulence | None = None
-
-
-STILL = Environment()
 
 
 def air_velocity(
@@ -128,15 +60,18 @@ def air_velocity(
     return velocity_N
 
 
-def gust_velocity(gust: CosineGust, airspeed: float, times: Array) -> Array:
-    """Gust velocity in N, (k, 3) m/s, at times (k,) s for an airspeed in m/s."""
+def gust_velocity(gust: Gust, airspeed: float, times: Array) -> Array:
+    """Gust velocity in N, (k, 3) m/s, at times (k,) s for an airspeed in m/s.
+
+    EASA CS-25.341(a)(2): U/2 (1 - cos(pi s / H)) over 0 <= s <= 2 H.
+    """
     distance = np.clip(airspeed * (times - gust.start_s), 0.0, 2.0 * gust.gradient_m)
     speed = 0.5 * gust.amplitude_m_s * (1.0 - np.cos(np.pi * distance / gust.gradient_m))
-    direction_N = np.asarray(gust.direction_N, dtype=np.float64)
+    direction_N = np.asarray(gust.direction_n, dtype=np.float64)
     return np.asarray(speed[:, None] * direction_N / np.sqrt(direction_N @ direction_N))
 
 
-def turbulence_scales(turbulence: DrydenTurbulence, altitude_m: float) -> tuple[Array, Array]:
+def turbulence_scales(turbulence: Turbulence, altitude_m: float) -> tuple[Array, Array]:
     """Standard deviations (m/s) and lengths (m) of u, v, w, (3,) each, at an altitude above ground.
 
     MIL-F-8785C, section 3.7.2 (high) and 3.7.3.4 (low altitude).
@@ -154,7 +89,7 @@ def turbulence_scales(turbulence: DrydenTurbulence, altitude_m: float) -> tuple[
 
 
 def turbulence_velocity(
-    turbulence: DrydenTurbulence, flight: Flight, times: Array, rng: np.random.Generator
+    turbulence: Turbulence, flight: Flight, times: Array, rng: np.random.Generator
 ) -> Array:
     """Turbulence in N, (k, 3) m/s, at times (k,) s: forming filters driven by white noise.
 
@@ -197,8 +132,3 @@ def _factor(covariance: Array) -> Array:
     l22 = np.sqrt(np.maximum(covariance[..., 1, 1] - l21**2, 0.0))
     zero = np.zeros_like(l11)
     return np.stack([np.stack([l11, zero], axis=-1), np.stack([l21, l22], axis=-1)], axis=-2)
-
-
-def _require(condition: object, field: str, message: str, hint: str) -> None:
-    if not condition:
-        raise InvalidInput(message, pointer=f"/environment/{field}", hint=hint)

@@ -18,7 +18,7 @@ from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, s
 from morphcore.aero.kernels.lattice_place import LatticeParts, lattice_place
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.aero.vlm import RingTable, prandtl_glauert
-from morphcore.geometry.lattice import VortexCore
+from morphdata.lattice import VortexCore
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -29,14 +29,9 @@ from numpy.typing import NDArray
 from morphcore.aero.kernels.loads import OUTPUTS
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.lattice import (
-    DEFAULT_LATTICE,
-    LatticeSettings,
-    SurfaceLattice,
-    surface_lattice,
-    surface_pose,
-)
+from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
 from morphcore.geometry.surface import Surface
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
 Array = NDArray[np.float64]
 
@@ -54,7 +49,7 @@ class AircraftLattice:
     """
 
     aircraft: Aircraft
-    settings: LatticeSettings
+    settings: Lattice
     lattices: tuple[SurfaceLattice, ...]
     images: tuple[Surface, ...]
     table: RingTable
@@ -89,7 +84,7 @@ class LatticeOperator:
 
 
 def aircraft_lattice(
-    aircraft: Aircraft, settings: LatticeSettings = DEFAULT_LATTICE, images: Sequence[Surface] = ()
+    aircraft: Aircraft, settings: Lattice = DEFAULT_LATTICE, images: Sequence[Surface] = ()
 ) -> AircraftLattice:
     """Lattices of the same settings on every surface; ``images`` of all of them or none."""
     panels = (settings.chordwise, settings.spanwise)

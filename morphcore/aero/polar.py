@@ -20,14 +20,8 @@ from morphcore.aero.vlm import (
 )
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.lattice import (
-    DEFAULT_CORE,
-    DEFAULT_LATTICE,
-    LatticeSettings,
-    VortexCore,
-    surface_lattice,
-    surface_pose,
-)
+from morphcore.geometry.lattice import surface_lattice, surface_pose
+from morphdata.lattice import DEFAULT_CORE, DEFAULT_LATTICE, Lattice, VortexCore
 
 Array = NDArray[np.float64]
 
@@ -66,7 +60,7 @@ def steady_polar(
     *,
     beta_rad: float = 0.0,
     hinge_rad: Sequence[float] = (),
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
     mach: float = 0.0,
 ) -> SteadyLoads:
     """Loads at an angle of attack and of sideslip, without profile drag.

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from morphcore.aero.kernels.influence import ring_influence
 from morphcore.errors import InvalidInput, UnsupportedRegime
-from morphcore.geometry.aircraft import MACH_LIMIT
-from morphcore.geometry.lattice import DEFAULT_CORE, SurfaceLattice, VortexCore
+from morphcore.geometry.lattice import SurfaceLattice
+from morphdata.flight import MACH_LIMIT
+from morphdata.lattice import DEFAULT_CORE, VortexCore
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

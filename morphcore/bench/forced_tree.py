@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from morphcore.bench.setting import Array, Bench
 from morphcore.frames import quaternion_from_euler
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, lane_constants
 from morphcore.simulate.batch import fly_batch, initial_state
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
 from morphcore.simulate.schedule import HingeMotion
+from morphdata.lattice import Lattice
 
 TREE_LINKS = 4
 DURATION_S = 2.0
@@ -30,7 +30,8 @@ MOMENT_B = np.array([30.0, -200.0, 60.0])  # N m
 START_EULER = (0.1, 0.05, -0.2)
 START_RATES_B = np.array([0.3, -0.2, 0.2])  # rad/s
 START_VELOCITY_B = np.array([40.0, 5.0, 3.0])
-AIRLESS = LatticeSettings(chordwise=1, spanwise=1)  # the model has a lattice always; here in no air
+# the model has a lattice always; here in no air, so it may be coarser than a document allows
+AIRLESS = Lattice.model_construct(chordwise=1, spanwise=1)
 
 
 @dataclass(frozen=True)

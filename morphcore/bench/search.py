@@ -15,6 +15,7 @@ from morphcore.identify.identification import SCREEN_SPREAD, Identification
 from morphcore.identify.settings import ModelSettings, SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
+from morphdata.identify import Search
 
 WITHIN = 0.1  # of the best known J: there a search has arrived
 # "scattered" is "least_squares" from points drawn around the physical guess: a descent from the guess itself
@@ -126,8 +127,10 @@ def search_benchmark(bench: Bench) -> Figures:
 
 def _settings(method: str, seed: int) -> SearchSettings:
     if method == "paper":
-        return search_settings({"preset": "paper", "seed": seed})
-    return search_settings({"method": "least_squares" if method == "scattered" else method, "seed": seed})
+        return search_settings(Search(preset="paper", seed=seed))
+    return search_settings(
+        Search.parse({"method": "least_squares" if method == "scattered" else method, "seed": seed})
+    )
 
 
 def _searched(run: Identification, method: str, most_sets: int | None, clock: Clock) -> _Run:

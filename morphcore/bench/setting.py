@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, sample_cases
 from morphcore.models.equivalent import ChainModel
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.stopping import heed
 from morphcore.threads import thread_count
+from morphdata.aircraft import load_aircraft
+from morphdata.flight import load_flight
 
 Array = NDArray[np.float64]
 Figures = dict[str, Any]
@@ -114,8 +116,8 @@ def bench_of(
     """
     folder = example_samples_dir() if samples_dir is None else Path(samples_dir)
     return Bench(
-        aircraft=load_aircraft(folder / "aircraft.json"),
-        flight=load_flight(folder / "flight.json"),
+        aircraft=Aircraft.of(load_aircraft(folder / "aircraft.json")),
+        flight=Flight.of(load_flight(folder / "flight.json")),
         samples={name: load_trajectory(folder / f"{name}.csv") for name in ACCURACY_SAMPLES},
         folder=folder,
         effort=effort,

@@ -8,7 +8,7 @@ from morphcore.bench.setting import LINKS, Bench, Figures
 from morphcore.bench.swarm import flown
 from morphcore.identify.cost import shared_trims
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.flight import simulate
+from morphcore.simulate.flight import flight_steps
 from morphcore.warming import warm_up_further
 
 
@@ -39,5 +39,5 @@ def flexible_flight(bench: Bench) -> Figures:
     """The same flight of the flexible model, trim and all, once: it takes seconds, not milliseconds."""
     sample = bench.samples["train_rate_0.5"]
     warm_up_further()
-    seconds = bench.timed(lambda: simulate(bench.aircraft, bench.flight, sample, model="flexible"))
+    seconds = bench.timed(lambda: list(flight_steps(bench.aircraft, bench.flight, sample, model="flexible")))
     return {"flight_s": sample.duration_s, "flexible_s": seconds}

@@ -16,9 +16,10 @@ from numba.core import event
 
 from morphcore.bench.fresh_process import in_fresh_process
 from morphcore.bench.setting import LINKS, QUICK, RATE_SAMPLES, Bench, Figures, bench_of
-from morphcore.identify import identification_from_document
+from morphcore.identify import identification_from_request
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.warming import warm_up, warm_up_further
+from morphdata.identify import IdentifyRequest
 
 COMPILING = "numba:compile"
 
@@ -78,7 +79,7 @@ def job_in_this_process(samples_dir: str) -> Figures:
     warm_up()
     keep("warm_up", begin)
     begin = clocks()
-    steps = identification_from_document(request_of(bench)).steps()
+    steps = identification_from_request(IdentifyRequest.parse(request_of(bench))).steps()
     next(steps)
     keep("job", begin)
     begin = clocks()

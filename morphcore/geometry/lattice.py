@@ -1,113 +1,20 @@
-"""Vortex-ring lattice of one flat, tapered lifting surface in its own wing axes, and its settings."""
+"""Vortex-ring lattice of one flat, tapered lifting surface in its own wing axes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.errors import InvalidInput
 from morphcore.frames import axis_rotation
-from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.surface import Surface
+from morphdata.lattice import DEFAULT_LATTICE
 
 Array = NDArray[np.float64]
 
-CHORDWISE_PANELS = 4
-SPANWISE_PANELS = 10
 RING_FRONT = 0.25  # of panel chord: with the control point at 3/4, exact for the flat plate in two dimensions
 CONTROL_POINT = 0.75  # of panel chord (Katz & Plotkin 2001, section 12.3; James 1972)
-
-CoreLaw = Literal["line", "smoothed"]
-
-CORE_LAWS: tuple[CoreLaw, ...] = ("line", "smoothed")
-# Core radius of "line" as a fraction of the smaller side of a panel (2.5 per cent of the chord at four rows).
-# Control points lie half a panel from their own ring's edges: Vatistas's factor there is
-# 1 - (0.1 / 0.5)^4 / 2, so it moves the self-influence by less than 1e-3, while a leg that strikes a control
-# point induces no more than gamma / (2 sqrt(2) pi core).
-LINE_CORE = 0.1
-# Cut-off of "smoothed" as a fraction of the surface's mean chord, as programs with this law commonly have it.
-# A panel of 1/4 chord has its control point 2.5 cut-offs from its edges: the self-influence is damped, and
-# the lift comes out too high (docs/physics.md has the figure).
-SMOOTHED_CORE = 0.05
-LARGEST_CORE = 0.5  # of either length; in documents
-
-
-@dataclass(frozen=True)
-class VortexCore:
-    """Law that keeps the velocity of a vortex finite, and its length.
-
-    Attributes
-    ----------
-    law : "line", Vatistas's factor of the distance from the vortex's line; or "smoothed", a cut-off in the
-        denominator of the product form (both in aero/kernels/vortex.py).
-    fraction : the core's radius over the smaller side of a panel ("line") or over the mean chord of the
-        surface ("smoothed"), above 0; None for the law's default.
-    """
-
-    law: CoreLaw = "line"
-    fraction: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.law not in CORE_LAWS:
-            raise InvalidInput(
-                f"the vortex core's law is {self.law!r}",
-                pointer="/model/lattice/core/law",
-                hint=f"use one of {', '.join(CORE_LAWS)}",
-            )
-        if not self.radius_fraction > 0.0:
-            raise InvalidInput(
-                f"the vortex core is {self.fraction}, not above 0",
-                pointer="/model/lattice/core/fraction",
-                hint="leave it out for the default",
-            )
-
-    @property
-    def radius_fraction(self) -> float:
-        """The fraction that holds, given or default."""
-        if self.fraction is not None:
-            return self.fraction
-        return LINE_CORE if self.law == "line" else SMOOTHED_CORE
-
-
-DEFAULT_CORE = VortexCore()
-
-
-@dataclass(frozen=True)
-class LatticeSettings(WholeNumbers):
-    """Panels of every surface, along chord and span, and the core of their vortices."""
-
-    chordwise: int = CHORDWISE_PANELS
-    spanwise: int = SPANWISE_PANELS
-    core: VortexCore = DEFAULT_CORE
-
-    def to_document(self) -> dict[str, Any]:
-        """JSON form, as ``lattice_settings`` reads it, with the core's fraction that holds."""
-        core = {"law": self.core.law, "fraction": self.core.radius_fraction}
-        return {"chordwise": self.chordwise, "spanwise": self.spanwise, "core": core}
-
-
-DEFAULT_LATTICE = LatticeSettings()
-
-
-def lattice_settings(document: dict[str, Any], pointer: str = "/model/lattice") -> LatticeSettings:
-    """Read ``{"chordwise", "spanwise", "core": {"law", "fraction"}}``; all may be left out."""
-    fields = Fields(document, pointer)
-    core = fields.optional_child("core")
-    default = DEFAULT_LATTICE
-    settings = LatticeSettings(
-        chordwise=fields.whole("chordwise", default=default.chordwise, least=1, most=8),
-        spanwise=fields.whole("spanwise", default=default.spanwise, least=4, most=20),
-        core=VortexCore(
-            law=core.choice("law", CORE_LAWS, default=default.core.law),  # type: ignore[arg-type]
-            fraction=core.optional_number("fraction", above=0.0, most=LARGEST_CORE),
-        ),
-    )
-    core.done()
-    fields.done()
-    return settings
 
 
 @dataclass(frozen=True)
@@ -178,7 +85,7 @@ class SurfaceLattice:
 
 
 def surface_lattice(
-    surface: Surface, chordwise: int = CHORDWISE_PANELS, spanwise: int = SPANWISE_PANELS
+    surface: Surface, chordwise: int = DEFAULT_LATTICE.chordwise, spanwise: int = DEFAULT_LATTICE.spanwise
 ) -> SurfaceLattice:
     """Lattice of ``chordwise`` x ``spanwise`` panels of uniform spacing on a surface's mid-plane."""
     edges = np.linspace(0.0, surface.span_m, spanwise + 1)

@@ -70,18 +70,13 @@ def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
 
 def _reflection(surface: Surface) -> Surface:
     """The surface on the other side; hinge coordinates are alike on both sides."""
-    hinge = surface.hinge
+    (x, y, z), hinge = surface.position_m, surface.hinge
+    if hinge is not None:
+        forward, right, down = hinge.position_m
+        hinge = hinge.model_copy(update={"position_m": [forward, -right, down]})
     return replace(
-        surface,
-        side="left" if surface.side == "right" else "right",
-        position_m=_across(surface.position_m),
-        hinge=None if hinge is None else replace(hinge, position_m=_across(hinge.position_m)),
+        surface, side="left" if surface.side == "right" else "right", position_m=(x, -y, z), hinge=hinge
     )
-
-
-def _across(point_B: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = point_B
-    return x, -y, z
 
 
 def _is_symmetric(fuselage: Fuselage) -> bool:

@@ -7,27 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from morphdata.aircraft import Material, Section
+
 Array = NDArray[np.float64]
 
 TORSION_SERIES_TERMS = 60  # odd terms of Saint-Venant's series; the sum is converged to 1e-9
-
-
-@dataclass(frozen=True)
-class Material:
-    """Isotropic elastic material.
-
-    ``stiffness_damping_s`` is beta of C = beta K (stiffness-proportional damping), in s.
-    """
-
-    density_kg_m3: float
-    youngs_modulus_pa: float
-    poisson_ratio: float
-    stiffness_damping_s: float
-
-    @property
-    def shear_modulus_pa(self) -> float:
-        """G = E / (2 (1 + nu))."""
-        return self.youngs_modulus_pa / (2 * (1 + self.poisson_ratio))
 
 
 @dataclass(frozen=True)
@@ -47,29 +31,19 @@ class SectionProperties:
     inertia_z: Array
 
 
-@dataclass(frozen=True)
-class GivenSection:
-    """Section properties given outright and constant along the span (units as in SectionProperties)."""
-
-    ei_flap_n_m2: float
-    ei_lag_n_m2: float
-    gj_n_m2: float
-    mass_per_length_kg_m: float
-    inertia_per_length_kg_m: tuple[float, float, float]
-
-    def at(self, chord: Array) -> SectionProperties:
-        """The properties at stations of the given chords, shape (stations,)."""
-        ones = np.ones_like(chord)
-        ix, iy, iz = self.inertia_per_length_kg_m
-        return SectionProperties(
-            ei_flap=self.ei_flap_n_m2 * ones,
-            ei_lag=self.ei_lag_n_m2 * ones,
-            gj=self.gj_n_m2 * ones,
-            mass=self.mass_per_length_kg_m * ones,
-            inertia_x=ix * ones,
-            inertia_y=iy * ones,
-            inertia_z=iz * ones,
-        )
+def given_section(section: Section, chord: Array) -> SectionProperties:
+    """Properties given outright and constant along the span, at stations of the given chords (stations,)."""
+    ones = np.ones_like(chord)
+    ix, iy, iz = section.inertia_per_length_kg_m
+    return SectionProperties(
+        ei_flap=section.ei_flap_n_m2 * ones,
+        ei_lag=section.ei_lag_n_m2 * ones,
+        gj=section.gj_n_m2 * ones,
+        mass=section.mass_per_length_kg_m * ones,
+        inertia_x=ix * ones,
+        inertia_y=iy * ones,
+        inertia_z=iz * ones,
+    )
 
 
 def torsion_constant(width: Array, height: Array) -> Array:

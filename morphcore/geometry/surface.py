@@ -1,4 +1,4 @@
-"""Lifting surfaces and their hinges."""
+"""Lifting surfaces with every default resolved, as the numerics take them."""
 
 from __future__ import annotations
 
@@ -8,40 +8,22 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from morphcore.geometry.section import GivenSection, Material, SectionProperties, solid_box
+from morphcore.geometry.section import SectionProperties, given_section, solid_box
 from morphcore.shown import Shown
+from morphdata import aircraft as documents
+from morphdata.aircraft import Hinge, Material, Section
+from morphdata.vehicle import ANGLE_TOLERANCE_RAD
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
 
-AXES = ("x", "y", "z")
-RANGE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly at the stop
 SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
-DEFAULT_HINGE_RANGE_RAD = 1.3  # either way from unswept; at more the wing lies along the fuselage
 
 
-@dataclass(frozen=True)
-class Hinge:
-    """A hinge of prescribed motion between fuselage and surface.
-
-    ``axis`` "z" sweeps (positive: tip aft), "x" folds (positive: tip up), "y" sets incidence (positive: nose
-    up), on both sides alike. ``position_m`` is in B from the fuselage reference point.
-    """
-
-    position_m: tuple[float, float, float]
-    axis: Literal["x", "y", "z"]
-    min_rad: float = -DEFAULT_HINGE_RANGE_RAD
-    max_rad: float = DEFAULT_HINGE_RANGE_RAD
-
-    @property
-    def axis_index(self) -> int:
-        """0, 1 or 2 for x, y, z."""
-        return AXES.index(self.axis)
-
-    def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
-        """Rows of a history of angles (k,) that lie beyond the hinge's range."""
-        low, high = self.min_rad - RANGE_TOLERANCE_RAD, self.max_rad + RANGE_TOLERANCE_RAD
-        return np.flatnonzero((angle_rad < low) | (angle_rad > high))
+def beyond_range(hinge: Hinge, angle_rad: Array) -> NDArray[np.int64]:
+    """Rows of a history of angles (k,) that lie beyond the hinge's range."""
+    low, high = hinge.min_rad - ANGLE_TOLERANCE_RAD, hinge.max_rad + ANGLE_TOLERANCE_RAD
+    return np.flatnonzero((angle_rad < low) | (angle_rad > high))
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,10 +46,32 @@ class Surface(Shown):
     hinge: Hinge | None
     position_m: tuple[float, float, float]
     flexible: bool
-    profile_drag: float = 0.0
-    section: GivenSection | None = None
-    elastic_axis_offset_m: float = 0.0
-    mass_axis_offset_m: float = 0.0
+    profile_drag: float
+    section: Section | None
+    elastic_axis_offset_m: float
+    mass_axis_offset_m: float
+
+    @classmethod
+    def of(cls, document: documents.Surface) -> Surface:
+        """Return the surface that a document describes."""
+        root, tip = document.root_and_tip_chord_m
+        x, y, z = document.root_m
+        return cls(
+            name=document.name,
+            side=document.side,
+            span_m=document.span_m,
+            root_chord_m=root,
+            tip_chord_m=tip,
+            thickness_m=document.thickness_m,
+            material=document.material,
+            hinge=document.hinge,
+            position_m=(x, y, z),
+            flexible=document.flexible,
+            profile_drag=document.profile_drag,
+            section=document.section,
+            elastic_axis_offset_m=document.elastic_axis_offset_m,
+            mass_axis_offset_m=document.mass_axis_offset_m,
+        )
 
     @property
     def span_sign(self) -> float:
@@ -113,7 +117,7 @@ class Surface(Shown):
         """Section properties at distances from the root, shape (stations,)."""
         chord = np.atleast_1d(self.chord_at(distance_m))
         if self.section is not None:
-            return self.section.at(chord)
+            return given_section(self.section, chord)
         return solid_box(self.material, chord, self.thickness_m)
 
     def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array]:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.fields import Fields
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
-from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.identify import IdentifyRequest, SamplesRequest
 
 __all__ = [
     "GenerationTask",
@@ -25,14 +25,14 @@ __all__ = [
     "ModelSettings",
     "SearchSettings",
     "Step",
-    "identification_from_document",
+    "identification_from_request",
     "identify",
 ]
 
 
 def identify(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
     links_per_wing: int = 3,
@@ -53,8 +53,8 @@ def identify(
     InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
     run = Identification(
-        aircraft,
-        flight,
+        Aircraft.of(aircraft),
+        Flight.of(flight),
         samples,
         model or ModelSettings(links_per_wing=links_per_wing),
         search or SearchSettings(seed=seed),
@@ -65,8 +65,8 @@ def identify(
     return run.result(checkpoint)
 
 
-def identification_from_document(document: dict[str, Any], threads: int | None = None) -> Identification:
-    """The identification that a request document (the body of ``POST /identify``) asks for.
+def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
+    """The identification that a request (the body of ``POST /identify``) asks for.
 
     Raises
     ------
@@ -74,15 +74,15 @@ def identification_from_document(document: dict[str, Any], threads: int | None =
     """
     if threads is not None:
         use_threads(threads)
-    fields = Fields(document, "")
-    aircraft = aircraft_from_document(fields.raw("aircraft"))
-    flight = flight_from_document(fields.raw("flight"))
-    listed = fields.raw("samples")
-    if not isinstance(listed, list):
-        raise InvalidInput("samples is not a list", pointer="/samples", hint="give a list of samples")
-    samples = [trajectory_from_document(item, f"/samples/{i}") for i, item in enumerate(listed)]
-    model = model_settings(fields.raw("model", {}))
-    search = search_settings(fields.raw("search", {}))
-    fields.raw("execution", None)  # how a service runs it: no number depends on that
-    fields.done()
-    return Identification(aircraft, flight, samples, model, search)
+    return Identification(
+        *flown_inputs(request), model_settings(request.model), search_settings(request.search)
+    )
+
+
+def flown_inputs(request: SamplesRequest) -> tuple[Aircraft, Flight, list[Trajectory]]:
+    """Aircraft, flight condition and samples of a request, as numbers."""
+    return (
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        [Trajectory.of(sample) for sample in request.inline_samples().values()],
+    )

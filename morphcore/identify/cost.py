@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.surface import beyond_range
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.simulate.batch import fly_batch
@@ -67,7 +68,7 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
     for surface in aircraft.surfaces:
         angle = sample.sweep(surface.side)
         if surface.hinge is not None:
-            bad = surface.hinge.beyond_range(angle)
+            bad = beyond_range(surface.hinge, angle)
             if bad.size:
                 raise InvalidInput(
                     f"sweep {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",

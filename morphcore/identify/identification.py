@@ -23,12 +23,15 @@ from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.sought import corrections_told
 from morphcore.identify.state import Phase, SearchState, decode, encode
 from morphcore.models.equivalent import ChainModel, chain_model
+from morphcore.simulate.compilation import compile_flights
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphcore.steps import Step
 from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
 from morphcore.threads import one_blas_thread
+from morphdata.faults import refuse
+from morphdata.identify import samples_faults
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -76,15 +79,9 @@ class Identification:
         self.samples = tuple(samples)
         self._clock = clock
         self._step_s = self.settings.step_s
-        names = [sample.name for sample in samples]
-        if len(set(names)) != len(names):
-            raise InvalidInput("two samples have one name", pointer="/samples", hint="rename one")
+        refuse(samples_faults(samples))
         for number, sample in enumerate(samples):
             require_flight(sample, f"/samples/{number}")
-        if not any(sample.role == "train" for sample in samples):
-            raise InvalidInput(
-                "no sample has the role train", pointer="/samples", hint="mark at least one with role train"
-            )
         if self.settings.start == "given" and flight.start is None:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
@@ -220,6 +217,7 @@ class Identification:
 
     def _first(self, stop: Stop | None) -> SearchState:
         """Choose the step, in the search's time, and fly what is known, which always is flown."""
+        compile_flights()
         deadline = Deadline(self.search.max_seconds, stop)
         try:
             self._chosen_step(deadline)

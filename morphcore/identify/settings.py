@@ -1,42 +1,36 @@
-"""What an identification is asked to do, read from its JSON document."""
+"""How an identification is searched for, with every choice made that a request may leave to the method."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
 
-from morphcore.errors import InvalidInput
-from morphcore.evolution import FEWEST, EvolutionSettings
-from morphcore.geometry.fields import Fields, WholeNumbers
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
-from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
-from morphcore.models.parameters import CHAIN_PARAMETERS
-from morphcore.models.parameters_document import parameters_from_document
-from morphcore.simulate.plan import STEP_S
+from morphcore.evolution import EvolutionSettings
+from morphcore.geometry.fields import WholeNumbers
+from morphcore.models.equivalent import ParameterBatch
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.simulate.trim import StartMode
 from morphcore.swarm import SwarmSettings
+from morphdata.identify import IdentifySearch, Method, Search, SoughtModel
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.parameters import parameters_in
 
-Method = Literal["hybrid", "least_squares", "cma", "pso"]
-
-METHODS: tuple[Method, ...] = ("hybrid", "least_squares", "cma", "pso")
-LARGEST_SEED = 2**53 - 1
-SHORTEST_STEP_S = 5e-4
 PAPER_PARTICLES = 2500
-# starts of the hybrid's second polish
+# starts of the hybrid's second descent
 DEFAULT_STARTS = 4
 DEFAULT_ITERATIONS = 40
 DEFAULT_SCREEN = 64  # candidates flown to find them
 # from a known model there is less to find: its surroundings, and the physical guess in case it is a bad one
 WARM_STARTS = 3
 WARM_SCREEN = 32
+UNCHOSEN = IdentifySearch()
 
 
 @dataclass(frozen=True)
 class ModelSettings(WholeNumbers):
-    """The model whose parameters are sought.
+    """The model whose parameters are searched.
 
-    ``aero_coefficients`` : the corrections to seek; None: those that the flights to fit can tell (see
+    ``aero_coefficients`` : the corrections to search; None: those that the flights to fit can tell (see
     ``morphcore/identify/sought.py``). ``step_s`` : s; None: the longest that holds the tolerance of
     ``morphcore/simulate/step_choice.py`` on the flights to fit.
     """
@@ -45,14 +39,14 @@ class ModelSettings(WholeNumbers):
     separate_wings: bool = False
     aero_coefficients: tuple[str, ...] | None = None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    lattice: LatticeSettings = DEFAULT_LATTICE
+    lattice: Lattice = DEFAULT_LATTICE
     step_s: float | None = None
     start: StartMode = "trim"
 
 
 @dataclass(frozen=True)
 class SearchSettings(WholeNumbers):
-    """How they are sought: ``swarm`` rules "pso", ``evolution`` "cma".
+    """The choices of all methods: ``swarm`` is of "pso", ``evolution`` of "cma".
 
     "least_squares" descends from what is known beforehand (the physical guess, ``warm_start``) in up to
     ``iterations``; "hybrid" does the same and, where that ends in a poor fit, flies ``screen`` candidates and
@@ -62,8 +56,8 @@ class SearchSettings(WholeNumbers):
     candidates.
     """
 
-    method: Method = "hybrid"
-    seed: int = 1
+    method: Method = UNCHOSEN.method
+    seed: int = UNCHOSEN.seed
     max_seconds: float | None = None
     swarm: SwarmSettings = field(default_factory=SwarmSettings)
     evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
@@ -73,78 +67,35 @@ class SearchSettings(WholeNumbers):
     warm_start: ParameterBatch | None = None
 
 
-def model_settings(document: dict[str, Any], pointer: str = "/model") -> ModelSettings:
-    """Read the model's part of a request."""
-    fields = Fields(document, pointer)
-    default = ModelSettings()
-    bounds = fields.optional_child("bounds")
-    names = [parameter.name for parameter in CHAIN_PARAMETERS]
-    pairs = {name: _pair(bounds, name) for name in names if bounds.has(name)}
-    bounds.done()
-    listed = fields.raw("aero_coefficients", None)
-    settings = ModelSettings(
-        links_per_wing=fields.whole(
-            "links_per_wing", default=default.links_per_wing, least=1, most=MOST_LINKS
-        ),
-        separate_wings=fields.flag("separate_wings", default=False),
+def model_settings(model: SoughtModel) -> ModelSettings:
+    """Take the model's part of a request; of several numbers of links the first."""
+    listed = model.aero_coefficients
+    return ModelSettings(
+        links_per_wing=model.numbers_of_links()[0],
+        separate_wings=model.separate_wings,
         aero_coefficients=None if listed is None else tuple(listed),
-        bounds=pairs,
-        lattice=lattice_settings(fields.raw("lattice", {}), f"{pointer}/lattice"),
-        step_s=fields.optional_number("step_s", least=SHORTEST_STEP_S, most=STEP_S),
-        start=fields.choice("start", ("trim", "given")) if fields.has("start") else "trim",  # type: ignore[arg-type]
-    )
-    fields.done()
-    return settings
-
-
-def search_settings(document: dict[str, Any], pointer: str = "/search") -> SearchSettings:
-    """Read the search's part of a request; ``preset: "paper"`` is the swarm of the 2021 paper."""
-    fields = Fields(document, pointer)
-    paper = fields.choice("preset", ("paper",)) == "paper" if fields.has("preset") else False
-    method = fields.choice("method", METHODS) if fields.has("method") else ("pso" if paper else "hybrid")
-    default = SwarmSettings(particles=PAPER_PARTICLES) if paper else SwarmSettings()
-    swarm = SwarmSettings(
-        particles=fields.whole("particles", default=default.particles, least=1, most=100_000),
-        generations=fields.whole("generations", default=default.generations, least=1, most=100_000),
-        c1=fields.number("c1", default=default.c1, least=0.0, most=4.0),
-        c2=fields.number("c2", default=default.c2, least=0.0, most=4.0),
-        inertia=fields.number("inertia", default=default.inertia, least=0.0, most=1.5),
-    )
-    evolution = _evolution_settings(fields) if method == "cma" and not paper else EvolutionSettings()
-    warm_start = None
-    if fields.has("warm_start"):
-        known = fields.child("warm_start")
-        warm_start = parameters_from_document(known.raw("parameters"), f"{known.pointer}/parameters")
-        known.done()
-    warm = warm_start is not None
-    settings = SearchSettings(
-        method="pso" if paper else method,  # type: ignore[arg-type]
-        seed=fields.whole("seed", default=1, least=0, most=LARGEST_SEED),
-        max_seconds=fields.optional_number("max_seconds", above=0.0),
-        swarm=swarm,
-        evolution=evolution,
-        screen=swarm.particles if fields.has("particles") else WARM_SCREEN if warm else DEFAULT_SCREEN,
-        starts=WARM_STARTS if warm else DEFAULT_STARTS,
-        iterations=swarm.generations if fields.has("generations") else DEFAULT_ITERATIONS,
-        warm_start=warm_start,
-    )
-    fields.done()
-    return settings
-
-
-def _evolution_settings(fields: Fields) -> EvolutionSettings:
-    default = EvolutionSettings()
-    return EvolutionSettings(
-        particles=fields.whole("particles", default=default.particles, least=FEWEST, most=100_000),
-        generations=fields.whole("generations", default=default.generations, least=1, most=100_000),
+        bounds={} if model.bounds is None else model.bounds.given(),
+        lattice=model.lattice,
+        step_s=model.step_s,
+        start=model.start,
     )
 
 
-def _pair(fields: Fields, name: str) -> tuple[float, float]:
-    value = fields.raw(name)
-    if not isinstance(value, list) or len(value) != 2:
-        raise InvalidInput(
-            f"{name} is not [low, high]", pointer=f"{fields.pointer}/{name}", hint="give two numbers"
-        )
-    numbers = Fields({"low": value[0], "high": value[1]}, f"{fields.pointer}/{name}")
-    return numbers.number("low"), numbers.number("high")
+def search_settings(search: Search) -> SearchSettings:
+    """Choose what a request leaves to the method; ``preset: "paper"`` is the swarm of the 2021 paper."""
+    paper = search.preset == "paper"
+    swarm = search.swarm_settings()
+    evolution = {name: swarm[name] for name in ("particles", "generations") if name in swarm}
+    warm_start = search.warm_start if isinstance(search, IdentifySearch) else None
+    known = None if warm_start is None else parameters_in(warm_start.parameters)
+    return SearchSettings(
+        method="pso" if paper else search.method,
+        seed=search.seed,
+        max_seconds=search.max_seconds,
+        swarm=SwarmSettings(**{**({"particles": PAPER_PARTICLES} if paper else {}), **swarm}),
+        evolution=EvolutionSettings(**evolution),
+        screen=search.particles or (DEFAULT_SCREEN if known is None else WARM_SCREEN),
+        starts=DEFAULT_STARTS if known is None else WARM_STARTS,
+        iterations=search.generations or DEFAULT_ITERATIONS,
+        warm_start=None if known is None else parameter_batch(known),
+    )

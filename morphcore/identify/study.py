@@ -11,25 +11,25 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
-from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.fields import Fields, whole_number
-from morphcore.identify import identification_from_document
+from morphcore.identify import flown_inputs
 from morphcore.identify.identification import Clock, Identification
-from morphcore.identify.settings import ModelSettings, SearchSettings
+from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
 from morphcore.identify.study_timing import ROUNDS, FlightTiming, Flyable, flight_timing, medians
-from morphcore.models.equivalent import MOST_LINKS, physical_guess
+from morphcore.models.equivalent import physical_guess
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.steps import Step
 from morphcore.stopping import Stop
-from morphcore.threads import one_blas_thread
+from morphcore.threads import one_blas_thread, use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.study import StudiedModels, StudyRequest
 
-LINKS = (1, 2, 3, 4, 5, 6)
+LINKS = tuple(StudiedModels().links_per_wing)
 TIMING_FRACTION = 0.02  # of the whole work, for the progress that is shown
 
 
@@ -58,7 +58,7 @@ class Study:
         search: SearchSettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
-        self.links = _different_links(links)
+        self.links = tuple(StudiedModels.parse({"links_per_wing": [*links]}, "/model").links_per_wing)
         self.search = search or SearchSettings()
         self._clock = clock
         settings = model or ModelSettings()
@@ -242,8 +242,8 @@ class Study:
 
 
 def study(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
     links: Sequence[int] = LINKS,
@@ -262,54 +262,28 @@ def study(
     ------
     InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
     """
-    run = Study(aircraft, flight, samples, links=links, model=model, search=search)
+    run = Study(Aircraft.of(aircraft), Flight.of(flight), samples, links=links, model=model, search=search)
     checkpoint = b""
     for step in run.steps():
         checkpoint = step.checkpoint
     return run.result(checkpoint)
 
 
-def study_from_document(document: dict[str, Any], threads: int | None = None) -> Study:
-    """The study that a request document (the body of ``POST /study``) asks for.
-
-    It is an identification's request with a list of numbers as ``model.links_per_wing`` (1 to 6 if missing).
+def study_from_request(request: StudyRequest, threads: int | None = None) -> Study:
+    """The study that a request (the body of ``POST /study``) asks for.
 
     Raises
     ------
     InvalidInput : with a pointer to the field at fault.
     """
-    fields = Fields(document, "")
-    model = fields.optional_child("model")
-    links = _listed(model.raw("links_per_wing", list(LINKS)))
-    single = {**fields.raw("model", {}), "links_per_wing": links[0]}
-    run = identification_from_document({**document, "model": single}, threads)
+    if threads is not None:
+        use_threads(threads)
     return Study(
-        run.model.aircraft, run.model.flight, run.samples, links=links, model=run.settings, search=run.search
+        *flown_inputs(request),
+        links=request.model.links_per_wing,
+        model=model_settings(request.model),
+        search=search_settings(request.search),
     )
-
-
-def _listed(given: Any) -> tuple[int, ...]:
-    if not isinstance(given, list):
-        raise InvalidInput(
-            "links_per_wing is not a list",
-            pointer="/model/links_per_wing",
-            hint=f"give the numbers to study, such as {list(LINKS)}",
-        )
-    return _different_links(given)
-
-
-def _different_links(links: Sequence[Any]) -> tuple[int, ...]:
-    """Numbers of links, all different, whole and in range."""
-    pointer = "/model/links_per_wing"
-    if not len(links):  # an array of numpy has no truth of its own
-        raise InvalidInput("no number of links is given", pointer=pointer, hint=f"give {list(LINKS)}")
-    found: list[int] = []
-    for index, given in enumerate(links):
-        n = whole_number(given, "a number of links", pointer=f"{pointer}/{index}", least=1, most=MOST_LINKS)
-        if n in found:
-            raise InvalidInput(f"{n} is listed twice", pointer=f"{pointer}/{index}", hint="drop one")
-        found.append(n)
-    return tuple(found)
 
 
 def _found(row: StudyRow) -> str:

@@ -13,7 +13,6 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import whole_number
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.mirror import Mirror, mirror_groups, mirror_of
 from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
@@ -27,6 +26,7 @@ from morphcore.models.kernels.layout import (
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -256,7 +256,7 @@ class ChainModel(Shown):
 
 
 def chain_model(
-    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: LatticeSettings = DEFAULT_LATTICE
+    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
     """The equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
 
@@ -274,7 +274,7 @@ def _chain_model(
     aircraft: Aircraft,
     flight: Flight,
     links_per_wing: int,
-    lattice: LatticeSettings,
+    lattice: Lattice,
     images: Sequence[Surface] = (),
 ) -> ChainModel:
     lattices = aircraft_lattice(aircraft, lattice, images)

@@ -20,10 +20,11 @@ from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.frames import skew
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
 from morphcore.geometry.fields import whole_number
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, SurfaceLattice
+from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
 from morphcore.multibody.beam import GAUSS, Beams, Section, make_beams
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -59,7 +60,7 @@ def flexible_model(
     flight: Flight,
     *,
     elements: int = DEFAULT_ELEMENTS,
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
 ) -> FlexibleModel:
     """Beams of ``elements`` equal elements for every flexible surface.
 

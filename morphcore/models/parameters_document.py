@@ -7,31 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.errors import InvalidInput
-from morphcore.geometry.fields import Fields
-from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
-from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
+from morphcore.models.equivalent import ParameterBatch
+from morphcore.models.parameters import CHAIN_PARAMETERS
+from morphdata.parameters import AXES, Parameters, SurfaceParameters, WholeResult
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
 
-AXES = 3  # flap, torsion, lag
-SUM_TOLERANCE = 1e-6  # of the division fractions: documents may be rounded for printing
-
 
 def parameters_from_document(document: Document, pointer: str = "/model") -> ParameterBatch:
-    """Read one parameter set.
+    """Read one parameter set: the ``model`` of an identification's result, or the whole result.
 
     Parameters
     ----------
-    document : a ``model`` object of an identification's result, or the whole result that holds one.
-        ``division`` (n,), ``stiffness_nm_rad`` (n - 1, 3) of flap, torsion and lag in N m/rad,
-        ``damping_nms_rad`` (n - 1, 3) in N m s/rad (or one number for a joint's three axes); each with one
-        more leading axis where the wings have parameters of their own. ``aero``: the corrections, by the
-        names of ``CHAIN_PARAMETERS``. ``surfaces``, where flexible surfaces are not one mirror pair: by the
-        name of each, its own division, stiffness, damping and profile drag, or ``mirror_of`` another. Other
-        fields are not looked at.
-    pointer : where the document stands, for errors.
+    document : dict
+        Parsed JSON.
+    pointer : str
+        Where the document stands, for errors.
 
     Returns
     -------
@@ -39,84 +31,55 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
     Raises
     ------
-    InvalidInput : a field is missing, has another shape than ``links_per_wing`` says, or is out of its range;
-        or the result is of a search whose best model never flew.
+    InvalidInput
+        A field is missing or out of its range, the lists do not fit the number of links, or the result is of
+        a search whose best model never flew.
     """
-    whole = Fields(document, pointer)
-    _require_flown(document, pointer)
-    fields = Fields(whole.raw("model"), pointer) if whole.has("model") else whole
-    fields.raw("links_per_wing")
-    links = fields.whole("links_per_wing", default=1, least=1, most=MOST_LINKS)
-    values = _structure(fields, links)
-    wings = values["division"].shape[0]
-    aero = fields.child("aero")
+    if "model" in document:
+        return parameter_batch(WholeResult.parse(document, pointer).model)
+    return parameter_batch(Parameters.parse(document, pointer))
+
+
+def parameter_batch(given: Parameters) -> ParameterBatch:
+    """Return the parameters of a document as a batch of one particle; each division adds up to 1 exactly."""
+    links, wings = given.links_per_wing, len(given.divisions)
+    values = _structure(given, wings, links)
+    whole = set()
     for parameter in CHAIN_PARAMETERS:
-        if parameter.correction:
-            value = np.full(1, _correction(aero, parameter))
-            values[parameter.name] = value if parameter.scope == "aircraft" else np.tile(value, wings)
-    if not fields.has("surfaces"):
-        return _batch(values)
-    surfaces = fields.child("surfaces")
-    if not fields.raw("surfaces"):
-        raise _error(fields, "surfaces", "surfaces is empty")
-    owners: dict[str, list[str]] = {}
-    own: dict[str, list[Array]] = {}
-    for name in fields.raw("surfaces"):
-        entry = surfaces.child(name)
-        if entry.has("mirror_of"):
-            owners.setdefault(entry.text("mirror_of"), []).append(name)
+        if not parameter.correction:
             continue
-        owners.setdefault(name, []).insert(0, name)
-        found = _structure(entry, links)
+        value = np.full(1, getattr(given.aero, parameter.name, parameter.default), dtype=np.float64)
+        if parameter.scope == "aircraft":
+            whole.add(parameter.name)
+        values[parameter.name] = value if parameter.scope == "aircraft" else np.tile(value, wings)
+    surfaces = None
+    if given.surfaces:
+        owners = {name: [name] for name, own in given.surfaces.items() if isinstance(own, SurfaceParameters)}
+        for name, own in given.surfaces.items():
+            if not isinstance(own, SurfaceParameters):
+                owners[own.mirror_of].append(name)
+        sets = [own for own in given.surfaces.values() if isinstance(own, SurfaceParameters)]
+        rows = [_structure(own, 1, links) for own in sets]
         for parameter in CHAIN_PARAMETERS:
             if parameter.correction and parameter.scope != "aircraft":
-                found[parameter.name] = np.full(1, _correction(entry, parameter))
-        for key, value in found.items():
-            own.setdefault(key, []).append(value[0])
-    for label, names in owners.items():
-        if names[0] != label:
-            entry = surfaces.child(names[0])
-            raise _error(entry, "mirror_of", f"{names[0]!r} mirrors {label!r}, which has no parameters")
-    values |= {key: np.stack(rows) for key, rows in own.items()}
-    return _batch(values, tuple(tuple(names) for names in owners.values()))
-
-
-def _batch(values: dict[str, Array], surfaces: tuple[tuple[str, ...], ...] | None = None) -> ParameterBatch:
-    """One particle of values without their leading axis."""
-    whole = {parameter.name for parameter in CHAIN_PARAMETERS if parameter.scope == "aircraft"}
+                for row, own in zip(rows, sets, strict=True):
+                    row[parameter.name] = np.full(1, getattr(own, parameter.name, parameter.default))
+        values |= {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+        surfaces = tuple(tuple(names) for names in owners.values())
     return ParameterBatch(
         {name: value if name in whole else value[None] for name, value in values.items()}, surfaces
     )
 
 
-def _structure(fields: Fields, links: int) -> dict[str, Array]:
-    """Division (w, n), stiffness and damping (w, n - 1, 3) of an object with w wings."""
-    division = _array(fields, "division")
-    wings = 1 if division.ndim == 1 else division.shape[0]
-    division = _shaped(fields, "division", division, (wings, links))
-    if np.any(division <= 0.0) or np.any(np.abs(division.sum(axis=1) - 1.0) > SUM_TOLERANCE):
-        raise _error(fields, "division", "the shares of the span are not positive or do not add up to 1")
-    stiffness = _array(fields, "stiffness_nm_rad")
-    stiffness = _shaped(fields, "stiffness_nm_rad", stiffness, (wings, links - 1, AXES))
-    damping = _array(fields, "damping_nms_rad")
-    if damping.ndim > 0 and damping.size == wings * (links - 1):
-        damping = np.repeat(damping.reshape(wings, links - 1, 1), AXES, axis=2)
-    damping = _shaped(fields, "damping_nms_rad", damping, (wings, links - 1, AXES))
-    for name, values in (("stiffness_nm_rad", stiffness), ("damping_nms_rad", damping)):
-        if np.any(values < 0.0):
-            raise _error(fields, name, f"{name} has a negative entry")
+def _structure(given: Parameters | SurfaceParameters, wings: int, links: int) -> dict[str, Array]:
+    """Division (w, n), stiffness and damping (w, n - 1, 3) of w wings."""
+    division = np.array(given.division, dtype=np.float64).reshape(wings, links)
+    joints = (wings, links - 1, AXES)
     return {
         "division": division / division.sum(axis=1, keepdims=True),
-        "stiffness_nm_rad": stiffness,
-        "damping_nms_rad": damping,
+        "stiffness_nm_rad": np.array(given.stiffness_nm_rad, dtype=np.float64).reshape(joints),
+        "damping_nms_rad": np.array(given.damping_nms_rad, dtype=np.float64).reshape(joints),
     }
-
-
-def _correction(fields: Fields, parameter: Parameter) -> float:
-    limits = {"least": parameter.minimum, "most": parameter.maximum, "above": parameter.above}
-    if parameter.default is None:
-        return fields.number(parameter.name, **limits)
-    return fields.number(parameter.name, default=parameter.default, **limits)
 
 
 def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
@@ -149,43 +112,3 @@ def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
             for i, name in enumerate(names)
         }
     return document
-
-
-def _require_flown(document: Document, pointer: str) -> None:
-    """Refuse a result without a model, or with one that did not fly what it was fitted to."""
-    fit = document.get("fit")
-    lost = [
-        row.get("sample")
-        for row in (fit if isinstance(fit, list) else [])
-        if isinstance(row, dict) and row.get("role") == "train" and row.get("J_identified", 0.0) is None
-    ]
-    if lost or ("model" in document and document["model"] is None):
-        raise InvalidInput(
-            "the result holds no model that flies the samples it was fitted to",
-            pointer=f"{pointer}/model",
-            hint="its warnings say why; give the result of an identification that succeeded",
-        )
-
-
-def _array(fields: Fields, name: str) -> Array:
-    raw = fields.raw(name)
-    try:
-        values = np.array(raw, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise _error(fields, name, f"{name} is not a list of numbers") from None
-    if values.ndim == 0 or not np.all(np.isfinite(values)):
-        raise _error(fields, name, f"{name} is not a list of finite numbers")
-    return values
-
-
-def _shaped(fields: Fields, name: str, values: Array, shape: tuple[int, ...]) -> Array:
-    # no entries at all (one link has no joints): [] and [[]] are the same
-    if values.size != np.prod(shape) or (values.size and values.shape not in {shape, shape[1:]}):
-        wanted = " x ".join(str(n) for n in (shape if shape[0] > 1 else shape[1:]))
-        raise _error(fields, name, f"{name} does not hold {wanted} numbers")
-    return values.reshape(shape)
-
-
-def _error(fields: Fields, name: str, message: str) -> InvalidInput:
-    hint = "give the model of an identification's result"
-    return InvalidInput(message, pointer=f"{fields.pointer}/{name}", hint=hint)

@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.geometry.fields import Fields
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters_document import parameters_from_document
+from morphcore.models.parameters_document import parameter_batch
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import (
-    VERIFICATIONS,
     FlexibleSettings,
-    Limits,
-    Morph,
     ScheduleSearch,
-    Verify,
-    Weights,
     flexible_settings,
-    limits_settings,
-    morph_settings,
     schedule_search,
-    weights_settings,
 )
-from morphcore.simulate.request import flown_model
 from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.optimize import Limits, Morph, OptimizeRequest, Verify, Weights
+from morphdata.parameters import flown_with
 
 __all__ = [
     "FlexibleSettings",
@@ -40,14 +33,14 @@ __all__ = [
     "ScheduleSearch",
     "Step",
     "Weights",
-    "optimisation_from_document",
+    "optimisation_from_request",
     "optimise_schedule",
 ]
 
 
 def optimise_schedule(
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     model: ParameterBatch,
     *,
     morph: Morph,
@@ -55,7 +48,7 @@ def optimise_schedule(
     weights: Weights | None = None,
     search: ScheduleSearch | None = None,
     verify: Verify = "flexible",
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
 ) -> ScheduleResult:
     """Find the morph schedule that disturbs the attitude least, from start to end.
 
@@ -73,8 +66,8 @@ def optimise_schedule(
     trimmed.
     """
     run = ScheduleOptimisation(
-        aircraft,
-        flight,
+        Aircraft.of(aircraft),
+        Flight.of(flight),
         model,
         morph=morph,
         limits=limits,
@@ -89,8 +82,8 @@ def optimise_schedule(
     return run.result(checkpoint)
 
 
-def optimisation_from_document(document: dict[str, Any], threads: int | None = None) -> ScheduleOptimisation:
-    """The optimisation that a request document (the body of ``POST /optimize``) asks for.
+def optimisation_from_request(request: OptimizeRequest, threads: int | None = None) -> ScheduleOptimisation:
+    """The optimisation that a request (the body of ``POST /optimize``) asks for.
 
     Identified parameters bring their own lattice, step and start, unless others are given beside them.
 
@@ -100,25 +93,25 @@ def optimisation_from_document(document: dict[str, Any], threads: int | None = N
     """
     if threads is not None:
         use_threads(threads)
-    fields = Fields(document, "")
-    aircraft = aircraft_from_document(fields.raw("aircraft"))
-    flight = flight_from_document(fields.raw("flight"))
-    parameters = parameters_from_document(fields.child("model").raw("parameters"), "/model/parameters")
-    model = flown_model({"kind": "equivalent", **fields.raw("model")})
-    run = ScheduleOptimisation(
-        aircraft,
-        flight,
-        parameters,
-        morph=morph_settings(fields.raw("morph")),
-        limits=limits_settings(fields.raw("limits", {})),
-        weights=weights_settings(fields.raw("weights", {})),
-        search=schedule_search(fields.raw("search", {})),
-        verify=fields.choice("verify", VERIFICATIONS, default="flexible"),  # type: ignore[arg-type]
-        flexible=flexible_settings(fields.raw("flexible", {})),
-        lattice=model.lattice,
-        start=model.start,
-        step_s=model.step_s,
+    flown = flown_with(request.model)
+    known = request.model.known
+    if known is None:
+        raise InvalidInput(
+            "only a service knows a model by its id",
+            pointer="/model/model_id",
+            hint="give the model's parameters instead",
+        )
+    return ScheduleOptimisation(
+        Aircraft.of(request.aircraft),
+        Flight.of(request.flight),
+        parameter_batch(known),
+        morph=request.morph,
+        limits=request.limits,
+        weights=request.weights,
+        search=schedule_search(request.search),
+        verify=request.verify,
+        flexible=flexible_settings(request.flexible),
+        lattice=flown.lattice,
+        start=flown.start,
+        step_s=flown.step_s,
     )
-    fields.raw("execution", None)  # how a service runs it: no number depends on that
-    fields.done()
-    return run

@@ -9,12 +9,12 @@ from scipy.interpolate import CubicSpline
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.surface import beyond_range
 from morphcore.optimise.limits import HELD, MorphSpace
-from morphcore.optimise.settings import Limits, Morph
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+from morphdata.optimize import Limits, Morph
 
 OVERSHOOT = 0.5  # of the change: how far a schedule that may turn back may go beyond either end
-SMALLEST_CHANGE_RAD = 1e-6
 USUAL_RAMP_S = 0.1  # of a constant rate where the limits allow it, as the sample flights have
 
 
@@ -23,21 +23,17 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
 
     Raises
     ------
-    InvalidInput : there is no hinge, no change, or a hinge does not reach the angles.
+    InvalidInput : there is no hinge, or a hinge does not reach the angles.
     """
     hinges = [surface.hinge for surface in aircraft.surfaces if surface.hinge is not None]
     if not hinges:
         raise InvalidInput(
             "no surface has a hinge", pointer="/aircraft/surfaces", hint="give the wings a hinge"
         )
-    if abs(morph.change_rad) < SMALLEST_CHANGE_RAD:
-        raise InvalidInput(
-            "the morph ends where it begins", pointer="/morph/final_rad", hint="give another final angle"
-        )
     least, most = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
     for name in ("initial_rad", "final_rad"):
         angle = getattr(morph, name)
-        if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
+        if any(beyond_range(hinge, np.array([angle])).size for hinge in hinges):
             raise InvalidInput(
                 f"{name} {angle:g} is beyond the hinges' range {least:g}..{most:g} rad",
                 pointer=f"/morph/{name}",
@@ -64,8 +60,8 @@ def require_schedules(space: MorphSpace) -> None:
         return
     limits = space.limits
     each = {
-        "max_rate_rad_s": replace(limits, max_accel_rad_s2=None),
-        "max_accel_rad_s2": replace(limits, max_rate_rad_s=None),
+        "max_rate_rad_s": limits.model_copy(update={"max_accel_rad_s2": None}),
+        "max_accel_rad_s2": limits.model_copy(update={"max_rate_rad_s": None}),
     }
     needed = {
         name: replace(space, limits=alone).quickest[0]

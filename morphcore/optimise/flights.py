@@ -17,7 +17,6 @@ from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.models.soft_joints import chain_obstacle
-from morphcore.optimise.settings import Weights
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.plan import CommonPath, time_grid
@@ -27,6 +26,7 @@ from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.stopping import Interrupted, Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
 from morphcore.validity import AirMotion
+from morphdata.optimize import Weights
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,8 @@ class Flown:
 
     def errors(self, weights: Weights) -> Array:
         """(p, 3 k) what is squared and summed: the departures times the roots of their weights."""
-        return (self.departure * weights.root).reshape(self.departure.shape[0], -1)
+        roots = np.sqrt([weights.phi, weights.theta, weights.psi])
+        return (self.departure * roots).reshape(self.departure.shape[0], -1)
 
     def cost(self, weights: Weights) -> Array:
         """(p,) J, rad^2."""

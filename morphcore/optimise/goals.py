@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.optimise.flights import SAMPLE_S
 from morphcore.optimise.limits import MorphSpace
-from morphcore.optimise.settings import Limits, Morph
+from morphdata.optimize import Morph
 
 Array = NDArray[np.float64]
 ModelName = Literal["equivalent", "rigid"]
@@ -146,24 +146,3 @@ def warm_starts(space: MorphSpace, found: tuple[Found, ...]) -> Array:
     later = near.point.copy()
     later[: space.inner] = 1.0 - ratio * (1.0 - later[: space.inner])
     return np.stack([near.point, later]) if ratio != 1.0 else near.point[None, :]
-
-
-def require_goal(morph: Morph, limits: Limits) -> None:
-    """Refuse goals that lack what they need.
-
-    Raises
-    ------
-    InvalidInput : with a pointer to what is missing.
-    """
-    if morph.goal == "minimum_time" and morph.max_variation_rad2 is None:
-        raise InvalidInput(
-            "the goal minimum_time needs max_variation_rad2",
-            pointer="/morph/max_variation_rad2",
-            hint="say how much the attitude may vary, rad^2",
-        )
-    if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
-        raise InvalidInput(
-            f"without a limit the goal {morph.goal} has no shortest duration",
-            pointer="/limits",
-            hint="give max_rate_rad_s or max_accel_rad_s2",
-        )

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from morphcore.optimise.settings import Limits, Morph
 from morphcore.optimise.shapes import Shapes, clamped_shapes
 from morphcore.simulate.schedule import Spline
+from morphdata.optimize import Limits, Morph
 
 Array = NDArray[np.float64]
 Map = Callable[[Array], Array]

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from morphcore.errors import FlightDiverged, InvalidInput, NotFlyable, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.soft_joints import chain_obstacle, soft_joint
@@ -30,14 +29,13 @@ from morphcore.optimise.goals import (
     chosen,
     durations,
     next_task,
-    require_goal,
     warm_starts,
 )
 from morphcore.optimise.limits import MorphSpace
 from morphcore.optimise.progress import Told, best_cost, effort, shown_cost
 from morphcore.optimise.result import ScheduleResult, schedule_result
 from morphcore.optimise.search import SearchRun, SearchState
-from morphcore.optimise.settings import FlexibleSettings, Limits, Morph, ScheduleSearch, Verify, Weights
+from morphcore.optimise.settings import FlexibleSettings, ScheduleSearch
 from morphcore.optimise.state import OptimisationState, Verified, decode, encode
 from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import STEP_S, CommonPath, common_path
@@ -48,6 +46,9 @@ from morphcore.steps import Step
 from morphcore.stopping import Deadline, Interrupted, Stop, say
 from morphcore.threads import one_blas_thread
 from morphcore.validity import documents
+from morphdata.faults import refuse
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.optimize import Limits, Morph, Verify, Weights, goal_faults
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
@@ -83,7 +84,7 @@ class ScheduleOptimisation:
         search: ScheduleSearch | None = None,
         verify: Verify = "flexible",
         flexible: FlexibleSettings | None = None,
-        lattice: LatticeSettings = DEFAULT_LATTICE,
+        lattice: Lattice = DEFAULT_LATTICE,
         start: StartMode = "trim",
         step_s: float | None = None,
         clock: Clock = time.perf_counter,
@@ -104,7 +105,7 @@ class ScheduleOptimisation:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
-        require_goal(morph, self.limits)
+        refuse(goal_faults(morph, self.limits))
         with one_blas_thread():
             longest = self.space(morph.duration_s)
             require_schedules(longest)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from morphcore.optimise.goals import planned
 from morphcore.optimise.search import SearchState, search_share
-from morphcore.optimise.settings import Morph, ScheduleSearch
+from morphcore.optimise.settings import ScheduleSearch
 from morphcore.optimise.state import OptimisationState
+from morphdata.optimize import Morph
 
 # seconds that parts of the work take on the machine it was written on: their ratios make the fraction
 SEARCH_COST_S = 3.5

@@ -14,10 +14,10 @@ from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import Flown
 from morphcore.optimise.goals import Found
 from morphcore.optimise.schedule_warnings import schedule_warnings
-from morphcore.optimise.settings import Limits, Morph, Weights
 from morphcore.optimise.state import OptimisationState
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+from morphdata.optimize import Limits, Morph, Weights
 
 if TYPE_CHECKING:
     from morphcore.optimise.optimisation import ScheduleOptimisation
@@ -111,7 +111,7 @@ class ScheduleResult(Shown):
         reduction, model = self.reduction()
         document: Document = {
             "schedule": None if self.lost else _knots(self.schedule),
-            "limits": vars(self.limits).copy(),
+            "limits": self.limits.model_dump(),
             "reached": {name: self._reached(name) for name in SCHEDULES},
             "variation": {
                 name: {model: self.variation(name, model) for model in MODELS} for name in SCHEDULES
@@ -123,9 +123,9 @@ class ScheduleResult(Shown):
             "torque": {
                 name: {model: self._torque(name, model) for model in MODELS[:2]} for name in SCHEDULES
             },
-            "morph": {name: value for name, value in vars(self.morph).items() if value is not None},
+            "morph": self.morph.model_dump(exclude_none=True),
             "duration_s": self.best.duration_s,
-            "weights": vars(self.weights).copy(),
+            "weights": self.weights.model_dump(),
             "search": self.search,
             "partial": self.partial,
             "warnings": list(self.warnings),

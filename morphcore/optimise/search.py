@@ -17,10 +17,11 @@ from morphcore.optimise.descent import DescentState, first_descent, next_descent
 from morphcore.optimise.ease import EaseState, next_ease
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.limits import HELD, MorphSpace
-from morphcore.optimise.settings import ScheduleSearch, Weights
+from morphcore.optimise.settings import ScheduleSearch
 from morphcore.optimise.torque_limit import TorqueLimit, Trials
 from morphcore.stopping import Stop
 from morphcore.swarm import SwarmState, first_swarm, next_swarm
+from morphdata.optimize import Weights
 
 Array = NDArray[np.float64]
 Phase = Literal["baseline", "ease", "screen", "swarm", "polish", "done"]
@@ -211,7 +212,7 @@ class SearchRun:
         most = share * float(space.peak_acceleration(state.anchor[None, :])[0])
         if limits.max_accel_rad_s2 is not None:
             most = min(most, limits.max_accel_rad_s2)
-        gentle = replace(space, limits=replace(limits, max_accel_rad_s2=most))
+        gentle = replace(space, limits=limits.model_copy(update={"max_accel_rad_s2": most}))
         return gentle if gentle.room >= HELD else space
 
     def _kept(self, state: SearchState, points: Array, stop: Stop | None) -> tuple[Array, Trials]:

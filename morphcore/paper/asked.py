@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from morphcore.geometry.lattice import CoreLaw
 from morphcore.paper.scenario import paper_flights
 from morphcore.paper.stages import Results
+from morphdata.lattice import CoreLaw
 
 Document = dict[str, Any]
 

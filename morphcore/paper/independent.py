@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 
 from morphcore.frames import wrap_angle
-from morphcore.geometry.aircraft import Aircraft, Flight, load_aircraft, load_flight
-from morphcore.geometry.lattice import CORE_LAWS, CoreLaw, LatticeSettings, VortexCore
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flight import Simulation, flight_steps
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphdata.aircraft import load_aircraft
+from morphdata.flight import load_flight
+from morphdata.lattice import CORE_LAWS, CoreLaw, Lattice, VortexCore
 
 Document = dict[str, Any]
 
@@ -47,8 +49,8 @@ def compare_independent(settings: PaperSettings, _results: Results, _checkpoint:
     """Fly every sample in our flexible model; empty where no samples are at hand."""
     if settings.samples is None:
         return {"available": False, "laws": []}
-    craft = load_aircraft(settings.samples / "aircraft.json")
-    condition = load_flight(settings.samples / "flight.json")
+    craft = Aircraft.of(load_aircraft(settings.samples / "aircraft.json"))
+    condition = Flight.of(load_flight(settings.samples / "flight.json"))
     samples = [load_trajectory(path) for path in _flights(settings.samples)]
     laws = []
     for number, law in enumerate(CORE_LAWS):
@@ -81,7 +83,7 @@ def _flown(
     for number, sample in enumerate(samples):
         for step in flight_steps(
             craft, condition, sample, model="flexible", elements=settings.elements,
-            step_s=settings.effort.flexible_step_s, lattice=LatticeSettings(core=VortexCore(law)),
+            step_s=settings.effort.flexible_step_s, lattice=Lattice(core=VortexCore(law=law)),
         ):  # fmt: skip
             share = (number + step.fraction) / len(samples) / len(CORE_LAWS)
             yield Progress(done + share, f"{sample.name}, core {law}")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -45,9 +45,9 @@ Array = NDArray[np.float64]
 Document = dict[str, Any]
 
 MORPH = Morph(final_rad=FINAL_RAD, duration_s=MORPH_S, knots=KNOTS, settle_s=SETTLE_S)
-FREE_MORPH = replace(MORPH, free_values=True)
-UNSETTLED_MORPH = replace(MORPH, settle_s=0.0)
-FASTEST_MORPH = replace(MORPH, goal="minimum_time")
+FREE_MORPH = MORPH.model_copy(update={"free_values": True})
+UNSETTLED_MORPH = MORPH.model_copy(update={"settle_s": 0.0})
+FASTEST_MORPH = MORPH.model_copy(update={"goal": "minimum_time"})  # under a limit found on the way
 LIMITS = Limits(max_rate_rad_s=RATE_LIMIT_RAD_S)
 WINDOW_S = MORPH_S + SETTLE_S  # from the start of any morph, over which attitudes count
 OTHER_SEARCHES = ("swarm_morph", "free_morph", "unsettled_morph", "fastest_morph")
@@ -71,8 +71,8 @@ def paper_search(settings: PaperSettings) -> ScheduleSearch:
 def morph_inputs(settings: PaperSettings, morph: Morph, search: Search) -> Document:
     """What decides an optimisation, beside the model."""
     return {
-        "morph": asdict(morph),
-        "limits": asdict(LIMITS),
+        "morph": morph.model_dump(),
+        "limits": LIMITS.model_dump(),
         "search": asdict(search(settings)),
         "lattice": settings.lattice.to_document(),
         "elements": settings.elements,
@@ -109,7 +109,7 @@ def search_morph(
 def search_fastest(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
     """The shortest morph whose variation is at most that of the constant rate in two seconds."""
     most = results["morph"]["variation"]["constant"]["equivalent"]
-    morph = replace(FASTEST_MORPH, max_variation_rad2=most)
+    morph = FASTEST_MORPH.model_copy(update={"max_variation_rad2": most})
     return (yield from search_morph(morph, our_search, settings, results, checkpoint))
 
 
@@ -118,7 +118,8 @@ def search_front(settings: PaperSettings, results: Results, checkpoint: bytes | 
     points: list[Document] = [] if checkpoint is None else json.loads(checkpoint)
     durations = settings.effort.front_durations_s
     for duration_s in durations[len(points) :]:
-        morph = replace(MORPH, duration_s=duration_s, settle_s=WINDOW_S - duration_s)
+        times = {"duration_s": duration_s, "settle_s": WINDOW_S - duration_s}
+        morph = MORPH.model_copy(update=times)
         search = search_morph(morph, our_search, settings, results, None)
         found = yield from part(search, len(points) / len(durations), 1.0 / len(durations))
         points.append(

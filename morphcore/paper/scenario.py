@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
-from morphcore.simulate.schedule import Schedule
-from morphcore.simulate.schedule_document import schedule_from_document
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.trajectory import Role
+from morphdata import aircraft as documents
+from morphdata.flight import Flight as FlightDocument
+from morphdata.schedules import Schedules
 
 Document = dict[str, Any]
 
@@ -87,7 +88,7 @@ FLIGHT: Document = {
 
 @dataclass(frozen=True)
 class PaperFlight:
-    """One sample flight: both wings follow ``schedule`` (a document, see `schedule_from_document`)."""
+    """One sample flight: both wings follow ``schedule`` (a document, see `morphdata.schedules`)."""
 
     name: str
     label: str
@@ -95,10 +96,9 @@ class PaperFlight:
     schedule: Document
     duration_s: float
 
-    def schedules(self) -> dict[str, Schedule]:
-        """The motion of each side's hinge."""
-        schedule = schedule_from_document(self.schedule, "/schedule")
-        return {"left": schedule, "right": schedule}
+    def schedules(self) -> Schedules:
+        """What both hinges do."""
+        return Schedules.parse({"both": self.schedule})
 
     def to_document(self) -> Document:
         """JSON form."""
@@ -107,12 +107,12 @@ class PaperFlight:
 
 def aircraft() -> Aircraft:
     """The aircraft."""
-    return aircraft_from_document(AIRCRAFT)
+    return Aircraft.of(documents.Aircraft.parse(AIRCRAFT))
 
 
 def flight() -> Flight:
     """The flight condition."""
-    return flight_from_document(FLIGHT)
+    return Flight.of(FlightDocument.parse(FLIGHT))
 
 
 def paper_flights() -> tuple[PaperFlight, ...]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from morphcore.geometry.lattice import CoreLaw, LatticeSettings, VortexCore
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.flexible import DEFAULT_ELEMENTS
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.swarm import SwarmSettings
+from morphdata.lattice import CoreLaw, Lattice, VortexCore
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,9 @@ class PaperSettings:
         return QUICK if self.quick else FULL
 
     @property
-    def lattice(self) -> LatticeSettings:
+    def lattice(self) -> Lattice:
         """The lattice of all three models."""
-        return LatticeSettings(core=VortexCore(self.core))
+        return Lattice(core=VortexCore(law=self.core))
 
     @property
     def elements(self) -> int:

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from morphcore.frames import wrap_angle
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.scenario import PaperFlight, aircraft, flight, paper_flights
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flight import Simulation, flight_steps
-from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
+from morphcore.simulate.trajectory import Trajectory
+from morphdata.lattice import Lattice
+from morphdata.samples import InlineSample
 
 Document = dict[str, Any]
 
@@ -30,7 +31,7 @@ class Resolution:
     what: str
     elements: int
     step_s: float
-    lattice: LatticeSettings
+    lattice: Lattice
 
     def to_document(self) -> Document:
         """JSON form."""
@@ -46,7 +47,7 @@ def resolutions(settings: PaperSettings) -> tuple[Resolution, ...]:
     ]
     if settings.effort.finer_lattice:
         coarse = used.lattice
-        lattice = replace(coarse, chordwise=2 * coarse.chordwise, spanwise=2 * coarse.spanwise)
+        lattice = Lattice(chordwise=2 * coarse.chordwise, spanwise=2 * coarse.spanwise, core=coarse.core)
         finer.append(replace(used, what="lattice doubled both ways", lattice=lattice))
     return (used, *finer)
 
@@ -106,7 +107,7 @@ def flown_flexible(
 def samples_of(truth: Document) -> list[Trajectory]:
     """The flights of the truth as samples, with their roles."""
     return [
-        trajectory_from_document(flown["sample"], f"/flights/{i}/sample")
+        Trajectory.of(InlineSample.parse(flown["sample"], f"/flights/{i}/sample"))
         for i, flown in enumerate(truth["flights"])
     ]
 

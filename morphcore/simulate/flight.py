@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -11,11 +11,11 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.environment import Environment, air_velocity
+from morphcore.aero.environment import air_velocity
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
+from morphcore.geometry.surface import beyond_range
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.flexible import DEFAULT_ELEMENTS, flexible_model
 from morphcore.models.soft_joints import chain_obstacle
@@ -25,17 +25,22 @@ from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
 from morphcore.simulate.plan import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.record import FlightRecord, recorded_trajectory
-from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.schedule import Schedule, Tabulated, scheduled
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
 from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
+from morphdata import schedules as documents
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.environment import Environment
+from morphdata.flight import Flight as FlightDocument
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
 
 Array = NDArray[np.float64]
-Schedules = Sequence[Schedule] | Mapping[str, Schedule] | Trajectory
+Schedules = Sequence[Schedule] | Mapping[str, Schedule] | documents.Schedules | Trajectory
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 
 OUTPUT_STEP_S = 0.01  # as the example flights
@@ -85,8 +90,8 @@ class FlightStep:
 
 
 def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
-    aircraft: Aircraft,
-    flight: Flight,
+    aircraft: AircraftDocument,
+    flight: FlightDocument,
     schedules: Schedules,
     *,
     model: ModelChoice = "rigid",
@@ -96,7 +101,7 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     start: StartMode = "trim",
     environment: Environment | None = None,
     rng: np.random.Generator | None = None,
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
     stop: Stop | None = None,
 ) -> Simulation:
@@ -104,8 +109,10 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
 
     Parameters
     ----------
+    aircraft, flight : the aircraft and its flight condition.
     schedules : one for each surface in the aircraft's order (of fixed ones it is not looked at), or one for
-        each side as ``{"left": ..., "right": ...}``, or a sample flight whose measured sweep is followed.
+        each side as ``{"left": ..., "right": ...}`` or as a document, or a sample flight whose measured sweep
+        is followed.
     model : "rigid", "flexible", or the parameters of one equivalent model (`parameters_from_document`,
         `physical_guess`).
     duration_s : s from time zero; of a sample flight, its own duration from its first time is the default.
@@ -124,9 +131,9 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     TrimNotFound : there is no steady level flight. FlightDiverged : the flight left the model's domain.
     """
     steps = flight_steps(
-        aircraft, flight, schedules, model=model, duration_s=duration_s, output_step_s=output_step_s,
-        step_s=step_s, start=start, environment=environment, rng=rng, lattice=lattice, elements=elements,
-        stop=stop,
+        Aircraft.of(aircraft), Flight.of(flight), schedules, model=model, duration_s=duration_s,
+        output_step_s=output_step_s, step_s=step_s, start=start, environment=environment, rng=rng,
+        lattice=lattice, elements=elements, stop=stop,
     )  # fmt: skip
     return next(step.simulation for step in steps if step.simulation is not None)
 
@@ -143,18 +150,22 @@ def flight_steps(  # noqa: PLR0913 - as above
     start: StartMode = "trim",
     environment: Environment | None = None,
     rng: np.random.Generator | None = None,
-    lattice: LatticeSettings = DEFAULT_LATTICE,
+    lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
     stop: Stop | None = None,
 ) -> Iterator[FlightStep]:
-    """Fly as `simulate` does, step by step: the fraction flown several times a second, the flight at last."""
+    """Fly as `simulate` does, step by step: the fraction flown several times a second, the flight at last.
+
+    Aircraft and flight are resolved; they need not be within the limits of documents.
+    """
     flyer = _flyer(aircraft, flight, model, lattice, elements)
     longest_s = flyer.step_s if step_s is None else step_s
     times = _output_times(schedules, duration_s, output_step_s, longest_s)
     grid = time_grid(times, longest_s)
-    each = _per_surface(aircraft, schedules)
-    _require_hinge_ranges(aircraft, each, grid.times_s)
-    smooth = _air(None if environment is None else replace(environment, turbulence=None), flight, None)
+    each, names = _per_surface(aircraft, schedules)
+    _require_hinge_ranges(aircraft, each, grid.times_s, names)
+    gusts = None if environment is None else environment.model_copy(update={"turbulence": None})
+    smooth = _air(gusts, flight, None)
     with naming_obstacles(flyer.obstacle):
         if step_s is None and flyer.chain is not None:
             chain, batch = flyer.chain
@@ -241,9 +252,7 @@ class _Flyer:
     chain: tuple[ChainModel, ParameterBatch] | None = None
 
 
-def _flyer(
-    aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: LatticeSettings, elements: int
-) -> _Flyer:
+def _flyer(aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: Lattice, elements: int) -> _Flyer:
     if isinstance(model, ParameterBatch):
         if model.particles != 1:
             raise InvalidInput(
@@ -310,38 +319,45 @@ def _output_times(
     return begin + output_step_s * np.arange(rows, dtype=np.float64)
 
 
-def _per_surface(aircraft: Aircraft, schedules: Schedules) -> Sequence[Schedule]:
+def _per_surface(aircraft: Aircraft, schedules: Schedules) -> tuple[list[Schedule], list[str]]:
+    """Return the schedule of each surface, and what each is called among those that are given."""
+    sides = [surface.side for surface in aircraft.surfaces]
     if isinstance(schedules, Trajectory):
-        return [Tabulated(schedules.time_s, schedules.sweep(surface.side)) for surface in aircraft.surfaces]
+        return [Tabulated(schedules.time_s, schedules.sweep(side)) for side in sides], list(sides)
+    if isinstance(schedules, documents.Schedules):
+        given = [schedules.of_side(side) or ("", documents.Hold(kind="hold")) for side in sides]
+        return [scheduled(schedule) for _, schedule in given], [name for name, _ in given]
     if isinstance(schedules, Mapping):
-        missing = {surface.side for surface in aircraft.surfaces} - set(schedules)
+        missing = set(sides) - set(schedules)
         if missing:
             raise InvalidInput(
                 f"no schedule for the {' and '.join(sorted(missing))} side",
                 pointer="/schedules",
                 hint='give {"left": ..., "right": ...}',
             )
-        return [schedules[surface.side] for surface in aircraft.surfaces]
-    if len(schedules) != len(aircraft.surfaces):
+        return [schedules[side] for side in sides], list(sides)
+    if len(schedules) != len(sides):
         raise InvalidInput(
-            f"{len(schedules)} schedules for {len(aircraft.surfaces)} surfaces",
+            f"{len(schedules)} schedules for {len(sides)} surfaces",
             pointer="/schedules",
             hint="give one for each surface, in the aircraft's order",
         )
-    return schedules
+    return list(schedules), [str(number) for number in range(len(schedules))]
 
 
-def _require_hinge_ranges(aircraft: Aircraft, schedules: Sequence[Schedule], times: Array) -> None:
-    for number, (surface, schedule) in enumerate(zip(aircraft.surfaces, schedules, strict=True)):
+def _require_hinge_ranges(
+    aircraft: Aircraft, schedules: Sequence[Schedule], times: Array, names: Sequence[str]
+) -> None:
+    for surface, schedule, name in zip(aircraft.surfaces, schedules, names, strict=True):
         if surface.hinge is None:
             continue
         angle = schedule.motion(times).angle
         low, high = surface.hinge.min_rad, surface.hinge.max_rad
-        outside = surface.hinge.beyond_range(angle)
+        outside = beyond_range(surface.hinge, angle)
         if outside.size:
             raise InvalidInput(
                 f"the hinge of {surface.name} is driven to {angle[outside[0]]:.4g} rad at "
                 f"t = {times[outside[0]]:.3f} s, beyond its range {low:g}..{high:g} rad",
-                pointer=f"/schedules/{number}",
-                hint="lower the final angle, or widen the hinge's min_rad and max_rad",
+                pointer=f"/schedules/{name}",
+                hint="lower the angles, or widen the hinge's range; a spline can go beyond its knots",
             )

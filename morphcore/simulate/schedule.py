@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from morphcore.errors import InvalidInput
+from morphdata import schedules as documents
 
 Array = NDArray[np.float64]
 
@@ -145,6 +146,21 @@ class Tabulated:
         if self.time_s.size < 3 or np.ptp(self.angle_rad) == 0.0:
             return Hold(float(self.angle_rad[0])).motion(time_s)
         return _held(self._curve, time_s, float(self.time_s[0]), float(self.time_s[-1]))
+
+
+def scheduled(document: documents.AnySchedule) -> Schedule:
+    """Return the motion that a document describes."""
+    if isinstance(document, documents.Hold):
+        return Hold(document.angle_rad)
+    if isinstance(document, documents.ConstantRate):
+        return ConstantRate(
+            document.initial_rad, document.final_rad, document.morph_s, document.start_s, document.ramp_s
+        )
+    if isinstance(document, documents.Quadratic):
+        return Quadratic(document.initial_rad, document.final_rad, document.duration_s, document.start_s)
+    if isinstance(document, documents.Spline):
+        return Spline(np.array(document.knot_time_s), np.array(document.knot_angle_rad))
+    return Tabulated(np.array(document.time_s), np.array(document.angle_rad))
 
 
 def _held(

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.geometry.fields import Fields
 from morphcore.shown import Shown
 from morphcore.simulate.file_columns import read_file_columns
-from morphdata.samplefiles.flight import INLINE, flight_faults, from_first_row
+from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.titles import FLIGHT
+from morphdata.samples import InlineSample
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
@@ -34,6 +34,21 @@ class Trajectory(Shown):
     role: Role = "train"
     weight: float = 1.0
     extra: dict[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, sample: InlineSample) -> Trajectory:
+        """Return the flight that a sample document holds."""
+        return cls(
+            name=sample.name,
+            time_s=_column(sample.time_s),
+            sweep_left=_column(sample.sweep_left_rad),
+            sweep_right=_column(sample.sweep_right_rad),
+            phi=_column(sample.phi_rad),
+            theta=_column(sample.theta_rad),
+            psi=_column(sample.psi_rad),
+            role=sample.role,
+            weight=sample.weight,
+        )
 
     @property
     def euler(self) -> Array:
@@ -77,26 +92,6 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     )
 
 
-def trajectory_from_document(document: dict[str, Any], pointer: str) -> Trajectory:
-    """A sample written inline in JSON (names and units as in the HTTP API)."""
-    fields = Fields(document, pointer)
-    role = fields.choice("role", ("train", "held_out")) if fields.has("role") else "train"
-    trajectory = Trajectory(
-        name=fields.text("name"),
-        time_s=_counted(fields.series("time_s")),
-        sweep_left=fields.series("sweep_left_rad"),
-        sweep_right=fields.series("sweep_right_rad"),
-        phi=fields.series("phi_rad"),
-        theta=fields.series("theta_rad"),
-        psi=fields.series("psi_rad"),
-        role=role,  # type: ignore[arg-type]
-        weight=fields.number("weight", default=1.0, least=0.0, most=1e6),
-    )
-    fields.done()
-    require_flight(trajectory, pointer)
-    return trajectory
-
-
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
     """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in FLIGHT if name != "t"}}
@@ -107,8 +102,7 @@ def require_flight(trajectory: Trajectory, pointer: str) -> None:
         )
 
 
-def _counted(time_s: Array) -> Array:
-    """Times that count from an epoch, from the first row; others as they are."""
-    counted: Array = np.array(from_first_row(time_s.tolist()))
-    counted.setflags(write=False)
-    return counted
+def _column(values: list[float]) -> Array:
+    column = np.array(values, dtype=np.float64)
+    column.setflags(write=False)
+    return column

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+from morphdata.faults import Pickled
 
 SHOWN_CHARACTERS = 60  # of a title or cell that a stranger wrote
 TITLES = "titles"
@@ -12,26 +13,6 @@ TITLES = "titles"
 def shown(text: object) -> str:
     """A piece of a stranger's text, short, with every character that a terminal would obey escaped."""
     return str(text)[:SHOWN_CHARACTERS].encode("unicode_escape").decode("ascii")
-
-
-class Pickled:
-    """Makes an exception survive pickling whole, however it is constructed: base of every error of the house.
-
-    Python calls an exception's class with its ``args`` again, which fails for keyword arguments and for
-    constructors that write their own sentence; a process pool then hangs.
-    """
-
-    args: tuple[Any, ...]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (type(self), self.args, dict(vars(self)))
-
-
-def _remade(kind: type[BaseException], args: tuple[Any, ...], data: dict[str, Any]) -> BaseException:
-    error = kind.__new__(kind, *args)
-    error.args = args
-    vars(error).update(data)
-    return error
 
 
 def as_sentence(text: str) -> str:

@@ -1,61 +1,29 @@
-"""``morphid identify``."""
+"""What ``morphid identify`` shows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
-from morphid.commands import options
-from morphid.files import require_place
+from morphid.commands.operation import Particulars
 from morphid.model_table import at_bound_line, model_table
-from morphid.screen import fit_table, reports_errors, stdout
+from morphid.screen import fit_table, stdout
+from morphid.verdict import verdict
 
-
-@reports_errors
-def identify(
-    aircraft: options.AircraftFile,
-    flight: options.FlightFile,
-    sample: options.Samples,
-    held_out: options.HeldOut = None,
-    links: Annotated[int, options.model_option(min=1, max=8, help="Links per wing.")] = 3,
-    start: options.StartAt = None,
-    chordwise: options.Chordwise = None,
-    spanwise: options.Spanwise = None,
-    core: options.VortexCore = None,
-    method: options.Method = None,
-    seed: options.Seed = None,
-    particles: options.Particles = None,
-    generations: options.Generations = None,
-    max_seconds: options.MaxSeconds = None,
-    warm_start: options.WarmStart = None,
-    url: options.AtUrl = None,
-    api_key: options.AtUrlKey = None,
-    json_out: options.JsonFile = None,
-    plots: options.Plots = None,
-) -> None:
-    """Identify an equivalent model from sample flights."""
-    from morphid.running import hand_over, run
-
-    require_place(json_out, "--json")
-    request = options.sample_request("identify", aircraft, flight, sample, held_out or [])
-    request.put("/model/links_per_wing", links, "--links")
-    request.put("/model/start", start, "--start")
-    options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
-    options.put_search(
-        request,
-        method=method,
-        seed=seed,
-        particles=particles,
-        generations=generations,
-        max_seconds=max_seconds,
-    )
-    if warm_start is not None:
-        request.put_file("/search/warm_start/parameters", warm_start, "--warm-start")
-    hand_over(run(request, url, api_key), show_model, json_out=json_out, plots=plots)
+USE = "Fly the model with morphid simulate --parameters, or find a morph for it with morphid optimize."
 
 
 def show_model(result: Mapping[str, Any]) -> None:
-    """Print what came out, for people."""
+    """Print what came out and whether it may be believed, for people."""
+    show_fit(result)
+    fits = result["fit"]
+    # results of earlier versions do not say how much moves in a sample
+    if result.get("model") is not None and fits and all("range_rad" in fit for fit in fits):
+        show_verdict(result, USE)
+
+
+def show_fit(result: Mapping[str, Any]) -> None:
+    """Print how well the samples are met, and the model."""
     stdout().print(fit_table(result))
     if result.get("model") is None:
         stdout().print("No model: nothing that was tried has flown the samples to fit.")
@@ -64,3 +32,22 @@ def show_model(result: Mapping[str, Any]) -> None:
     line = at_bound_line(result)
     if line:
         stdout().print(line, markup=False, soft_wrap=True)
+
+
+def show_verdict(result: Mapping[str, Any], use: str) -> None:
+    """Print the verdict on an identification, and what to do next.
+
+    Parameters
+    ----------
+    use : what to do with a model that is not poor.
+    """
+    found, console = verdict(result, use), stdout()
+    console.print(f"Verdict: {found.grade}", style="bold")
+    for reason in found.reasons:
+        console.print(f"  {reason}", markup=False, soft_wrap=True)
+    console.print("What to do next", style="bold")
+    for step in found.next_steps:
+        console.print(f"  {step}", markup=False, soft_wrap=True)
+
+
+IDENTIFY = Particulars(show_model)

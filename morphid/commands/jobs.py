@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from morphid.commands import options
-from morphid.commands.identify import show_model
-from morphid.commands.optimize import show_schedule
-from morphid.commands.simulate import show_flight
-from morphid.commands.study import show_study
+from morphid.commands.operations import particulars_of
 from morphid.connections import DEFAULT_URL
 from morphid.exits import Exit
 from morphid.screen import (
@@ -29,12 +25,6 @@ from morphid.screen import (
 if TYPE_CHECKING:
     from morphid.service import Service
 
-SHOW_RESULT: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
-    "identify": show_model,
-    "study": show_study,
-    "simulate": show_flight,
-    "optimize": show_schedule,
-}
 JobId = Annotated[str, typer.Argument(metavar="JOB", help="Id of the job.")]
 
 jobs = typer.Typer(help="Look after the jobs of a service.", no_args_is_help=True, epilog=options.EXIT_CODES)
@@ -84,8 +74,8 @@ def show_job(
         stdout().print(beside, markup=False)
     if found.get("error"):
         print_job_error(found["error"])
-    if result is not None and found["operation"] in SHOW_RESULT:
-        SHOW_RESULT[found["operation"]](result)
+    if result is not None:
+        particulars_of(found["operation"]).show(result)
 
 
 @jobs.command("watch")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import deepcopy
 from enum import StrEnum
 from functools import partial
@@ -11,21 +10,21 @@ from typing import Annotated, Any
 
 import typer
 
+from morphdata.options import MODEL
 from morphid.connections import KEY_VARIABLE, URL_VARIABLE
 from morphid.exits import CommandError, Exit
-from morphid.files import matching_files, read_json
+from morphid.files import read_json
 from morphid.request import Request
 
 EXIT_CODES = (
     "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 input refused, 4 cancelled or out of time, 5 no service, "
     "6 machine not ready, 130 Ctrl-C."
 )
+KNOWN_MODEL = frozenset({"--parameters", "--model-id"})  # see `put_known_model`
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters of an identified model
 
 # groups of options, as a command's help shows them
-flight_option = partial(typer.Option, rich_help_panel="Aircraft and flights")
-model_option = partial(typer.Option, rich_help_panel="Model")
-search_option = partial(typer.Option, rich_help_panel="Search")
+model_option = partial(typer.Option, rich_help_panel=MODEL)
 answer_option = partial(typer.Option, rich_help_panel="Where it runs, and where the answer goes")
 
 
@@ -34,13 +33,6 @@ class Core(StrEnum):
 
     LINE = "line"
     SMOOTHED = "smoothed"
-
-
-class Start(StrEnum):
-    """Where a flight starts."""
-
-    TRIM = "trim"
-    GIVEN = "given"
 
 
 def setting(name: str, default: str, what: str, **more: Any) -> Any:
@@ -73,46 +65,6 @@ ApiKey = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
-AircraftFile = Annotated[Path, flight_option("--aircraft", help="Aircraft, JSON.")]
-FlightFile = Annotated[Path, flight_option("--flight", help="Flight condition, JSON.")]
-Samples = Annotated[
-    list[Path],
-    flight_option(
-        "--sample", help="Sample flights to fit: CSV, JSON, Parquet, MATLAB; several, or a pattern."
-    ),
-]
-HeldOut = Annotated[
-    list[Path] | None,
-    flight_option("--held-out", help="Sample flights to predict, not to fit; several, or a pattern."),
-]
-
-Parameters = Annotated[
-    Path | None, model_option("--parameters", help="Equivalent model: result of an identification, JSON.")
-]
-ModelId = Annotated[
-    str | None, model_option("--model-id", help="Instead of --parameters: a model identified at the --url.")
-]
-Elements = Annotated[
-    int | None, model_option("--elements", min=1, help="Beam elements of each wing of the flexible model.")
-]
-Chordwise = Annotated[int | None, model_option("--chordwise", min=1, help="Lattice panels along the chord.")]
-Spanwise = Annotated[int | None, model_option("--spanwise", min=1, help="Lattice panels along the span.")]
-VortexCore = Annotated[Core | None, model_option("--core", help="Core of the lattice's vortices.")]
-StartAt = Annotated[
-    Start | None, model_option("--start", help="Trim each model by itself, or start as the flight file says.")
-]
-
-Method = Annotated[str | None, search_option("--method", help="hybrid, least_squares, cma or pso.")]
-Seed = Annotated[int | None, search_option("--seed", min=0, help="Same seed, same answer.")]
-Particles = Annotated[int | None, search_option("--particles", min=2, help="Swarm size.")]
-Generations = Annotated[int | None, search_option("--generations", min=1, help="Swarm generations.")]
-MaxSeconds = Annotated[
-    float | None, search_option("--max-seconds", min=1.0, help="Stop searching after this long.")
-]
-WarmStart = Annotated[
-    Path | None, search_option("--warm-start", help="Begin from the model of this earlier result (JSON).")
-]
-
 AtUrl = Annotated[
     str | None,
     answer_option("--url", envvar=URL_VARIABLE, help="Run at this service instead of in this process."),
@@ -122,24 +74,6 @@ AtUrlKey = Annotated[
 ]
 JsonFile = Annotated[Path | None, answer_option("--json", help="Write the result here; `-` prints it.")]
 Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and curves into this folder.")]
-
-
-def sample_request(
-    operation: str, aircraft: Path, flight: Path, samples: Sequence[Path], held_out: Sequence[Path]
-) -> Request:
-    """Begin a request that has sample flights."""
-    request = flight_request(operation, aircraft, flight)
-    request.add_samples(matching_files(samples, "--sample"), "train", "--sample")
-    request.add_samples(matching_files(held_out, "--held-out"), "held_out", "--held-out")
-    return request
-
-
-def flight_request(operation: str, aircraft: Path, flight: Path) -> Request:
-    """Begin a request about an aircraft in a flight condition."""
-    request = Request(operation)
-    request.put_file("/aircraft", aircraft, "--aircraft")
-    request.put_file("/flight", flight, "--flight")
-    return request
 
 
 def put_known_model(request: Request, parameters: Path | None, model_id: str | None, url: str | None) -> None:
@@ -184,19 +118,3 @@ def _parameters_in(path: Path) -> dict[str, Any]:
             hint="give the file that `morphid identify --json` wrote, or the `model` in it",
         )
     return found
-
-
-def put_search(request: Request, **options: Any) -> None:
-    """Fill in how to search; what the user did not choose is left out."""
-    request.document.setdefault("search", {})
-    for name, value in options.items():
-        request.put(f"/search/{name}", value, f"--{name.replace('_', '-')}")
-
-
-def put_lattice(
-    request: Request, pointer: str, *, chordwise: int | None, spanwise: int | None, core: Core | None
-) -> None:
-    """Fill in the vortex lattice at a pointer."""
-    request.put(f"{pointer}/chordwise", chordwise, "--chordwise")
-    request.put(f"{pointer}/spanwise", spanwise, "--spanwise")
-    request.put(f"{pointer}/core/law", core, "--core")

@@ -1,4 +1,4 @@
-"""``morphid simulate``."""
+"""What ``morphid simulate`` has beside its request: model, schedule, the written flight, the table."""
 
 from __future__ import annotations
 
@@ -6,20 +6,24 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from morphdata.options import SCHEDULE
 from morphid.commands import options
+from morphid.commands.operation import Particulars, Values
 from morphid.exits import CommandError, Exit
-from morphid.files import require_file, require_place, write_bytes
+from morphid.files import require_file, write_bytes
 from morphid.request import Request
-from morphid.screen import reports_errors, short, stdout
+from morphid.screen import short, stdout
 
-schedule_option = partial(typer.Option, rich_help_panel="Schedule and air")
+if TYPE_CHECKING:
+    from morphid.running import Answer
 
+schedule_option = partial(typer.Option, rich_help_panel=SCHEDULE)
 
 FLIGHT_FILE = "flight.csv"  # among what a simulation leaves behind
 
@@ -32,65 +36,21 @@ class Model(StrEnum):
     FLEXIBLE = "flexible"
 
 
-@reports_errors
-def simulate(
-    aircraft: options.AircraftFile,
-    flight: options.FlightFile,
-    model: Annotated[
-        Model | None,
-        options.model_option(help="What flies.", show_default="equivalent with --parameters, else rigid"),
-    ] = None,
-    parameters: options.Parameters = None,
-    model_id: options.ModelId = None,
-    schedule: Annotated[
-        Path | None, schedule_option(help="Sweep over time: a file with t, sweep_left, sweep_right.")
-    ] = None,
-    rate: Annotated[
-        float | None,
-        schedule_option(help="Instead of --schedule: sweep both wings at this mean rate, rad/s."),
-    ] = None,
-    final: Annotated[float | None, schedule_option(help="With --rate: sweep at the end, rad.")] = None,
-    duration: Annotated[
-        float | None, schedule_option(help="Time to fly, s.", show_default="to the end of the schedule")
-    ] = None,
-    environment: Annotated[
-        Path | None, schedule_option(help="Gust and turbulence, JSON; still air without.")
-    ] = None,
-    start: options.StartAt = None,
-    elements: options.Elements = None,
-    chordwise: options.Chordwise = None,
-    spanwise: options.Spanwise = None,
-    core: options.VortexCore = None,
-    out: Annotated[
-        Path | None, options.answer_option(help="Write the flight, CSV, columns as the samples'.")
-    ] = None,
-    url: options.AtUrl = None,
-    api_key: options.AtUrlKey = None,
-    json_out: options.JsonFile = None,
-    plots: options.Plots = None,
-) -> None:
-    """Fly the aircraft through a morph schedule, as a rigid, an equivalent or a flexible model."""
-    from morphid.running import hand_over, run, wrote
-
-    require_place(json_out, "--json")
-    require_place(out, "--out")
-    request = options.flight_request("simulate", aircraft, flight)
+def _fill(request: Request, values: Values) -> None:
+    parameters, model_id = values["parameters"], values["model_id"]
     known = parameters is not None or model_id is not None
-    kind = model or (Model.EQUIVALENT if known else Model.RIGID)
+    kind = values["model"] or (Model.EQUIVALENT if known else Model.RIGID)
     request.put("/model/kind", kind, "--model")
     if known or kind is Model.EQUIVALENT:
-        options.put_known_model(request, parameters, model_id, url)
-    request.put("/model/elements", elements, "--elements")
-    request.put("/model/start", start, "--start")
-    options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
-    if environment is not None:
-        request.put_file("/environment", environment, "--environment")
-    _put_schedules(request, schedule, rate, final, duration)
-    answer = run(request, url, api_key)
-    if out is not None and answer.result is not None:
-        write_bytes(answer.files[FLIGHT_FILE], out)
-        wrote(out)
-    hand_over(answer, show_flight, json_out=json_out, plots=plots)
+        options.put_known_model(request, parameters, model_id, values["url"])
+    _put_schedules(request, *(values[name] for name in ("schedule", "rate", "final", "duration")))
+
+
+def _save(answer: Answer, path: Path) -> None:
+    from morphid.running import wrote
+
+    write_bytes(answer.files[FLIGHT_FILE], path)
+    wrote(path)
 
 
 def _put_schedules(
@@ -172,3 +132,37 @@ def flight_table(result: Mapping[str, Any]) -> Table:
     table.add_row("computed in, s", short(cost.get("wall_s")))
     table.add_row("times faster than real time", short(cost.get("real_time_factor")))
     return table
+
+
+SIMULATE = Particulars(
+    show_flight,
+    options={
+        "model": Annotated[
+            Model | None,
+            options.model_option(
+                "--model", help="What flies.", show_default="equivalent with --parameters, else rigid"
+            ),
+        ],
+        "schedule": Annotated[
+            Path | None,
+            schedule_option("--schedule", help="Sweep over time: a file with t, sweep_left, sweep_right."),
+        ],
+        "rate": Annotated[
+            float | None,
+            schedule_option(
+                "--rate", help="Instead of --schedule: sweep both wings at this mean rate, rad/s."
+            ),
+        ],
+        "final": Annotated[
+            float | None, schedule_option("--final", help="With --rate: sweep at the end, rad.")
+        ],
+        "duration": Annotated[
+            float | None,
+            schedule_option("--duration", help="Time to fly, s.", show_default="to the end of the schedule"),
+        ],
+    },
+    fill=_fill,
+    fills=options.KNOWN_MODEL,
+    out="Write the flight, CSV, columns as the samples'.",
+    save=_save,
+)

@@ -1,70 +1,15 @@
-"""``morphid study``."""
+"""What ``morphid study`` shows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from morphid.commands import options
-from morphid.exits import CommandError, Exit
-from morphid.files import require_place
-from morphid.screen import reports_errors, short, stdout
-
-
-@reports_errors
-def study(
-    aircraft: options.AircraftFile,
-    flight: options.FlightFile,
-    sample: options.Samples,
-    held_out: options.HeldOut = None,
-    links: Annotated[
-        str, options.model_option(help="Numbers of links per wing to compare, with commas between.")
-    ] = "1,2,3,4,5,6",
-    start: options.StartAt = None,
-    chordwise: options.Chordwise = None,
-    spanwise: options.Spanwise = None,
-    core: options.VortexCore = None,
-    method: options.Method = None,
-    seed: options.Seed = None,
-    particles: options.Particles = None,
-    generations: options.Generations = None,
-    max_seconds: options.MaxSeconds = None,
-    url: options.AtUrl = None,
-    api_key: options.AtUrlKey = None,
-    json_out: options.JsonFile = None,
-    plots: options.Plots = None,
-) -> None:
-    """Identify models of several sizes, compare accuracy and cost, recommend one."""
-    from morphid.running import hand_over, run
-
-    require_place(json_out, "--json")
-    request = options.sample_request("study", aircraft, flight, sample, held_out or [])
-    request.put("/model/links_per_wing", _whole_numbers(links), f"--links {links}")
-    request.put("/model/start", start, "--start")
-    options.put_lattice(request, "/model/lattice", chordwise=chordwise, spanwise=spanwise, core=core)
-    options.put_search(
-        request,
-        method=method,
-        seed=seed,
-        particles=particles,
-        generations=generations,
-        max_seconds=max_seconds,
-    )
-    hand_over(run(request, url, api_key), show_study, json_out=json_out, plots=plots)
-
-
-def _whole_numbers(text: str) -> list[int]:
-    try:
-        return [int(word) for word in text.split(",")]
-    except ValueError:
-        raise CommandError(
-            f"--links {text}: not whole numbers with commas between",
-            code=Exit.USAGE,
-            hint="write --links 1,2,3",
-        ) from None
+from morphid.commands.operation import Particulars
+from morphid.screen import short, stdout
 
 
 def show_study(result: Mapping[str, Any]) -> None:
@@ -103,3 +48,6 @@ def study_table(result: Mapping[str, Any]) -> Table:
             "" if row.get("identify_s") is None else f"{row['identify_s']:.1f} s",
         )
     return table
+
+
+STUDY = Particulars(show_study)

@@ -50,7 +50,7 @@ def service(url: str, api_key: str | None) -> Iterator[Finding]:
 def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Finding]:
     import httpx
 
-    from app.version import VERSION
+    from morphdata.version import VERSION
 
     began = time.monotonic()
     alive = client.get("/livez")

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from morphcore.aero.polar import steady_edges
 from morphcore.aero.vlm import RingTable, ring_table
-from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
-from morphcore.geometry.lattice import DEFAULT_CORE, VortexCore, surface_lattice
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.lattice import surface_lattice
+from morphdata.lattice import DEFAULT_CORE, VortexCore
+from tests.models.chains import aircraft_of
 
 Array = NDArray[np.float64]
 Warp = Callable[[Array], Array]
@@ -34,7 +36,7 @@ def straight_wings(semi_span: float, root_chord: float, tip_chord: float, gap: f
             "tip_chord_m": tip_chord,
             "position_m": [0.0, side * gap / 2, 0.0],
         }
-    return aircraft_from_document(document)
+    return aircraft_of(document)
 
 
 @dataclass(frozen=True)

@@ -4,33 +4,27 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from morphcore.aero.environment import (
-    FOOT_M,
-    STILL,
-    CosineGust,
-    DrydenTurbulence,
-    Environment,
-    air_velocity,
-    turbulence_scales,
-)
+from morphcore.aero.environment import FOOT_M, air_velocity, turbulence_scales
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Flight, flight_from_document
+from morphcore.geometry.aircraft import Flight
+from morphdata.environment import Environment, Gust, Turbulence
+from tests.models.chains import flight_of
 
 
 def flight(altitude_m: float = 0.0, wind=(0.0, 0.0, 0.0)) -> Flight:
     """150 m/s."""
-    return flight_from_document({"airspeed_m_s": 150.0, "altitude_m": altitude_m, "wind_n_m_s": list(wind)})
+    return flight_of({"airspeed_m_s": 150.0, "altitude_m": altitude_m, "wind_n_m_s": list(wind)})
 
 
 def test_air_is_the_flights_wind_by_default():
     """Without gust and turbulence the air moves with the flight's uniform wind."""
-    velocity_N = air_velocity(STILL, flight(wind=(3.0, -1.0, 0.5)), [0.0, 0.3, 2.0])
+    velocity_N = air_velocity(Environment(), flight(wind=(3.0, -1.0, 0.5)), [0.0, 0.3, 2.0])
     np.testing.assert_array_equal(velocity_N, np.tile((3.0, -1.0, 0.5), (3, 1)))
 
 
 def test_gust_has_the_shape_of_the_rule():
     """CS-25.341: nothing before, U at H, half of it at H/2 and 3H/2, nothing after 2H; impulse U H / V."""
-    gust = CosineGust(amplitude_m_s=8.0, gradient_m=30.0, start_s=0.5)
+    gust = Gust(amplitude_m_s=8.0, gradient_m=30.0, start_s=0.5)
     at = 0.5 + np.array([-0.1, 0.0, 15.0 / 150, 30.0 / 150, 45.0 / 150, 60.0 / 150, 0.6])
     velocity_N = air_velocity(Environment(gust=gust), flight(), at)
     np.testing.assert_allclose(-velocity_N[:, 2], [0, 0, 4, 8, 4, 0, 0], atol=1e-12)
@@ -42,7 +36,7 @@ def test_gust_has_the_shape_of_the_rule():
 
 def test_gust_blows_along_its_direction():
     """The direction's length does not matter."""
-    gust = CosineGust(5.0, 30.0, direction_N=(0.0, 3.0, -4.0))
+    gust = Gust(amplitude_m_s=5.0, gradient_m=30.0, direction_n=[0.0, 3.0, -4.0])
     np.testing.assert_allclose(
         air_velocity(Environment(gust=gust), flight(), [0.2]), [[0.0, 3.0, -4.0]], atol=1e-12
     )
@@ -50,7 +44,7 @@ def test_gust_blows_along_its_direction():
 
 def test_turbulence_scales_of_the_specification():
     """MIL-F-8785C: at 1000 ft sigma_u = sigma_w and all lengths are 1000 ft; then 1750 ft and one sigma."""
-    turbulence = DrydenTurbulence(wind_20ft_m_s=15.0, sigma_high_m_s=3.0)
+    turbulence = Turbulence(wind_20ft_m_s=15.0, sigma_high_m_s=3.0)
     sigma, length = turbulence_scales(turbulence, 1000 * FOOT_M)
     np.testing.assert_allclose(sigma, 1.5, rtol=1e-12)
     np.testing.assert_allclose(length, 1000 * FOOT_M, rtol=1e-12)
@@ -63,7 +57,7 @@ def test_turbulence_scales_of_the_specification():
     assert sigma[0] == pytest.approx(1.5 / (0.177 + 0.1646) ** 0.4)
 
 
-TURBULENCE = Environment(turbulence=DrydenTurbulence(wind_20ft_m_s=15.0, sigma_high_m_s=3.0))
+TURBULENCE = Environment(turbulence=Turbulence(wind_20ft_m_s=15.0, sigma_high_m_s=3.0))
 
 
 def test_dryden_spectrum():
@@ -109,12 +103,12 @@ def test_turbulence_repeats_with_its_generator():
 def test_bad_environments_are_refused():
     """Wrong values name their field."""
     with pytest.raises(InvalidInput, match="gradient"):
-        CosineGust(1.0, 0.0)
+        Gust(amplitude_m_s=1.0, gradient_m=0.0)
     with pytest.raises(InvalidInput, match="no direction"):
-        CosineGust(1.0, 10.0, direction_N=(0.0, 0.0, 0.0))
+        Gust(amplitude_m_s=1.0, gradient_m=10.0, direction_n=[0.0, 0.0, 0.0])
     with pytest.raises(InvalidInput, match="sigma_high_m_s"):
-        DrydenTurbulence(1.0, -1.0)
+        Turbulence(wind_20ft_m_s=1.0, sigma_high_m_s=-1.0)
     with pytest.raises(InvalidInput, match="generator"):
         air_velocity(TURBULENCE, flight(), [0.0, 1.0])
     with pytest.raises(InvalidInput, match="rising"):
-        air_velocity(STILL, flight(), [0.0, 0.0])
+        air_velocity(Environment(), flight(), [0.0, 0.0])

@@ -9,8 +9,9 @@ import pytest
 
 from morphcore.aero.polar import steady_polar
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, load_aircraft
-from morphcore.geometry.lattice import LatticeSettings, VortexCore
+from morphcore.geometry.aircraft import Aircraft
+from morphdata.aircraft import load_aircraft
+from morphdata.lattice import Lattice, VortexCore
 from tests.aero.planforms import EXAMPLES, straight_wings
 
 ALPHA = 0.0623
@@ -18,15 +19,15 @@ MIRROR_FORCE = np.array([1.0, -1.0, 1.0])
 MIRROR_MOMENT = -MIRROR_FORCE
 
 
-def with_core(fraction: float) -> LatticeSettings:
+def with_core(fraction: float) -> Lattice:
     """The default lattice with a core of another size."""
-    return LatticeSettings(core=VortexCore(fraction=fraction))
+    return Lattice(core=VortexCore(fraction=fraction))
 
 
 @pytest.fixture(scope="module")
 def aircraft() -> Aircraft:
     """The reference aircraft."""
-    return load_aircraft(EXAMPLES / "aircraft.json")
+    return Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json"))
 
 
 @pytest.mark.parametrize(("sweep", "beta"), [((0.3, 0.9), 0.1), ((1.2, 0.0), 0.0), ((0.7, 0.7), -0.2)])

@@ -14,7 +14,7 @@ from morphcore.aero.vlm import (
     solve_circulation,
 )
 from morphcore.errors import InvalidInput, UnsupportedRegime
-from morphcore.geometry.lattice import VortexCore
+from morphdata.lattice import VortexCore
 from tests.aero.planforms import Lattice, lattice, straight_wings
 
 STREAM_B = np.array([-0.98, -0.05, -0.17])
@@ -51,8 +51,8 @@ def product_segment(point, start, end, cut_off):
     [
         (VortexCore(fraction=1e-3), textbook_segment),
         # of the mean chord, 0.3 m
-        (VortexCore("smoothed"), lambda *line: product_segment(*line, 0.05 * 0.3)),
-        (VortexCore("smoothed", 0.3), lambda *line: product_segment(*line, 0.3 * 0.3)),
+        (VortexCore(law="smoothed"), lambda *line: product_segment(*line, 0.05 * 0.3)),
+        (VortexCore(law="smoothed", fraction=0.3), lambda *line: product_segment(*line, 0.3 * 0.3)),
     ],
 )
 def test_rings_by_the_textbook(wing, core, segment):
@@ -176,7 +176,7 @@ def test_what_has_no_meaning_is_refused(wing):
     """Mach beyond 0.7, a vanishing core and corners of another lattice are errors."""
     with pytest.raises(UnsupportedRegime, match=r"Mach 0\.75"):
         influence(wing.controls_B, wing.corners_B, wing.table, STREAM_B, mach=0.75)
-    with pytest.raises(InvalidInput, match="core"):
+    with pytest.raises(InvalidInput, match="fraction"):
         influence(wing.controls_B, wing.corners_B, wing.table, STREAM_B, core=VortexCore(fraction=0.0))
     with pytest.raises(InvalidInput, match="corners"):
         influence(wing.controls_B, wing.corners_B[:-1], wing.table, STREAM_B)

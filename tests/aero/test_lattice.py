@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import load_aircraft
-from morphcore.geometry.lattice import (
-    LatticeSettings,
-    VortexCore,
-    lattice_settings,
-    surface_lattice,
-    surface_pose,
-)
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.lattice import surface_lattice, surface_pose
+from morphdata.aircraft import load_aircraft
+from morphdata.lattice import Lattice, VortexCore
 from tests.aero.planforms import EXAMPLES, straight_wings
 
 
@@ -39,7 +35,7 @@ def test_rings_start_at_a_quarter_and_end_at_the_trailing_edge():
 
 def test_left_is_the_mirror_of_right():
     """The left lattice is the right one mirrored in the x-z plane, its pose at the same hinge angle too."""
-    right, left = load_aircraft(EXAMPLES / "aircraft.json").surfaces
+    right, left = Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json")).surfaces
     mirror = np.array([1.0, -1.0, 1.0])
     points = []
     for surface in (right, left):
@@ -50,7 +46,7 @@ def test_left_is_the_mirror_of_right():
 
 def test_positive_sweep_moves_the_tip_aft():
     """A swept tip lies sin(sweep) spans behind its root; the root stays on the hinge."""
-    right, _ = load_aircraft(EXAMPLES / "aircraft.json").surfaces
+    right, _ = Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json")).surfaces
     R_BW, r_B = surface_pose(right, 0.5)
     np.testing.assert_array_equal(r_B, right.position_m)
     np.testing.assert_allclose(R_BW @ [0, 3, 0], (-3 * np.sin(0.5), 3 * np.cos(0.5), 0), rtol=1e-15)
@@ -58,13 +54,13 @@ def test_positive_sweep_moves_the_tip_aft():
 
 def test_settings_survive_their_document():
     """Settings read back from their document are the same, a default fraction as the number that it is."""
-    chosen = LatticeSettings(2, 6, VortexCore("smoothed", 0.07))
-    assert lattice_settings(chosen.to_document()) == chosen
-    assert lattice_settings({}) == LatticeSettings()
-    smoothed = lattice_settings({"core": {"law": "smoothed"}})
+    chosen = Lattice(chordwise=2, spanwise=6, core=VortexCore(law="smoothed", fraction=0.07))
+    assert Lattice.parse(chosen.to_document()) == chosen
+    assert Lattice.parse({}) == Lattice()
+    smoothed = Lattice.parse({"core": {"law": "smoothed"}})
     assert smoothed.core.radius_fraction == 0.05
-    assert lattice_settings(smoothed.to_document()).core == VortexCore("smoothed", 0.05)
-    assert lattice_settings({"core": {"fraction": None}}).core.radius_fraction == 0.1
+    assert Lattice.parse(smoothed.to_document()).core == VortexCore(law="smoothed", fraction=0.05)
+    assert Lattice.parse({"core": {"fraction": None}}).core.radius_fraction == 0.1
 
 
 @pytest.mark.parametrize(
@@ -82,7 +78,7 @@ def test_settings_survive_their_document():
 def test_bad_settings_name_the_field(document, pointer):
     """What is wrong in a lattice's document is said with a pointer to it and a hint."""
     with pytest.raises(InvalidInput) as caught:
-        lattice_settings(document, "/x")
+        Lattice.parse(document, "/x")
     assert caught.value.pointer == pointer
     assert caught.value.hint
 
@@ -90,7 +86,7 @@ def test_bad_settings_name_the_field(document, pointer):
 def test_a_core_without_a_law_or_a_size_is_refused():
     """Laws that there are not, and radii that are not above zero, are errors."""
     with pytest.raises(InvalidInput, match="law"):
-        VortexCore("thick")
+        VortexCore(law="thick")
     for fraction in (0.0, -0.1, float("nan")):
-        with pytest.raises(InvalidInput, match="not above 0"):
+        with pytest.raises(InvalidInput, match="fraction"):
             VortexCore(fraction=fraction)

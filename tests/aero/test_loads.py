@@ -19,7 +19,6 @@ from morphcore.aero.kernels.loads import (
     L_SLOW_DECAY,
     lagged_motion,
 )
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.lanes import TOGETHER, lane_type
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.models.parameters import lag_weights
@@ -28,6 +27,7 @@ from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import lag_from_stage, lag_to_stage
 from morphcore.simulate.plan import STEP_S, flight_plan
 from morphcore.simulate.schedule import Hold
+from morphdata.lattice import Lattice
 from tests.aero.link_loads import edge_loads, lane_loads
 from tests.kernels import door
 from tests.models.chains import example_aircraft, example_flight, instant, odd_aircraft
@@ -101,7 +101,7 @@ def test_odd_surfaces():
     aircraft = replace(aircraft, surfaces=tuple(replace(s, profile_drag=0.0) for s in aircraft.surfaces))
     flat = replace(aircraft, surfaces=tuple(flattened(s) for s in aircraft.surfaces))
     for shape, tolerance, in_plane in ((flat, 1e-11, 0.012), (aircraft, 0.03, 0.03)):
-        model = chain_model(shape, example_flight(), 1, LatticeSettings(chordwise=3, spanwise=6))
+        model = chain_model(shape, example_flight(), 1, Lattice(chordwise=3, spanwise=6))
         lanes, lattice = compared(model, [0.4, 0.1, 0.0, 0.05, 0.0], SINKING)
         np.testing.assert_allclose(lanes[:, [0, 1, 5]], lattice[:, [0, 1, 5]], atol=tolerance)
         np.testing.assert_allclose(lanes[:, [2, 3, 4]], lattice[:, [2, 3, 4]], atol=in_plane)
@@ -242,9 +242,7 @@ def test_a_sudden_gust_builds_lift_up_as_jones_says():
     aircraft = example_aircraft()
     heavy = replace(aircraft.fuselage, mass_kg=1e8, inertia_B=1e13 * np.eye(3))
     flight = replace(example_flight(), gravity_m_s2=0.0)
-    model = chain_model(
-        replace(aircraft, fuselage=heavy), flight, 1, LatticeSettings(chordwise=2, spanwise=4)
-    )
+    model = chain_model(replace(aircraft, fuselage=heavy), flight, 1, Lattice(chordwise=2, spanwise=4))
     batch, grid = dragless(model), steps(0.1, 0.0005)
     plan = flight_plan(
         model, [Hold(), Hold()], grid, air_velocity_N=lambda t: np.tile([0.0, 0.0, -2.0], (t.size, 1))

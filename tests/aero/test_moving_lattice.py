@@ -10,9 +10,9 @@ from morphcore.aero.kernels.lattice_place import induced_velocity
 from morphcore.aero.kernels.lattice_place import refine as refine_kernel
 from morphcore.aero.moving_lattice import MovingLattice
 from morphcore.aero.vlm import edge_midpoints, influence, panel_normals
-from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.jit import entry_kernel
 from morphcore.models.flexible import flexible_model
+from morphdata.lattice import Lattice, VortexCore
 from tests.kernels import door
 from tests.models.chains import example_aircraft, example_flight
 
@@ -29,7 +29,7 @@ def _induced(parts, place, gamma, still):  # pasted into kernels only
 def test_influence_is_that_of_the_rings(law: str, mach: float) -> None:
     """Crooked wings, compressible too: normal part at control points, sums at the edges, to rounding."""
     rng = np.random.default_rng(3)
-    settings = LatticeSettings(chordwise=2, spanwise=4, core=VortexCore(law))  # type: ignore[arg-type]
+    settings = Lattice(chordwise=2, spanwise=4, core=VortexCore(law=law))  # type: ignore[arg-type]
     model = flexible_model(example_aircraft(), example_flight(), elements=2, lattice=settings)
     table, riders = model.lattice.table, model.riders
     lattice = MovingLattice(table, riders, settings.core, 1.2, mach)

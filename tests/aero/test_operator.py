@@ -15,8 +15,10 @@ from morphcore.aero.operator import (
 )
 from morphcore.aero.vlm import influence, solve_circulation
 from morphcore.errors import UnsupportedRegime
-from morphcore.geometry.aircraft import load_aircraft
-from morphcore.geometry.lattice import LatticeSettings, surface_pose
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.lattice import surface_pose
+from morphdata.aircraft import load_aircraft
+from morphdata.lattice import Lattice
 from tests.aero.planforms import EXAMPLES, straight_wings
 from tests.models.chains import odd_aircraft
 
@@ -25,7 +27,7 @@ ANGLES = (0.3, 0.9)
 
 def example_lattice():
     """The reference aircraft's lattice."""
-    return aircraft_lattice(load_aircraft(EXAMPLES / "aircraft.json"))
+    return aircraft_lattice(Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json")))
 
 
 def circulations(lattice, angles, inputs):
@@ -52,7 +54,7 @@ def circulations(lattice, angles, inputs):
     "build",
     [
         example_lattice,
-        lambda: aircraft_lattice(odd_aircraft(np.random.default_rng(3)), LatticeSettings(2, 5)),
+        lambda: aircraft_lattice(odd_aircraft(np.random.default_rng(3)), Lattice(chordwise=2, spanwise=5)),
     ],
 )
 def test_circulation_of_any_motion(build):
@@ -101,7 +103,9 @@ def test_flat_plate_of_six_metres():
 
 def test_padding_is_empty():
     """Rows and columns that fill up the tiles hold nothing."""
-    lattice = aircraft_lattice(odd_aircraft(np.random.default_rng(0)), LatticeSettings(1, 3))
+    lattice = aircraft_lattice(
+        odd_aircraft(np.random.default_rng(0)), Lattice.model_construct(chordwise=1, spanwise=3)
+    )
     rows, columns = lattice.operator_shape
     assert rows % ROW_MULTIPLE == 0
     assert columns % COLUMN_MULTIPLE == 0
@@ -149,7 +153,7 @@ def test_compressibility(mach):
 
 def test_fixed_surfaces_stay():
     """An angle given for a surface without hinge is not looked at."""
-    lattice = aircraft_lattice(straight_wings(3.0, 0.3, 0.3), LatticeSettings(2, 4))
+    lattice = aircraft_lattice(straight_wings(3.0, 0.3, 0.3), Lattice(chordwise=2, spanwise=4))
     np.testing.assert_array_equal(
         lattice_operator(lattice, (0.0, 0.0)).matrix, lattice_operator(lattice, (0.7, 0.2)).matrix
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from morphcore.aero.polar import steady_polar
-from morphcore.geometry.lattice import LatticeSettings, VortexCore
+from morphdata.lattice import Lattice, VortexCore
 from tests.aero.planforms import DEGREE, elliptic, lattice, lift_and_drag, sheared, straight_wings
 
 TWO_PI = 2 * np.pi
@@ -42,9 +42,9 @@ def test_smoothed_core_lifts_too_much():
     """
     bound = TWO_PI * 5 * DEGREE * 20 / (20 + 2)
     lifts = {}
-    for core in (VortexCore(), VortexCore("smoothed")):
+    for core in (VortexCore(), VortexCore(law="smoothed")):
         for panels in ((4, 10), (8, 20)):
-            chosen = LatticeSettings(*panels, core=core)
+            chosen = Lattice(chordwise=panels[0], spanwise=panels[1], core=core)
             loads = steady_polar(straight_wings(3.0, 0.3, 0.3), 150.0, 1.225, 5 * DEGREE, lattice=chosen)
             lifts[core.law, panels] = loads.lift_coefficient
     assert lifts["smoothed", (4, 10)] == pytest.approx(0.527, abs=5e-4)

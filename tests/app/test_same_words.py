@@ -13,13 +13,11 @@ from pydantic import ValidationError
 
 from morphcore import load_trajectory
 from morphcore.errors import InvalidInput
-from morphcore.geometry.fields import Fields
-from morphcore.simulate.request import simulation_from_document
-from morphcore.simulate.trajectory import trajectory_from_document
-from morphdata.fields import Strict
+from morphdata.base import Document
 from morphdata.samplefiles.fault import as_sentence
+from morphdata.samples import InlineSample
 from tests.app.calls import changed, fault, post
-from tests.app.request_documents import identify_document, sample_document, simulate_document
+from tests.app.request_documents import identify_document, sample_document
 from tests.app.running_service import RunningService
 
 NAME = "train_rate_0.8"
@@ -54,8 +52,8 @@ def test_a_flight_is_refused_in_the_librarys_words(service: RunningService, bad:
     """Inline in a request, uploaded as JSON and uploaded as a file: what the library says of the same."""
     document = spoiled(bad)
     with pytest.raises(InvalidInput) as inline:
-        trajectory_from_document(document, "/samples/2")
-    said = as_sentence(inline.value.message), as_sentence(inline.value.hint)
+        InlineSample.parse(document, "/samples/2")
+    said = inline.value.message, inline.value.hint
     asked = changed(identify_document(), "/samples/2", document)
     found = fault(post(service, "/identify", asked))
     assert (found["detail"], found["hint"], found["pointer"]) == (*said, inline.value.pointer)
@@ -92,35 +90,14 @@ def test_time_since_an_epoch_is_read_by_the_service(service: RunningService) -> 
     assert answer.json()["duration_s"] == pytest.approx(document["time_s"][-1], abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "detail", "hint"),
-    [
-        ("duration_s", 700.0, "duration_s is 700", "it must be at most 600"),
-        ("duration_s", 0.0, "duration_s is 0", "it must be more than 0"),
-        ("output_step_s", 1000.0, "output_step_s is 1000", "it must be at most 600"),
-    ],
-)
-def test_a_flight_beyond_its_bounds_is_refused_in_the_same_words(
-    service: RunningService, field: str, value: float, detail: str, hint: str
-) -> None:
-    """The bound that is broken, and no word about the others: ten minutes of a simulation among them."""
-    document = {**simulate_document(), field: value}
-    with pytest.raises(InvalidInput) as caught:
-        simulation_from_document(document)
-    assert (caught.value.message, caught.value.hint) == (detail, hint)
-    found = fault(post(service, "/simulate", document))
-    assert (found["detail"], found["hint"]) == (f"{detail}.", as_sentence(hint))
-    assert found["pointer"] == caught.value.pointer
-
-
-def strict_models(kind: type[Strict] = Strict) -> Iterator[type[Strict]]:
+def strict_models(kind: type[Document] = Document) -> Iterator[type[Document]]:
     """Every model of a document that clients send."""
     for model in kind.__subclasses__():
         yield model
         yield from strict_models(model)
 
 
-def whole_fields() -> list[tuple[type[Strict], str, bool]]:
+def whole_fields() -> list[tuple[type[Document], str, bool]]:
     """Every field that the JSON schema calls an integer, or a list of such."""
     from app.main import create_app  # noqa: F401 - loads every model
 
@@ -135,7 +112,7 @@ def whole_fields() -> list[tuple[type[Strict], str, bool]]:
     return sorted(found, key=lambda item: (item[0].__name__, item[1]))
 
 
-def faults_at(model: type[Strict], name: str, value: Any) -> set[str]:
+def faults_at(model: type[Document], name: str, value: Any) -> set[str]:
     """Kinds of faults that a model finds in one field; the others are left out."""
     try:
         model.model_validate({name: value})
@@ -145,19 +122,11 @@ def faults_at(model: type[Strict], name: str, value: Any) -> set[str]:
 
 
 @pytest.mark.parametrize(("model", "name", "listed"), whole_fields(), ids=str)
-def test_a_whole_number_may_have_a_point(model: type[Strict], name: str, listed: bool) -> None:  # noqa: FBT001
-    """3.0 is an integer of JSON Schema; 3.5, true and a text are none. So it is in the library."""
+def test_a_whole_number_may_have_a_point(model: type[Document], name: str, listed: bool) -> None:  # noqa: FBT001
+    """3.0 is an integer of JSON Schema; 3.5, true and a text are none."""
     for value, whole in ((5, True), (5.0, True), (3.5, False), (True, False), ("3", False)):
         found = faults_at(model, name, [value] if listed else value)
         assert ("int_type" not in found) is whole, (value, found)
-        fields = Fields({name: value}, "")
-        if whole:
-            read = fields.whole(name, default=1, least=0, most=100)
-            assert (read, type(read)) == (5, int)
-        else:
-            with pytest.raises(InvalidInput) as caught:
-                fields.whole(name, default=1, least=0, most=100)
-            assert caught.value.hint == "give a whole number"
 
 
 def test_the_walk_finds_the_whole_numbers() -> None:

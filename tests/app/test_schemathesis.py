@@ -29,7 +29,7 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from app.settings import Settings
-from morphdata.fields import Identifier
+from morphdata.base import Identifier
 from tests.app.request_documents import RESULT
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.app.tenants import Tenant, client_json, new_tenant, replenish, short_requests

@@ -8,9 +8,9 @@ from statistics import median
 import pytest
 
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.trajectory import load_trajectory
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
+from tests.simulate.flights import fly
 
 FLIGHTS = ("train_rate_0.8", "train_asymmetric")
 TRIES = 5  # a machine shared with others is slow at times: the median of these
@@ -20,11 +20,11 @@ PROMISED_S = 1.0e-3  # a step on one core, trim included; half of what the forme
 def time_per_step(name: str) -> tuple[float, float]:
     """Processor time per step (s, median) with trim, and how many seconds a flown second takes."""
     flight = load_trajectory(EXAMPLES / f"{name}.csv")
-    simulate(example_aircraft(), example_flight(), flight, model="flexible", duration_s=0.02)
+    fly(example_aircraft(), example_flight(), flight, model="flexible", duration_s=0.02)
     spent = []
     for _ in range(TRIES):
         begin = time.process_time()
-        simulate(example_aircraft(), example_flight(), flight, model="flexible")
+        fly(example_aircraft(), example_flight(), flight, model="flexible")
         spent.append(time.process_time() - begin)
     duration = float(flight.time_s[-1] - flight.time_s[0])
     return median(spent) * FLEXIBLE_STEP_S / duration, median(spent) / duration

@@ -11,8 +11,9 @@ from numba.core import event
 from morphcore.bench.fresh_process import in_fresh_process
 from morphcore.bench.setting import QUICK, bench_of, example_samples_dir
 from morphcore.bench.start_up import COMPILING, CompileTimes, first_generation, import_times, request_of
-from morphcore.identify import identification_from_document
+from morphcore.identify import identification_from_request
 from morphcore.jit import compiled, kernel
+from morphdata.identify import IdentifyRequest
 
 ALLOWED_S = 0.5
 ALLOWED_RATIO = 1.5
@@ -20,7 +21,7 @@ ALLOWED_RATIO = 1.5
 
 def test_a_request_of_the_benchmark_is_one_that_the_library_takes() -> None:
     """Three flights to train on, and a first step that leaves a best so far."""
-    run = identification_from_document(request_of(bench_of(QUICK)))
+    run = identification_from_request(IdentifyRequest.parse(request_of(bench_of(QUICK))))
     assert [sample.role for sample in run.samples] == ["train"] * 3
     assert next(run.steps()).best_cost > 0.0
 

@@ -24,7 +24,6 @@ from app.database import Database, Session, upgrade
 from app.documents import unpacked
 from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.chunks import (
-    ChunkClaim,
     claim_chunk,
     finish_chunk,
     flown,
@@ -34,7 +33,7 @@ from app.jobs.chunks import (
 )
 from app.jobs.creation import Terms
 from app.jobs.reaper import reap
-from app.jobs.records import Claim, JobStatus
+from app.jobs.records import ChunkClaim, Claim, JobStatus
 from app.jobs.store import claim_job, create_job, finish_job, load_checkpoint, load_request
 from app.jobs.turns import next_unit
 from app.tables import job_results

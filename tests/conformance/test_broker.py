@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from kombu import Connection
 
-from app.jobs.queue import QUEUE_NAME, TASK_NAME, publish
+from app.jobs.queue import QUEUE, RUN_JOB, publish
 from tests.conformance.conftest import OwnBroker
 
 RECEIVE_S = 5.0
@@ -21,7 +21,7 @@ GIVE_UP_S = 4.0  # connecting fails after half a second, a socket that hangs aft
 def queue_of(url: str) -> Iterator[Any]:
     """Take part as a consumer of wake-up messages."""
     with Connection(url) as connection:
-        queue = connection.SimpleQueue(QUEUE_NAME)
+        queue = connection.SimpleQueue(QUEUE)
         yield queue
         queue.close()
 
@@ -32,7 +32,7 @@ def received(url: str, number: int) -> list[str]:
     with queue_of(url) as queue:
         for _ in range(number):
             message = queue.get(timeout=RECEIVE_S)
-            assert message.headers["task"] == TASK_NAME
+            assert message.headers["task"] == RUN_JOB
             ids.append(message.payload[0][0])
             message.ack()
     return ids

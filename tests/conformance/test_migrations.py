@@ -98,8 +98,9 @@ def test_webhooks_of_before_need_no_challenge(database_url: str) -> None:
         connection.execute(insert(table).values(**row, secret="whsec_x", failures=0, created_at=7.0))
     upgrade(database_url)
     with database.read() as session:
-        (found,) = list_webhooks(session, "me")
-        destination = session.scalar(select(webhooks.c.destination))
+        (shown,) = list_webhooks(session, "me")
+        found = session.execute(select(webhooks)).one()
     database.dispose()
+    assert shown.enabled
     assert found.verified_at == found.created_at
-    assert destination == destination_of(row["url"])
+    assert found.destination == destination_of(row["url"])

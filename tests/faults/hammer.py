@@ -9,6 +9,7 @@ import time
 
 from sqlalchemy import func, select
 
+from app import on_end  # noqa: F401 - jobs end here
 from app.database import Database
 from app.jobs.repository import JobFilter, list_jobs
 from app.jobs.store import claim_job, create_job, finish_job, save_progress
@@ -52,7 +53,7 @@ class Hammer:
         """List jobs and count them."""
         while time.monotonic() < self._until:
             with self._database.read() as session:
-                list_jobs(session, "local", JobFilter(), before=None, limit=50)
+                list_jobs(session, "local", JobFilter(), cursor=None, limit=50)
                 session.scalar(select(func.count()).select_from(jobs))
 
     def _timed(self, action):  # type: ignore[no-untyped-def]  # any transaction

@@ -7,7 +7,8 @@ import json
 import zlib
 from typing import Any
 
-from worker.hints import QUEUE, RUN_JOB, Hint
+from app.jobs.queue import QUEUE, RUN_JOB
+from worker.hints import Hint
 
 
 def envelope(**changes: Any) -> dict[str, Any]:

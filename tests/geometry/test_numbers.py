@@ -14,14 +14,15 @@ import pytest
 from morphcore.errors import InvalidInput, MorphError
 from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import Fields, whole_number
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import flexible_model
-from morphcore.optimise import FlexibleSettings, Morph, ScheduleSearch, optimisation_from_document
-from morphcore.simulate.request import FlownModel, simulation_from_document
+from morphcore.optimise import FlexibleSettings, ScheduleSearch
+from morphcore.simulate.request import simulation_from_document
 from morphcore.swarm import SwarmSettings
+from morphdata.lattice import Lattice
+from morphdata.optimize import OptimizeRequest
 from tests.app.request_documents import optimize_document, simulate_document
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
@@ -49,11 +50,8 @@ SETTINGS: list[tuple[type, dict[str, Any]]] = [
     (SearchSettings, {}),
     (SwarmSettings, {}),
     (EvolutionSettings, {}),
-    (LatticeSettings, {}),
     (ScheduleSearch, {}),
     (FlexibleSettings, {}),
-    (FlownModel, {"kind": "rigid"}),
-    (Morph, {"final_rad": 1.0, "duration_s": 2.0}),
 ]
 
 
@@ -79,7 +77,7 @@ def test_a_search_with_numpys_numbers_ends_in_json() -> None:
             reference_aircraft(),
             reference_flight(),
             [flight],
-            ModelSettings(whole(2), lattice=LatticeSettings(whole(1), whole(4)), step_s=0.01),
+            ModelSettings(whole(2), lattice=Lattice(chordwise=whole(1), spanwise=whole(4)), step_s=0.01),
             SearchSettings(method="pso", seed=whole(3), swarm=SwarmSettings(whole(4), whole(1))),
         )
         *_, last = run.steps()
@@ -94,7 +92,7 @@ def test_a_search_with_numpys_numbers_ends_in_json() -> None:
 def test_numbers_of_links_and_elements_are_whole() -> None:
     """As they are for the functions that make models of them."""
     aircraft, flight = reference_aircraft(), reference_flight()
-    lattice = LatticeSettings(1, 4)
+    lattice = Lattice(chordwise=1, spanwise=4)
     assert type(chain_model(aircraft, flight, np.int8(2), lattice).links) is int
     assert flexible_model(aircraft, flight, elements=2.0, lattice=lattice) is not None  # type: ignore[arg-type]
     for make, hint in (
@@ -151,7 +149,7 @@ def with_value(document: Any, pointer: str, value: Any) -> Any:
 
 READERS = [
     (simulate_document(), simulation_from_document),
-    (optimize_document(), optimisation_from_document),
+    (optimize_document(), OptimizeRequest.parse),
 ]
 
 

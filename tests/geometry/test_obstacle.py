@@ -17,7 +17,7 @@ def with_modulus(number: int, modulus_pa: float) -> Aircraft:
     """The example with another material of one wing."""
     aircraft = example_aircraft()
     surfaces = list(aircraft.surfaces)
-    material = replace(surfaces[number].material, youngs_modulus_pa=modulus_pa)
+    material = surfaces[number].material.model_copy(update={"youngs_modulus_pa": modulus_pa})
     surfaces[number] = replace(surfaces[number], material=material)
     return replace(aircraft, surfaces=tuple(surfaces))
 

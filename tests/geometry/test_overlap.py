@@ -62,7 +62,10 @@ def test_surfaces_in_one_plane_against_a_net_of_points() -> None:
     for _ in range(150):
         place = (rng.uniform(-0.6, 0.6), 0.35 + rng.uniform(-3.5, 3.5), rng.choice([0.0, 0.04, 0.3]))
         aircraft = pair(
-            wing, position_m=place, span_m=rng.uniform(0.5, 3.0), hinge=replace(wing.hinge, position_m=place)
+            wing,
+            position_m=place,
+            span_m=rng.uniform(0.5, 3.0),
+            hinge=wing.hinge.model_copy(update={"position_m": list(place)}),
         )
         one, other = aircraft.surfaces
         angles = (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
@@ -97,7 +100,7 @@ def test_pairs_that_everybody_can_judge(changes: dict[str, Any], expected: bool)
 def test_a_wing_folded_through_a_tail_crosses_it() -> None:
     """A surface folded up by 80 degrees cuts another one above it, and meets none at its own root."""
     wing = example_aircraft().surfaces[0]
-    folding = replace(wing, hinge=replace(wing.hinge, axis="x"))
+    folding = replace(wing, hinge=wing.hinge.model_copy(update={"axis": "x"}))
     above = pair(folding, position_m=(0.0, 0.35, -1.0), hinge=None)
     assert overlap(above, 1.4, 0.0)
     assert not overlap(above, 0.0, 0.0)

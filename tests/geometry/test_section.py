@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from morphcore.geometry.section import GivenSection, Material, solid_box, torsion_constant
+from morphcore.geometry.section import given_section, solid_box, torsion_constant
+from morphdata.aircraft import Material, Section
 
-WOOD = Material(500.0, 2.1e9, 0.3, 0.004)
+WOOD = Material(density_kg_m3=500.0, youngs_modulus_pa=2.1e9, poisson_ratio=0.3, stiffness_damping_s=0.004)
 
 
 @pytest.mark.parametrize(
@@ -69,13 +70,21 @@ def test_polar_moment_is_the_sum(chord: float, thickness: float) -> None:
 
 def test_isotropic_shear_modulus() -> None:
     """G = E / 2 without lateral contraction, E / 3 of an incompressible material."""
-    assert Material(1.0, 6.0, 0.0, 0.0).shear_modulus_pa == pytest.approx(3.0)
-    assert Material(1.0, 6.0, 0.5, 0.0).shear_modulus_pa == pytest.approx(2.0)
+    for ratio, modulus in ((0.0, 3.0), (0.5, 2.0)):
+        material = Material(density_kg_m3=1.0, youngs_modulus_pa=6.0, poisson_ratio=ratio)
+        assert material.shear_modulus_pa == pytest.approx(modulus)
 
 
 def test_a_given_section_is_taken_as_given() -> None:
     """Properties given outright hold at every station, whatever the chord."""
-    section = GivenSection(1.0, 2.0, 3.0, 4.0, (5.0, 6.0, 7.0)).at(np.array([0.3, 0.1]))
+    given = Section(
+        ei_flap_n_m2=1.0,
+        ei_lag_n_m2=2.0,
+        gj_n_m2=3.0,
+        mass_per_length_kg_m=4.0,
+        inertia_per_length_kg_m=[5.0, 6.0, 7.0],
+    )
+    section = given_section(given, np.array([0.3, 0.1]))
     for name, value in zip(
         ("ei_flap", "ei_lag", "gj", "mass", "inertia_x", "inertia_y", "inertia_z"), range(1, 8), strict=True
     ):

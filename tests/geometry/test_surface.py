@@ -10,16 +10,17 @@ import pytest
 from scipy.integrate import quad
 
 from morphcore.frames import axis_rotation
-from morphcore.geometry.section import Material
-from morphcore.geometry.surface import Hinge, Surface
+from morphcore.geometry.surface import Surface
+from morphdata.aircraft import Hinge, Material
+from morphdata.aircraft import Surface as SurfaceDocument
 
-WOOD = Material(500.0, 2.1e9, 0.3, 0.004)
+WOOD = Material(density_kg_m3=500.0, youngs_modulus_pa=2.1e9, poisson_ratio=0.3, stiffness_damping_s=0.004)
 SIDES: tuple[Literal["right", "left"], ...] = ("right", "left")
 
 
 def surface(side: Literal["right", "left"], axis: Literal["x", "y", "z"]) -> Surface:
     """A tapered surface hinged about one axis."""
-    return Surface(
+    document = SurfaceDocument(
         name="wing",
         side=side,
         span_m=3.0,
@@ -27,10 +28,9 @@ def surface(side: Literal["right", "left"], axis: Literal["x", "y", "z"]) -> Sur
         tip_chord_m=0.2,
         thickness_m=0.1,
         material=WOOD,
-        hinge=Hinge((0.0, 0.35, 0.0), axis),
-        position_m=(0.0, 0.35, 0.0),
-        flexible=True,
+        hinge=Hinge(position_m=[0.0, 0.35, 0.0], axis=axis),
     )
+    return Surface.of(document)
 
 
 def turned(wing: Surface, direction: np.ndarray) -> np.ndarray:
@@ -80,3 +80,17 @@ def test_sections_follow_the_taper() -> None:
     assert section.ei_flap[0] / section.ei_flap[1] == pytest.approx(2.0)
     assert section.ei_lag[0] / section.ei_lag[1] == pytest.approx(8.0)
     assert wing.section_at(1.0).mass.shape == (1,)
+
+
+def test_a_chord_that_is_not_said_is_the_uniform_one() -> None:
+    """Root or tip may be given beside the chord of the rest; the root is at the hinge where not said."""
+    document = {"name": "w", "side": "left", "span_m": 2.0, "thickness_m": 0.1, "material": WOOD}
+    hinge = Hinge(position_m=[0.1, -0.35, 0.2], axis="z")
+    for given, chords in (
+        ({}, (0.3, 0.3)),
+        ({"root_chord_m": 0.4}, (0.4, 0.3)),
+        ({"tip_chord_m": 0.2}, (0.3, 0.2)),
+    ):
+        wing = Surface.of(SurfaceDocument.parse({**document, "chord_m": 0.3, "hinge": hinge, **given}))
+        assert (wing.root_chord_m, wing.tip_chord_m) == chords
+        assert wing.position_m == (0.1, -0.35, 0.2)

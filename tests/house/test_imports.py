@@ -16,7 +16,7 @@ WORKER_MAY_KNOW = (
         "app.observability.",
         "app.health.presence",
         "app.health.broker",
-        "app.version",
+        "app.on_end",
     ),  # what it tells of itself
 )
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}

@@ -9,24 +9,33 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore import Aircraft, Flight, Trajectory, load_aircraft, load_flight, load_trajectory
+from morphcore import Trajectory, load_aircraft, load_flight, load_trajectory
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ParameterBatch, chain_model
 from morphcore.simulate.schedule import ConstantRate
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.flight import Flight as FlightDocument
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 @cache
+def reference_documents() -> tuple[AircraftDocument, FlightDocument]:
+    """The example aircraft and flight condition as documents."""
+    return load_aircraft(EXAMPLES / "aircraft.json"), load_flight(EXAMPLES / "flight.json")
+
+
+@cache
 def reference_aircraft() -> Aircraft:
     """The example aircraft."""
-    return load_aircraft(EXAMPLES / "aircraft.json")
+    return Aircraft.of(reference_documents()[0])
 
 
 @cache
 def reference_flight() -> Flight:
     """The example flight condition."""
-    return load_flight(EXAMPLES / "flight.json")
+    return Flight.of(reference_documents()[1])
 
 
 @cache

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from morphcore import identify
-from tests.identify.flights import example, reference_aircraft, reference_flight
+from tests.identify.flights import example, reference_documents
 
 THREE = ("rate_0.2", "rate_0.5", "rate_0.8")
 
@@ -15,9 +15,7 @@ THREE = ("rate_0.2", "rate_0.5", "rate_0.8")
 def fits(*names: str, held_out: tuple[str, ...] = (), seed: int = 1) -> dict[str, dict[str, Any]]:
     """The fit of every sample, by name, for three links a wing."""
     samples = [example(name) for name in names] + [example(name, "held_out") for name in held_out]
-    document = identify(
-        reference_aircraft(), reference_flight(), samples, links_per_wing=3, seed=seed
-    ).to_document()
+    document = identify(*reference_documents(), samples, links_per_wing=3, seed=seed).to_document()
     return {fit["sample"].removeprefix("train_"): fit for fit in document["fit"]}
 
 

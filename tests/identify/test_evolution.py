@@ -14,6 +14,7 @@ from morphcore.evolution import Evolution, EvolutionSettings, EvolutionState, fi
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.settings import search_settings
 from morphcore.identify.state import decode
+from morphdata.identify import IdentifySearch
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 Array = NDArray[np.float64]
@@ -133,9 +134,11 @@ def test_diverged_flights_do_not_stop_it() -> None:
 
 def test_documents_say_how_many() -> None:
     """``particles`` and ``generations`` are the strategy's; fewer than four models are refused."""
-    settings = search_settings({"method": "cma", "particles": 24, "generations": 7, "seed": 2})
+    settings = search_settings(
+        IdentifySearch.parse({"method": "cma", "particles": 24, "generations": 7, "seed": 2})
+    )
     assert settings.evolution == EvolutionSettings(24, 7)
-    assert search_settings({"method": "cma"}).evolution == EvolutionSettings()
+    assert search_settings(IdentifySearch.parse({"method": "cma"})).evolution == EvolutionSettings()
     with pytest.raises(InvalidInput) as error:
-        search_settings({"method": "cma", "particles": 3})
+        IdentifySearch.parse({"method": "cma", "particles": 3}, "/search")
     assert error.value.pointer == "/search/particles"

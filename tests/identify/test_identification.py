@@ -22,7 +22,7 @@ from morphcore.identify import (
     ModelSettings,
     SearchSettings,
     Step,
-    identification_from_document,
+    identification_from_request,
 )
 from morphcore.identify.cost import costs, evaluate, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
@@ -31,6 +31,7 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.plan import STEP_S
 from morphcore.swarm import SwarmSettings
 from morphcore.threads import thread_count
+from morphdata.identify import IdentifyRequest
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
@@ -241,9 +242,10 @@ def test_one_link_has_only_corrections_to_find() -> None:
 
 def test_request_document_runs() -> None:
     """The body of POST /identify, as the clients send it, becomes an identification."""
-    run = identification_from_document(
-        identification("train_rate_0.8", links=2, search={"method": "pso", "particles": 4, "generations": 1})
+    request = identification(
+        "train_rate_0.8", links=2, search={"method": "pso", "particles": 4, "generations": 1}
     )
+    run = identification_from_request(IdentifyRequest.parse(request))
     document = run.result(last(run).checkpoint).to_document()
     assert set(document) == {"model", "fit", "uncertainty", "search", "cost", "warnings"}
     assert document["search"]["method"] == "pso"
@@ -252,7 +254,7 @@ def test_request_document_runs() -> None:
 def test_paper_preset_is_the_papers_swarm() -> None:
     """``preset: paper`` means 2500 particles with c1 = c2 = 1."""
     request = identification("train_rate_0.8", search={"preset": "paper", "generations": 20})
-    search = identification_from_document(request).search
+    search = identification_from_request(IdentifyRequest.parse(request)).search
     assert (search.method, search.swarm.particles, search.swarm.c1, search.swarm.c2) == (
         "pso",
         2500,
@@ -283,7 +285,7 @@ def test_bad_requests_name_the_field(change: dict[str, Any], pointer: str) -> No
     """What is wrong in a request is said with a pointer to it and a hint."""
     request = identification("train_rate_0.8") | change
     with pytest.raises(InvalidInput) as caught:
-        identification_from_document(request)
+        identification_from_request(IdentifyRequest.parse(request))
     assert caught.value.pointer == pointer
     assert caught.value.hint
 
@@ -301,7 +303,7 @@ def test_bad_rows_are_named(column: str, row: int, value: float, pointer: str) -
     request = identification("train_rate_0.8")
     request["samples"][0][column][row] = value
     with pytest.raises(InvalidInput) as caught:
-        list(identification_from_document(request).steps())
+        list(identification_from_request(IdentifyRequest.parse(request)).steps())
     assert caught.value.pointer == pointer
 
 
@@ -322,9 +324,11 @@ def test_the_number_of_threads_does_not_change_the_answer() -> None:
     """One or two threads, of kernels and of linear algebra, give the same model and fit, to the bit."""
     code = (
         "import json;"
-        "from morphcore.identify import identification_from_document as begin;"
+        "from morphcore.identify import identification_from_request as begin;"
+        "from morphdata.identify import IdentifyRequest;"
         "from tests.identification_request import identification as ask;"
-        "run = begin(ask('train_rate_0.8', links=2, search={'particles': 24, 'generations': 3}), {threads});"
+        "request = ask('train_rate_0.8', links=2, search={'particles': 24, 'generations': 3});"
+        "run = begin(IdentifyRequest.parse(request), {threads});"
         "*_, step = run.steps(); found = run.result(step.checkpoint).to_document();"
         "print(json.dumps([found['model'], found['fit']]))"
     )

@@ -16,7 +16,13 @@ from morphcore.identify.study import Study
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
 from morphcore.swarm import SwarmSettings
 from tests.geometry.test_obstacle import with_modulus
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
 from tests.optimise.morphs import last as last_of_morph
 from tests.optimise.morphs import optimisation
 
@@ -34,8 +40,10 @@ def ended(run: Any) -> bytes:
 
 def test_a_soft_wing_is_the_cause() -> None:
     """The error names wing and field, says what to check, and survives a process pool."""
+    run = Identification(SOFT, reference_flight(), [TRAIN], TWO, SWARM)
+    checkpoint = ended(run)
     with pytest.raises(NotFlyable) as caught:
-        identify(SOFT, reference_flight(), [TRAIN], model=TWO, search=SWARM)
+        run.result(checkpoint)
     error = pickle.loads(pickle.dumps(caught.value))  # noqa: S301 - our own
     assert (error.code, error.pointer) == (
         "not_flyable",
@@ -68,7 +76,7 @@ def test_bounds_that_let_nothing_fly_are_the_cause() -> None:
     """A wing that is right and bounds that make it soft: the hint is about the bounds."""
     soft = replace(TWO, bounds={"stiffness_nm_rad": (1e-3, 1e-2)})
     with pytest.raises(NotFlyable) as caught:
-        identify(reference_aircraft(), reference_flight(), [TRAIN], model=soft, search=SWARM)
+        identify(*reference_documents(), [TRAIN], model=soft, search=SWARM)
     assert caught.value.pointer == "/model/bounds"
 
 

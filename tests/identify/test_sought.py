@@ -11,7 +11,14 @@ from morphcore.identify import Identification, ModelSettings, SearchSettings, id
 from morphcore.identify.settings import model_settings
 from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from morphdata.identify import EquivalentModel
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
 
 AERO_COEFFICIENTS = ("lift_factor", "centre_shift_m", "profile_drag", "lag_s")
 WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag")
@@ -64,8 +71,7 @@ def test_a_heading_is_no_yaw() -> None:
 def test_the_result_names_what_was_sought() -> None:
     """The corrections, and those left out have the values of the physical guess."""
     found = identify(
-        reference_aircraft(),
-        reference_flight(),
+        *reference_documents(),
         [shortened(example("rate_0.8"), 40)],
         model=ModelSettings(links_per_wing=1),
         search=SearchSettings(iterations=2),
@@ -78,7 +84,7 @@ def test_the_result_names_what_was_sought() -> None:
 
 def test_the_document_may_leave_them_out() -> None:
     """Left out or null: the library's choice. A list, even an empty one, is the caller's."""
-    assert model_settings({}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": None}).aero_coefficients is None
-    assert model_settings({"aero_coefficients": []}).aero_coefficients == ()
-    assert model_settings({"aero_coefficients": list(LISTED)}).aero_coefficients == LISTED
+    assert model_settings(EquivalentModel()).aero_coefficients is None
+    assert model_settings(EquivalentModel(aero_coefficients=None)).aero_coefficients is None
+    assert model_settings(EquivalentModel(aero_coefficients=[])).aero_coefficients == ()
+    assert model_settings(EquivalentModel(aero_coefficients=list(LISTED))).aero_coefficients == LISTED

@@ -13,6 +13,7 @@ from morphcore.identify.study import Study
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.step_choice import CANDIDATES_S
 from morphcore.stopping import Interrupted
+from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 TWO = ModelSettings(links_per_wing=2)
@@ -108,5 +109,5 @@ def test_every_number_of_links_chooses_its_own() -> None:
 
 def test_the_document_may_leave_it_out() -> None:
     """Left out it is the search's choice; given, the caller's."""
-    assert model_settings({}).step_s is None
-    assert model_settings({"step_s": 0.0025}).step_s == 0.0025
+    assert model_settings(EquivalentModel()).step_s is None
+    assert model_settings(EquivalentModel(step_s=0.0025)).step_s == 0.0025

@@ -9,14 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore import simulate
 from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, ModelSettings, SearchSettings, Step
-from morphcore.identify.study import Study, study, study_from_document
+from morphcore.identify.study import Study, study, study_from_request
 from morphcore.identify.study_timing import ROUNDS, timed_flight
+from morphdata.study import StudyRequest
 from tests.identification_request import identification
-from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.identify.flights import (
+    example,
+    reference_aircraft,
+    reference_documents,
+    reference_flight,
+    shortened,
+)
+from tests.simulate.flights import fly
 
 QUICK = SearchSettings(seed=3, screen=16, starts=2, iterations=3)
 TRAIN = shortened(example("rate_0.8"), 80)
@@ -116,7 +123,7 @@ def test_the_models_of_a_study_fly(undisturbed: tuple[Study, list[Step]]) -> Non
     """
     run, steps = undisturbed
     row = run.result(steps[-1].checkpoint).row(2)
-    flown = simulate(reference_aircraft(), reference_flight(), TRAIN, model=row.batch).trajectory
+    flown = fly(reference_aircraft(), reference_flight(), TRAIN, model=row.batch).trajectory
     J = np.sum((flown.euler - TRAIN.euler) ** 2)
     assert row.J_train == pytest.approx(J, rel=1e-6)
 
@@ -174,7 +181,7 @@ def test_a_request_document_runs() -> None:
     """The body of POST /study is an identification's with a list of links; one to six if none is given."""
     request = identification("train_rate_0.8", search={"particles": 8, "generations": 1, "seed": 5})
     request["model"] = {"links_per_wing": [2, 1], "lattice": {"chordwise": 1, "spanwise": 4}}
-    run = study_from_document(request)
+    run = study_from_request(StudyRequest.parse(request))
     assert run.links == (2, 1)
     assert run.search.seed == 5
     *_, last = run.steps()
@@ -182,7 +189,7 @@ def test_a_request_document_runs() -> None:
     assert [row["links_per_wing"] for row in rows] == [1, 2], "rows rise, in whatever order they were asked"
     assert rows[0]["model"]["lattice"]["chordwise"] == 1
     del request["model"]
-    assert study_from_document(request).links == (1, 2, 3, 4, 5, 6)
+    assert study_from_request(StudyRequest.parse(request)).links == (1, 2, 3, 4, 5, 6)
 
 
 def test_bad_requests_name_the_field() -> None:
@@ -199,17 +206,17 @@ def test_bad_requests_name_the_field() -> None:
     for links, pointer in cases:
         request = identification("train_rate_0.8") | {"model": {"links_per_wing": links}}
         with pytest.raises(InvalidInput) as caught:
-            study_from_document(request)
+            study_from_request(StudyRequest.parse(request))
         assert caught.value.pointer == pointer
         assert caught.value.hint
     request = identification("train_rate_0.8")
     request["model"] = {"links_per_wing": [2, 6], "bounds": {"division": [0.2, 0.9]}}
     with pytest.raises(InvalidInput) as caught:
-        study_from_document(request)
-    assert caught.value.pointer == "/model/bounds/division", "six links have no room; two have"
+        study_from_request(StudyRequest.parse(request))
+    assert caught.value.pointer == "/model/bounds/division/0", "six links have no room; two have"
     for request in ([], {"model": []}, identification("train_rate_0.8") | {"thing": 1}):
         with pytest.raises(InvalidInput):
-            study_from_document(request)  # type: ignore[arg-type]
+            study_from_request(StudyRequest.parse(request))
 
 
 def test_a_foreign_checkpoint_is_refused(undisturbed: tuple[Study, list[Step]]) -> None:
@@ -237,7 +244,7 @@ def test_the_example_flights_want_few_links(seed: int) -> None:
     samples = [example(name) for name in ("rate_0.2", "rate_0.5", "rate_0.8")]
     samples.append(example("asymmetric", "held_out"))
     search = SearchSettings(seed=seed)
-    document = study(reference_aircraft(), reference_flight(), samples, search=search).to_document()
+    document = study(*reference_documents(), samples, search=search).to_document()
     for row in document["rows"]:
         print({name: value for name, value in row.items() if name not in ("fit", "model")})
     print(document["rigid"], document["recommended"])

@@ -15,6 +15,7 @@ from morphcore.identify.parameters import search_space
 from morphcore.identify.settings import search_settings
 from morphcore.models.equivalent import ParameterBatch, chain_model
 from morphcore.models.parameters_document import parameters_from_document
+from morphdata.identify import IdentifySearch
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 TWO = ModelSettings(links_per_wing=2)
@@ -131,10 +132,13 @@ def test_first_particles_of_a_swarm() -> None:
 
 def test_documents_say_what_to_begin_from() -> None:
     """A model or a whole result; with it the search looks at fewer candidates unless told how many."""
-    settings = search_settings({"warm_start": {"parameters": {"model": MODEL, "fit": []}}})
-    assert settings.warm_start is not None
-    assert (settings.screen, settings.starts) < (search_settings({}).screen, search_settings({}).starts)
-    assert search_settings({"warm_start": {"parameters": MODEL}, "particles": 500}).screen == 500
+    cold = search_settings(IdentifySearch())
+    for parameters in ({"model": MODEL, "fit": []}, MODEL):
+        settings = search_settings(IdentifySearch.parse({"warm_start": {"parameters": parameters}}))
+        assert settings.warm_start is not None
+        assert (settings.screen, settings.starts) < (cold.screen, cold.starts)
+    many = IdentifySearch.parse({"warm_start": {"parameters": MODEL}, "particles": 500})
+    assert search_settings(many).screen == 500
     with pytest.raises(InvalidInput) as error:
-        search_settings({"warm_start": {"parameters": {"links_per_wing": 2}}})
+        IdentifySearch.parse({"warm_start": {"parameters": {"links_per_wing": 2}}}, "/search")
     assert error.value.pointer.startswith("/search/warm_start")

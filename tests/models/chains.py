@@ -10,18 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.frames import quaternion_from_euler
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, load_aircraft, load_flight
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.multibody.dynamics import Motion
 from morphcore.simulate.batch import initial_state
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
 from morphcore.simulate.schedule import HingeMotion
+from morphdata.aircraft import Aircraft as AircraftDocument
+from morphdata.aircraft import load_aircraft
+from morphdata.flight import Flight as FlightDocument
+from morphdata.flight import load_flight
+from morphdata.lattice import Lattice
 
 Array = NDArray[np.float64]
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SMALL_LATTICE = LatticeSettings(chordwise=1, spanwise=3)  # where the air is not what a test is about
+SMALL_LATTICE = Lattice.model_construct(chordwise=1, spanwise=3)  # where the air is not what a test is about
 
 
 @dataclass(frozen=True)
@@ -59,14 +63,24 @@ class Swing:
         )
 
 
+def aircraft_of(document: dict[str, Any]) -> Aircraft:
+    """The aircraft of a document, resolved, which a test may change beyond a document's limits."""
+    return Aircraft.of(AircraftDocument.parse(document, "/aircraft"))
+
+
+def flight_of(document: dict[str, Any]) -> Flight:
+    """The same of a flight condition."""
+    return Flight.of(FlightDocument.parse(document, "/flight"))
+
+
 def example_aircraft() -> Aircraft:
     """The reference aircraft of the examples."""
-    return load_aircraft(EXAMPLES / "aircraft.json")
+    return Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json"))
 
 
 def example_flight() -> Flight:
     """Its flight condition."""
-    return load_flight(EXAMPLES / "flight.json")
+    return Flight.of(load_flight(EXAMPLES / "flight.json"))
 
 
 def airless(flight: Flight, *, gravity: float | None = None) -> Flight:
@@ -111,7 +125,7 @@ def odd_aircraft(rng: np.random.Generator) -> Aircraft:
             document["hinge"] = {"axis": axis, "position_m": position}
         return document
 
-    return aircraft_from_document(
+    return aircraft_of(
         {
             "name": "odd",
             "fuselage": {

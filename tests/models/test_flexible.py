@@ -11,11 +11,11 @@ import pytest
 from morphcore.aero.moving_lattice import MovingLattice
 from morphcore.aero.polar import steady_polar
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
 from morphcore.models.flexible import FlexibleModel, flexible_model
 from morphcore.multibody.beam import BeamWorkspace, NodePoses, node_forces, sections_of
-from tests.models.chains import EXAMPLES, example_aircraft, example_flight
+from tests.models.chains import EXAMPLES, aircraft_of, example_aircraft, example_flight
 
 NO_GRAVITY = np.zeros(3)
 
@@ -31,7 +31,7 @@ def odd_aircraft() -> Aircraft:
     tail.pop("hinge")
     tail |= {"name": "tail", "flexible": False, "position_m": [-2.0, 0.1, -0.2], "span_m": 0.8}
     document["surfaces"].append(tail)
-    return aircraft_from_document(document)
+    return aircraft_of(document)
 
 
 def unbent(model: FlexibleModel) -> NodePoses:

@@ -124,7 +124,7 @@ def test_a_refusal_names_the_option(
         raise WorkRefused("invalid_input", "it will not do", pointer=pointer, hint="do better")
 
     play_work(refuse)
-    ended = RUNNER.invoke(app, [*command(examples), "--seed", "3", "--json", "-"])
+    ended = RUNNER.invoke(app, [*command(examples), "--seed", "3", "--links", "3", "--json", "-"])
     assert ended.exit_code == Exit.INVALID_INPUT
     error = json.loads(ended.stderr.splitlines()[-1])
     assert (error["error"], error["pointer"], error["hint"]) == ("it will not do", pointer, "do better")

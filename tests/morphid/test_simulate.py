@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from morphcore import load_aircraft, load_flight, load_trajectory, simulate
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.schedule import ConstantRate
+from morphdata.lattice import Lattice
 from morphid.exits import Exit
 from morphid.main import app
 from tests.live import LiveService
@@ -46,7 +46,7 @@ def test_a_flight_is_the_librarys_and_a_sample_again(tmp_path: Path) -> None:
         dict.fromkeys(("left", "right"), ConstantRate(0.0, 0.6, 0.3)),
         model=parameters_from_document(PARAMETERS),
         duration_s=0.5,
-        lattice=LatticeSettings(1, 4),  # the command takes the one that stands beside the parameters
+        lattice=Lattice(chordwise=1, spanwise=4),  # the one that stands beside the parameters
     ).trajectory
     # nine digits are written
     np.testing.assert_allclose(written.euler, flown.euler, rtol=0.0, atol=1e-9)

@@ -15,7 +15,7 @@ from tests.identify.flights import reference_aircraft, reference_flight
 
 Array = NDArray[np.float64]
 
-SHORT = Morph(0.4, 0.8, settle_s=0.2)  # mean rate 0.5 rad/s
+SHORT = Morph(final_rad=0.4, duration_s=0.8, settle_s=0.2)  # mean rate 0.5 rad/s
 QUICK = ScheduleSearch(seed=3, screen=2, starts=2, iterations=2)
 
 

@@ -11,10 +11,12 @@ from scipy.optimize import minimize
 from morphcore.optimise.descent import first_descent, next_descent, probes_of
 from morphcore.optimise.ease import EaseState, next_ease
 from morphcore.optimise.limits import HELD, MorphSpace
-from morphcore.optimise.settings import Limits, Morph
 from morphcore.optimise.torque_limit import TorqueLimit, Trials
+from morphdata.optimize import Limits, Morph
 
-SPACE = MorphSpace(Morph(1.0, 2.0), Limits(1.0, 6.0), 2.0)
+SPACE = MorphSpace(
+    Morph(final_rad=1.0, duration_s=2.0), Limits(max_rate_rad_s=1.0, max_accel_rad_s2=6.0), 2.0
+)
 LATE = np.array([0.75, 0.85, 0.92, 0.97])  # beyond the limits of SPACE
 NO_LIMIT = TorqueLimit(None)
 
@@ -135,7 +137,11 @@ def test_starts_rest_when_they_stall_or_fall_behind():
 @pytest.mark.parametrize("knots", [4, 6, 12, 20])
 def test_probes_keep_the_limits_at_every_corner(knots):
     """Beside schedules at their limits there are probes that keep them, along every unknown."""
-    space = MorphSpace(Morph(1.0, 2.0, knots=knots), Limits(1.0, 8.0), 2.0)
+    space = MorphSpace(
+        Morph(final_rad=1.0, duration_s=2.0, knots=knots),
+        Limits(max_rate_rad_s=1.0, max_accel_rad_s2=8.0),
+        2.0,
+    )
     for point in space.drawn_back(np.random.default_rng(1).uniform(size=(6, space.dimension))):
         found = probes_of(space, point)
         assert found is not None

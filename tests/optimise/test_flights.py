@@ -12,13 +12,13 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.kernels.layout import LINKS_C
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
-from morphcore.optimise.settings import Weights
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import STEP_S, common_path
 from morphcore.simulate.schedule import ConstantRate, Spline
 from morphcore.stopping import Interrupted
 from morphcore.threads import thread_count, use_threads
+from morphdata.optimize import Weights
 from tests.identify.flights import reference_aircraft, reference_flight
+from tests.simulate.flights import fly
 
 SCHEDULES = (
     Spline(np.array([0.0, 0.2, 0.35, 0.6]), np.array([0.0, 0.1, 0.2, 0.4])),
@@ -54,7 +54,7 @@ def test_departures_are_those_of_the_simulator(flights):
     """
     flown = flights.fly(SCHEDULES, torque=False)
     for i, schedule in enumerate(SCHEDULES):
-        alone = simulate(
+        alone = fly(
             reference_aircraft(),
             reference_flight(),
             {"left": schedule, "right": schedule},
@@ -89,7 +89,7 @@ def test_weights_count_each_angle():
     rng = np.random.default_rng(0)
     departure = rng.normal(size=(4, 30, 3))
     flown = Flown(departure, np.zeros((4, 0)), np.zeros(4, dtype=bool))
-    weights = Weights(0.5, 2.0, 0.0)
+    weights = Weights(phi=0.5, theta=2.0, psi=0.0)
     expected = np.sum(departure**2 * np.array([0.5, 2.0, 0.0]), axis=(1, 2))
     np.testing.assert_allclose(flown.cost(weights), expected, rtol=1e-12)
     np.testing.assert_allclose(np.sum(flown.errors(weights) ** 2, axis=1), expected, rtol=1e-12)

@@ -8,21 +8,27 @@ import numpy as np
 import pytest
 
 from morphcore.optimise.limits import HELD, SHORTEST_PIECE, MorphSpace
-from morphcore.optimise.settings import Limits, Morph
+from morphdata.optimize import Limits, Morph
 from tests.optimise.morphs import sampled
 
 SPACES = [
-    MorphSpace(Morph(final, 2.0, initial_rad=0.1, knots=knots, free_values=free), limits, 2.0, -0.4, 1.3)
+    MorphSpace(
+        Morph(final_rad=final, duration_s=2.0, initial_rad=0.1, knots=knots, free_values=free),
+        limits,
+        2.0,
+        -0.4,
+        1.3,
+    )
     for (final, knots), free, limits in product(
         ((1.1, 7), (-0.9, 4)),
         (False, True),
         (
-            Limits(1.0),
-            Limits(1.2, 6.0),
-            Limits(None, 3.0),
+            Limits(max_rate_rad_s=1.0),
+            Limits(max_rate_rad_s=1.2, max_accel_rad_s2=6.0),
+            Limits(max_accel_rad_s2=3.0),
             Limits(),
-            Limits(1.0, monotonic=False),
-            Limits(1.2, 5.0, monotonic=False),
+            Limits(max_rate_rad_s=1.0, monotonic=False),
+            Limits(max_rate_rad_s=1.2, max_accel_rad_s2=5.0, monotonic=False),
         ),
     )
 ]
@@ -125,7 +131,7 @@ def test_the_quickest_morph_is_slower_than_the_trapezoid_and_feasible(space):
 
 def test_waiting_schedules_wait():
     """The first shapes of a search: at constant rate between ramps, after a wait."""
-    space = MorphSpace(Morph(1.0, 2.0, knots=8, free_values=True), Limits(), 2.0)
+    space = MorphSpace(Morph(final_rad=1.0, duration_s=2.0, knots=8, free_values=True), Limits(), 2.0)
     points = space.waiting((0.4,))
     assert np.all((points >= 0.0) & (points <= 1.0))
     # the quickest ramp: six tenths of the time for one, the knots on a straight line but for the corners
@@ -135,7 +141,7 @@ def test_waiting_schedules_wait():
 
 def test_the_last_angle_is_exact():
     """A schedule ends at the angle that was asked for, not beside it by round-off."""
-    space = MorphSpace(Morph(0.7, 1.1, initial_rad=0.1, knots=7), Limits(), 1.1)
+    space = MorphSpace(Morph(final_rad=0.7, duration_s=1.1, initial_rad=0.1, knots=7), Limits(), 1.1)
     schedule = space.schedule(space.centre)
     assert schedule.knot_angle_rad[0] == 0.1
     assert schedule.knot_angle_rad[-1] == 0.7

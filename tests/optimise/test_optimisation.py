@@ -30,12 +30,13 @@ from morphcore.optimise import optimisation as module
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.state import decode
-from morphcore.simulate.flight import FlightStep, simulate
+from morphcore.simulate.flight import FlightStep
 from morphcore.simulate.schedule import Spline
 from morphcore.simulate.step_choice import choose_step
 from morphcore.swarm import SwarmSettings
-from tests.identify.flights import EXAMPLES, reference_aircraft, reference_flight
+from tests.identify.flights import EXAMPLES, reference_aircraft, reference_documents, reference_flight
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
+from tests.simulate.flights import fly
 
 SWARM = ScheduleSearch(method="pso", seed=3, swarm=SwarmSettings(particles=6, generations=3))
 TORQUE = Limits(max_rate_rad_s=0.9, max_hinge_torque_nm=560.0)  # the centre of the limits needs more
@@ -49,7 +50,7 @@ def without_times(document: dict[str, Any]) -> dict[str, Any]:
 
 def by_simulation(schedule: Any, model: Any, end_s: float) -> np.ndarray:
     """Departures (k, 3) of a schedule flown by the simulator's front door."""
-    flown = simulate(
+    flown = fly(
         reference_aircraft(),
         reference_flight(),
         {"left": schedule, "right": schedule},
@@ -65,7 +66,10 @@ def test_the_papers_problem_is_solved_20_per_cent_below_constant_rate() -> None:
     Found by a search of three starts with two links; the limits hold in 20,000 samples of the schedule.
     """
     run = optimisation(
-        Morph(1.0, 2.0), Limits(1.0), links=2, search=ScheduleSearch(screen=2, starts=2, iterations=3)
+        Morph(final_rad=1.0, duration_s=2.0),
+        Limits(max_rate_rad_s=1.0),
+        links=2,
+        search=ScheduleSearch(screen=2, starts=2, iterations=3),
     )
     result = run.result(last(run).checkpoint)
     reduction, model = result.reduction()
@@ -80,7 +84,11 @@ def test_the_papers_problem_is_solved_20_per_cent_below_constant_rate() -> None:
 
 @pytest.mark.parametrize(
     ("search", "limits"),
-    [(QUICK, Limits(0.9, 4.0)), (SWARM, TORQUE), (QUICK, Limits(None, 5.0, monotonic=False))],
+    [
+        (QUICK, Limits(max_rate_rad_s=0.9, max_accel_rad_s2=4.0)),
+        (SWARM, TORQUE),
+        (QUICK, Limits(max_accel_rad_s2=5.0, monotonic=False)),
+    ],
 )
 def test_every_flown_candidate_keeps_the_limits(
     search: ScheduleSearch, limits: Limits, monkeypatch: pytest.MonkeyPatch
@@ -110,8 +118,8 @@ def test_every_flown_candidate_keeps_the_limits(
 @pytest.mark.parametrize(
     ("search", "limits", "cuts"),
     [
-        (QUICK, Limits(0.9), (0.0, 0.5, 0.8)),
-        (SWARM, Limits(0.9), (0.0, 0.5)),
+        (QUICK, Limits(max_rate_rad_s=0.9), (0.0, 0.5, 0.8)),
+        (SWARM, Limits(max_rate_rad_s=0.9), (0.0, 0.5)),
         pytest.param(QUICK, TORQUE, (0.15,), marks=pytest.mark.slow),
     ],
 )
@@ -211,7 +219,7 @@ def test_time_budget_is_shared_between_the_searches() -> None:
 @pytest.mark.slow
 def test_free_values_are_no_worse_than_fixed_ones() -> None:
     """With the angles at the knots free too, the best schedule disturbs less."""
-    limits = Limits(0.9, 6.0)
+    limits = Limits(max_rate_rad_s=0.9, max_accel_rad_s2=6.0)
     search = ScheduleSearch(seed=1, screen=2, starts=2, iterations=5)
     fixed, free = (
         last(optimisation(replace(SHORT, free_values=free), limits, search=search)).best_cost
@@ -235,7 +243,7 @@ def test_a_torque_that_no_schedule_keeps_is_an_error_with_a_way_out() -> None:
 
 def test_minimum_time_agrees_with_the_front() -> None:
     """The shortest morph below a variation of the front is that point of it, or a shorter one."""
-    limits = Limits(0.9, 6.0)
+    limits = Limits(max_rate_rad_s=0.9, max_accel_rad_s2=6.0)
     front_run = optimisation(replace(SHORT, goal="pareto", front_points=2), limits)
     front = front_run.result(last(front_run).checkpoint).to_document()
     times = [point["duration_s"] for point in front["searched"]]
@@ -278,7 +286,7 @@ class FlexibleDouble:
             yield FlightStep(quarter / 4)
         if self.diverges:
             raise FlightDiverged(time_s=0.3)
-        yield FlightStep(1.0, simulate(*args, model="rigid", **options))
+        yield FlightStep(1.0, fly(*args, model="rigid", **options))
 
 
 @pytest.fixture
@@ -345,9 +353,7 @@ def test_one_parameter_set_is_needed() -> None:
     """A batch of several models is not one model to optimise with."""
     guess = physical_guess(chain_model(reference_aircraft(), reference_flight(), 2))
     with pytest.raises(InvalidInput) as caught:
-        optimise_schedule(
-            reference_aircraft(), reference_flight(), guess.select(np.array([0, 0])), morph=SHORT
-        )
+        optimise_schedule(*reference_documents(), guess.select(np.array([0, 0])), morph=SHORT)
     assert caught.value.pointer == "/model/parameters"
 
 
@@ -357,8 +363,9 @@ def test_the_number_of_threads_does_not_change_the_answer() -> None:
     code = (
         "import json;"
         "from tests.optimise.test_settings import request;"
-        "from morphcore.optimise import optimisation_from_document as begin;"
-        "run = begin(request(), {threads}); *_, step = run.steps();"
+        "from morphcore.optimise import optimisation_from_request as begin;"
+        "from morphdata.optimize import OptimizeRequest;"
+        "run = begin(OptimizeRequest.parse(request()), {threads}); *_, step = run.steps();"
         "found = run.result(step.checkpoint).to_document();"
         "print(json.dumps([found['schedule'], found['variation']]))"
     )
@@ -386,7 +393,10 @@ def test_the_papers_problem_in_the_flexible_model() -> None:
     """With three links the default search ends a quarter below constant rate in the flexible model too."""
     parameters = physical_guess(chain_model(reference_aircraft(), reference_flight(), 3))
     result = optimise_schedule(
-        reference_aircraft(), reference_flight(), parameters, morph=Morph(1.0, 2.0), limits=Limits(1.0)
+        *reference_documents(),
+        parameters,
+        morph=Morph(final_rad=1.0, duration_s=2.0),
+        limits=Limits(max_rate_rad_s=1.0),
     )
     reduction, model = result.reduction()
     assert model == "flexible"
@@ -398,7 +408,7 @@ def test_the_papers_problem_in_the_flexible_model() -> None:
 @pytest.mark.slow
 def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
     """The paper's 50 particles, 20 generations of them, do not find better than the descent's few flights."""
-    morph, limits = Morph(1.0, 2.0), Limits(1.0)
+    morph, limits = Morph(final_rad=1.0, duration_s=2.0), Limits(max_rate_rad_s=1.0)
     swarm = ScheduleSearch(method="pso", swarm=SwarmSettings(particles=50, generations=20))
     steps = {
         search.method: last(optimisation(morph, limits, links=2, search=search))
@@ -411,7 +421,7 @@ def test_the_default_search_is_no_worse_than_the_papers_swarm() -> None:
 
 def test_the_step_holds_for_both_models() -> None:
     """The step is the longest with which both models fly the constant rate well enough, or the given one."""
-    jerk, limits = Morph(1.0, 0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
+    jerk, limits = Morph(final_rad=1.0, duration_s=0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
     run = optimisation(jerk, limits, links=2)
     flight = [run.constant(jerk.duration_s)] * len(run.aircraft.surfaces), run.times_s
     alone = {}

@@ -13,12 +13,21 @@ from morphcore.paper.scenario import (
     FLIGHT,
     HELD_BEFORE_S,
     RAMP_S,
+    PaperFlight,
     aircraft,
     flight,
     paper_flights,
     two_second_flight,
 )
+from morphcore.simulate.schedule import Schedule, scheduled
 from morphcore.simulate.trajectory import load_trajectory
+
+
+def moved(flight: PaperFlight) -> Schedule:
+    """What both hinges do."""
+    both = flight.schedules().both
+    assert both is not None
+    return scheduled(both)
 
 
 def test_the_aircraft_is_that_of_the_examples(examples: Path) -> None:
@@ -43,7 +52,7 @@ def test_fitted_flights_sweep_as_the_sample_files(examples: Path, name: str) -> 
     """
     sample = load_trajectory(examples / f"train_{name}.csv")
     each = next(each for each in paper_flights() if each.name == name)
-    apart = np.abs(each.schedules()["right"].motion(sample.time_s).angle - sample.sweep_right)
+    apart = np.abs(moved(each).motion(sample.time_s).angle - sample.sweep_right)
     since = sample.time_s - HELD_BEFORE_S
     end = each.schedule["duration_s"]
     in_ramp = ((since > 0.0) & (since < RAMP_S)) | ((since > end - RAMP_S) & (since < end))
@@ -57,6 +66,5 @@ def test_six_flights_as_the_paper_has_them() -> None:
     flights = paper_flights()
     assert [each.role for each in flights] == ["train"] * 3 + ["held_out"] * 3
     for each in (*flights, two_second_flight()):
-        for schedule in each.schedules().values():
-            assert schedule.motion([each.duration_s]).angle[0] == pytest.approx(1.0)
+        assert moved(each).motion([each.duration_s]).angle[0] == pytest.approx(1.0)
     assert two_second_flight().duration_s == 2.0

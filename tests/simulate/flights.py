@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from morphcore.models.equivalent import (
     physical_guess,
 )
 from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.flight import Simulation, flight_steps
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule, Tabulated
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
@@ -101,3 +103,9 @@ def steps(duration_s: float, step_s: float) -> TimeGrid:
 def plan_of(model: ChainModel, schedules: Sequence[Schedule], duration_s: float, step_s: float) -> FlightPlan:
     """A plan of equal steps from zero."""
     return flight_plan(model, schedules, steps(duration_s, step_s))
+
+
+def fly(*conditions: Any, **options: Any) -> Simulation:
+    """`simulate` for a resolved aircraft and flight, which a test may change beyond a document's limits."""
+    steps = flight_steps(*conditions, **options)
+    return next(step.simulation for step in steps if step.simulation is not None)

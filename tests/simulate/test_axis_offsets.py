@@ -14,19 +14,19 @@ import pytest
 from numpy.typing import NDArray
 
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.flexible import flexible_model
 from morphcore.models.tree import chain_tree
 from morphcore.simulate.flexible import FlexibleFlight, hinge_path
 from morphcore.simulate.flexible_trim import trim_flexible
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.trim import trim
+from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from tests.aero.link_loads import edge_loads
 from tests.models.chains import SMALL_LATTICE, airless, example_aircraft, example_flight, instant
 from tests.multibody.mujoco_flight import MujocoTree
+from tests.simulate.flights import fly
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def offset_aircraft(*, elastic_m: float, mass_m: float, heavy: bool = False) -> 
 def stiffened(aircraft: Aircraft, modulus_pa: float) -> Aircraft:
     """The same with wings of another material."""
     surfaces = tuple(
-        replace(surface, material=replace(surface.material, youngs_modulus_pa=modulus_pa))
+        replace(surface, material=surface.material.model_copy(update={"youngs_modulus_pa": modulus_pa}))
         for surface in aircraft.surfaces
     )
     return replace(aircraft, surfaces=surfaces)
@@ -85,7 +85,7 @@ def chain_twists(model: ChainModel, sweep_rad: float) -> Array:
 
 
 def beam_twists(
-    aircraft: Aircraft, flight: Flight, sweep_rad: float, lattice: LatticeSettings = SMALL_LATTICE
+    aircraft: Aircraft, flight: Flight, sweep_rad: float, lattice: Lattice = SMALL_LATTICE
 ) -> Array:
     """The same of the flexible model: the rotation of its tip nodes against their roots."""
     model = flexible_model(aircraft, flight, elements=10, lattice=lattice)
@@ -196,7 +196,7 @@ def test_a_push_ahead_of_the_centre_of_mass_pitches_up(model: str) -> None:
         + fuselage.mass_kg * (behind**2 + fuselage.centre_of_mass_B[2] ** 2)
         + wing_kg * ((0.3**2 + 0.1**2) / 12.0 + (aft_m - behind) ** 2)
     )
-    flown = simulate(
+    flown = fly(
         aircraft, flight, [Hold(), Hold()], model=model, duration_s=0.05, output_step_s=0.01,  # type: ignore[arg-type]
         step_s=1e-3, start="given", lattice=SMALL_LATTICE,
     ).trajectory  # fmt: skip

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
-from morphcore.geometry.lattice import CORE_LAWS, LatticeSettings, VortexCore
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.multibody.dynamics import forward_dynamics_crba
 from morphcore.simulate.fresh import FreshModel, fly_fresh
 from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.trim import trim
+from morphdata.lattice import CORE_LAWS, Lattice, VortexCore
 from tests.models.chains import example_aircraft, example_flight, instant, random_batch
 from tests.simulate.flights import (
     SAMPLES,
@@ -79,7 +79,7 @@ def test_both_trims_agree(law):
 
     With either core: the two laws are 8 per cent apart in alpha.
     """
-    chosen = LatticeSettings(core=VortexCore(law))
+    chosen = Lattice(core=VortexCore(law=law))
     model = chain_model(example_aircraft(), example_flight(), 3, chosen)
     fresh, _ = FreshModel(model, physical_guess(model)).trimmed(np.zeros(2))
     fast = trim(model, physical_guess(model), plan_of(model, [Hold(), Hold()], 0.1, 0.01)).require()
@@ -103,7 +103,7 @@ def test_given_start():
 
 def test_fresh_flight_is_of_second_order():
     """Halving the fresh flight's own step divides its error by about four; at 5 ms it is below 0.1 mrad."""
-    model = chain_model(example_aircraft(), example_flight(), 2, LatticeSettings(chordwise=1, spanwise=4))
+    model = chain_model(example_aircraft(), example_flight(), 2, Lattice(chordwise=1, spanwise=4))
     fresh = FreshModel(model, physical_guess(model))
     start, state = fresh.trimmed(np.zeros(2))
     schedules = [sample_schedules("train_rate_0.8")[0], Hold()]
@@ -122,7 +122,7 @@ def test_fresh_flight_is_of_second_order():
 
 def test_wind_carries_the_fresh_flight_along():
     """In steady wind the aircraft flies as in still air, seen from the air."""
-    calm = chain_model(example_aircraft(), example_flight(), 2, LatticeSettings(chordwise=1, spanwise=4))
+    calm = chain_model(example_aircraft(), example_flight(), 2, Lattice(chordwise=1, spanwise=4))
     blown = replace(calm, flight=replace(calm.flight, wind_N=np.array([5.0, -3.0, 1.0])))
     schedules, grid = sample_schedules("train_asymmetric"), time_grid(np.linspace(0.0, 0.5, 51))
     places, attitudes = [], []

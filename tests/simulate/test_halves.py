@@ -11,17 +11,17 @@ import pytest
 from morphcore.aero.operator import lattice_operator
 from morphcore.bench import benchmark_swarm
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, aircraft_from_document
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.mirror import mirror_of
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import whole_joints
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import common_path, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trim import trim
-from tests.models.chains import example_aircraft, example_flight
-from tests.simulate.flights import example_model, sample, sample_schedules, steps
+from morphdata.environment import Environment, Gust
+from tests.models.chains import aircraft_of, example_aircraft, example_flight
+from tests.simulate.flights import example_model, fly, sample, sample_schedules, steps
 
 # sums in another order, over hundreds of steps of an aircraft that leaves its trim by itself
 ROUND_OFF_RAD = 1e-10
@@ -47,7 +47,7 @@ def tailed(**change: Any) -> Aircraft:
     )
     for part in (left_tail, right_tail):
         part.pop("hinge")
-    return aircraft_from_document(
+    return aircraft_of(
         {
             "fuselage": {"length_m": 4.0, "width_m": 0.5, "height_m": 0.5, "density_kg_m3": 120.0},
             "surfaces": [wing("left"), left_tail, wing("right") | change, right_tail],
@@ -103,12 +103,10 @@ def test_a_single_flight_tells_of_both_halves() -> None:
 
     A gust of no strength keeps the simulator from halving.
     """
-    from morphcore.aero.environment import CosineGust, Environment
-
     aircraft, schedule = tailed(), ConstantRate(0.0, 0.3, 0.5, start_s=0.05)
-    still = Environment(gust=CosineGust(0.0, 10.0))
+    still = Environment(gust=Gust(amplitude_m_s=0.0, gradient_m=10.0))
     half, whole = (
-        simulate(
+        fly(
             aircraft,
             replace(example_flight(), airspeed_m_s=70.0, start=None),
             {"left": schedule, "right": schedule},

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore import simulate
-from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.errors import InvalidInput, TrimNotFound
-from morphcore.geometry.lattice import LatticeSettings
 from morphcore.models.equivalent import physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.simulate.plan import STEP_S
@@ -19,8 +16,12 @@ from morphcore.simulate.request import attitude_variation, simulation_from_docum
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Interrupted
+from morphdata.environment import Environment
+from morphdata.lattice import Lattice
+from morphdata.parameters import FlownWith, flown_with
+from morphdata.simulate import SimulateRequest
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight
-from tests.simulate.flights import example_model
+from tests.simulate.flights import example_model, fly
 
 MORPH = {"kind": "constant_rate", "final_rad": 0.5, "duration_s": 0.4, "start_s": 0.05}
 COARSE = {"chordwise": 1, "spanwise": 4}
@@ -46,7 +47,7 @@ def parameters(links: int = 2) -> dict[str, Any]:
 @pytest.mark.parametrize("kind", ["rigid", "equivalent", "flexible"])
 def test_a_request_flies_what_the_library_flies(kind: str) -> None:
     """Each model flown by request gives the trajectory of `simulate` with the same arguments, to the bit."""
-    lattice = LatticeSettings(1, 4)
+    lattice = Lattice(chordwise=1, spanwise=4)
     model = {"kind": kind, "lattice": COARSE}
     choice: Any = kind
     options: dict[str, Any] = {}
@@ -59,7 +60,7 @@ def test_a_request_flies_what_the_library_flies(kind: str) -> None:
     run = simulation_from_document(request(model=model))
     flown = run.result().trajectory
     schedule = ConstantRate(0.0, 0.5, 0.4, start_s=0.05)
-    direct = simulate(
+    direct = fly(
         example_aircraft(), example_flight(), {"left": schedule, "right": schedule}, model=choice,
         duration_s=0.5, lattice=lattice, **options,
     ).trajectory  # fmt: skip
@@ -114,18 +115,18 @@ def test_the_variation_does_not_hang_on_the_rows() -> None:
 
 def test_identified_parameters_fly_with_what_they_were_identified_with() -> None:
     """Lattice, step and start stand beside an identification's parameters; the request may overrule them."""
+
+    def flown(**model: Any) -> FlownWith:
+        return flown_with(SimulateRequest.parse(request(model={"kind": "equivalent", **model})).model)
+
     given = parameters()
-    model = simulation_from_document(request(model={"kind": "equivalent", "parameters": given})).model
-    assert (model.lattice, model.step_s, model.start) == (LatticeSettings(1, 4), 0.01, "trim")
-    whole = {"model": given, "fit": []}
-    again = simulation_from_document(request(model={"kind": "equivalent", "parameters": whole})).model
-    assert again.lattice == model.lattice
-    over = {"kind": "equivalent", "parameters": given, "lattice": {"chordwise": 2}, "step_s": 0.002}
-    model = simulation_from_document(request(model=over)).model
-    assert (model.lattice, model.step_s) == (LatticeSettings(2, 10), 0.002)
+    coarse = Lattice(chordwise=1, spanwise=4)
+    assert flown(parameters=given) == FlownWith(coarse, 0.01, "trim")
+    assert flown(parameters={"model": given, "fit": []}) == FlownWith(coarse, 0.01, "trim")
+    over = flown(parameters=given, lattice={"chordwise": 2}, step_s=0.002)
+    assert over == FlownWith(Lattice(chordwise=2), 0.002, "trim")
     bare = {name: value for name, value in given.items() if name not in ("lattice", "step_s", "start")}
-    model = simulation_from_document(request(model={"kind": "equivalent", "parameters": bare})).model
-    assert (model.lattice, model.step_s) == (LatticeSettings(), None)
+    assert flown(parameters=bare) == FlownWith(Lattice(), None, "trim")
 
 
 def test_the_air_is_read() -> None:
@@ -136,8 +137,7 @@ def test_the_air_is_read() -> None:
         "seed": 4,
     }
     run = simulation_from_document(request(environment=air))
-    gust = CosineGust(5.0, 30.0, 0.1, (0.0, 1.0, 0.0))
-    assert run.environment == Environment(gust, DrydenTurbulence(7.7, 1.5))
+    assert run.request.environment == Environment.parse(air)
     phi = run.result().trajectory.phi
     assert np.abs(phi).max() > 1e-4, "a gust from the side rolls the aircraft"
     np.testing.assert_array_equal(
@@ -145,7 +145,8 @@ def test_the_air_is_read() -> None:
     )
     other = simulation_from_document(request(environment=air | {"seed": 5})).result().trajectory.phi
     assert np.abs(other - phi).max() > 1e-6
-    assert simulation_from_document(request(environment={})).environment is None
+    still = simulation_from_document(request(environment={})).result().trajectory
+    np.testing.assert_array_equal(still.theta, simulation_from_document(request()).result().trajectory.theta)
 
 
 def test_steps_tell_how_far_it_is() -> None:
@@ -179,8 +180,8 @@ def test_what_cannot_fly_says_so() -> None:
     ("change", "pointer"),
     [
         ({"aircraft": {}}, "/aircraft/fuselage"),
-        ({"model": {}}, "/model/kind"),
-        ({"model": {"kind": "stiff"}}, "/model/kind"),
+        ({"model": {}}, "/model"),
+        ({"model": {"kind": "stiff"}}, "/model"),
         ({"model": {"kind": "equivalent"}}, "/model/parameters"),
         (
             {"model": {"kind": "equivalent", "parameters": {"links_per_wing": 2}}},
@@ -193,10 +194,10 @@ def test_what_cannot_fly_says_so() -> None:
         ({"model": {"kind": "rigid", "step_s": 1.0}}, "/model/step_s"),
         ({"model": {"kind": "rigid", "start": "anywhere"}}, "/model/start"),
         ({"schedules": {"left": {"kind": "hold"}}}, "/schedules/right"),
-        ({"schedules": {"both": {"kind": "hold", "angle_rad": 1.5}}}, "/schedules/both"),
+        ({"schedules": {"both": {"kind": "hold", "angle_rad": 1.5}}}, "/schedules/both/angle_rad"),
         (
             {"schedules": {"left": {"kind": "hold"}, "right": MORPH | {"final_rad": 1.4}}},
-            "/schedules/right",
+            "/schedules/right/final_rad",
         ),
         ({"duration_s": 0.0}, "/duration_s"),
         ({"duration_s": None}, "/duration_s"),

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from morphcore.aero.environment import CosineGust, DrydenTurbulence, Environment
 from morphcore.frames import wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.step_choice import CANDIDATES_S, TOLERANCE_RAD, busiest_part, choose_step
+from morphdata.environment import Environment, Gust, Turbulence
 from tests.models.chains import example_aircraft, example_flight
-from tests.simulate.flights import example_model, fly_trimmed, plan_of, sample, sample_schedules
+from tests.simulate.flights import example_model, fly, fly_trimmed, plan_of, sample, sample_schedules
 
 SLOW = [ConstantRate(0.0, 0.3, 0.5, ramp_s=0.2)] * 2
 # one wing jerks through 0.5 rad: its ramps last two steps of 10 ms
@@ -102,7 +101,7 @@ def test_a_flight_chooses_its_step():
     """A flight of which nobody gives the step holds 1e-4 rad where 10 ms do not; a given step stands."""
 
     def flown(**options):
-        return simulate(example_aircraft(), example_flight(), HARD, duration_s=0.6, **options)
+        return fly(example_aircraft(), example_flight(), HARD, duration_s=0.6, **options)
 
     fine = flown(step_s=CANDIDATES_S[-1] / 8).trajectory.euler
     chosen, given = flown(), flown(step_s=CANDIDATES_S[0])
@@ -112,9 +111,12 @@ def test_a_flight_chooses_its_step():
 
 def test_turbulence_does_not_choose():
     """The step is that of the smooth air: the same seed of turbulence gives the same air as a given step."""
-    air = Environment(CosineGust(3.0, 20.0, 0.1), DrydenTurbulence(5.0, 1.0))
+    air = Environment(
+        gust=Gust(amplitude_m_s=3.0, gradient_m=20.0, start_s=0.1),
+        turbulence=Turbulence(wind_20ft_m_s=5.0, sigma_high_m_s=1.0),
+    )
     both = [
-        simulate(
+        fly(
             example_aircraft(),
             example_flight(),
             SLOW,

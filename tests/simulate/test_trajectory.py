@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput
-from morphcore.simulate.trajectory import load_trajectory, trajectory_from_document
+from morphcore.simulate.trajectory import Trajectory, load_trajectory
+from morphdata.samples import InlineSample
 from tests.models.chains import EXAMPLES
 
 HEADER = "t,sweep_left,sweep_right,phi,theta,psi"
@@ -89,7 +90,7 @@ def test_a_file_that_is_not_there(tmp_path):
 
 def test_documents():
     """Inline samples are read with their role and weight."""
-    flown = trajectory_from_document(document(role="held_out", weight=2.0), "/samples/0")
+    flown = Trajectory.of(InlineSample.parse(document(role="held_out", weight=2.0), "/samples/0"))
     assert (flown.role, flown.weight, flown.name) == ("held_out", 2.0, "one")
     np.testing.assert_array_equal(flown.sweep_left, [0.0, 0.1, 0.2])
 
@@ -109,5 +110,5 @@ def test_documents():
 def test_broken_documents_point_to_the_field(changes, pointer):
     """Unequal lengths, NaN, falling time, unknown words and fields: a JSON pointer to the place."""
     with pytest.raises(InvalidInput) as caught:
-        trajectory_from_document(document(**changes), "/samples/0")
+        InlineSample.parse(document(**changes), "/samples/0")
     assert caught.value.pointer.startswith(pointer)

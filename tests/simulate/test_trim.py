@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput, TrimNotFound
-from morphcore.geometry.lattice import LatticeSettings, VortexCore
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import tip_positions
@@ -17,6 +16,7 @@ from morphcore.multibody.dynamics import Acceleration, inverse_dynamics
 from morphcore.simulate.batch import state_rates
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import SLAB, trim, trimmed_state
+from morphdata.lattice import Lattice, VortexCore
 from tests.models.chains import (
     airless,
     example_aircraft,
@@ -108,7 +108,7 @@ def test_the_samples_trim_is_that_of_a_smoothed_core(law, low, high):
     flight's start; 0.0692 rad with the thin one, 11 per cent above it. More links take another per cent off.
     """
     flight = example_flight()
-    chosen = LatticeSettings(core=VortexCore(law))
+    chosen = Lattice(core=VortexCore(law=law))
     model = chain_model(example_aircraft(), flight, 8, chosen)
     found = trim(model, physical_guess(model), instant(model, np.zeros((2, 3)))).require()
     assert low < found.alpha[0] / flight.start.alpha_rad - 1 < high

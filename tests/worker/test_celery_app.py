@@ -12,7 +12,7 @@ import pytest
 from app.settings import load_settings
 from worker import celery_app
 from worker.celery_app import make_app
-from worker.hints import QUEUE, REAP, RUN_JOB
+from worker.hints import REAP
 
 
 def test_messages_are_hints() -> None:
@@ -70,10 +70,3 @@ def test_the_reaper_runs_often_enough() -> None:
     assert schedule["task"] == REAP
     assert settings.lease_s + schedule["schedule"] <= 75.0
     assert schedule["options"]["expires"] > 3 * 3600.0, "a worker whose clock is hours wrong still takes part"
-
-
-def test_app_and_worker_agree_on_names() -> None:
-    """The API publishes the task that the worker knows, on the queue that it listens to."""
-    from app.jobs import queue
-
-    assert (queue.TASK_NAME, queue.QUEUE_NAME) == (RUN_JOB, QUEUE)

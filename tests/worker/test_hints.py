@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from celery import Celery
 
+from app.jobs.queue import QUEUE, RUN_JOB
 from tests.faults.malformed import HARMFUL, MALFORMED, envelope
-from worker.hints import LONGEST_BYTES, QUEUE, REAP, RUN_JOB, Hint, read_hint
+from worker.hints import LONGEST_BYTES, REAP, Hint, read_hint
 from worker.transport import Dropped
 
 

@@ -1,4 +1,4 @@
-"""The vigil over a running job."""
+"""The lease keeper of a running job."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.database import Database
 from app.jobs.store import claim_job, request_cancel
 from tests.waiting import until
 from tests.worker.conftest import OWNER, Queue
-from worker.lease import StopReason, Vigil
+from worker.lease import LeaseKeeper, StopReason
 from worker.runner import never
 
 
@@ -20,7 +20,7 @@ def test_work_that_never_stops_ends_its_process(queue: Queue, database: Database
     with database.write() as connection:
         claim = claim_job(connection, job_id, "test")
     assert claim is not None
-    vigil = Vigil(
+    keeper = LeaseKeeper(
         database,
         claim,
         lease_s=60.0,
@@ -30,13 +30,13 @@ def test_work_that_never_stops_ends_its_process(queue: Queue, database: Database
         on_stuck=ended.set,
         stuck_after_s=0.4,
     )
-    with vigil:
+    with keeper:
         with database.write() as connection:
             request_cancel(connection, OWNER, job_id)
         began = time.monotonic()
         assert ended.wait(5.0)
         assert time.monotonic() - began >= 0.4, "not before its patience is over"
-        assert vigil.reason is StopReason.CANCEL
+        assert keeper.reason is StopReason.CANCEL
 
 
 def test_work_that_stops_in_time_is_left_alone(queue: Queue, database: Database) -> None:
@@ -46,7 +46,7 @@ def test_work_that_stops_in_time_is_left_alone(queue: Queue, database: Database)
     with database.write() as connection:
         claim = claim_job(connection, job_id, "test")
     assert claim is not None
-    vigil = Vigil(
+    keeper = LeaseKeeper(
         database,
         claim,
         lease_s=60.0,
@@ -56,10 +56,10 @@ def test_work_that_stops_in_time_is_left_alone(queue: Queue, database: Database)
         on_stuck=ended.set,
         stuck_after_s=0.4,
     )
-    with vigil:
-        while not vigil.should_stop():
+    with keeper:
+        while not keeper.should_stop():
             time.sleep(0.01)
-        assert vigil.reason is StopReason.SHUTDOWN
+        assert keeper.reason is StopReason.SHUTDOWN
     assert not ended.wait(0.6)
 
 
@@ -71,9 +71,11 @@ def test_a_vanished_job_stops_the_work(queue: Queue, database: Database) -> None
     with database.write() as connection:
         claim = claim_job(connection, job_id, "test")
     assert claim is not None
-    vigil = Vigil(database, claim, lease_s=60.0, heartbeat_s=10.0, shutting_down=never, look_every_s=0.05)
-    with vigil:
+    keeper = LeaseKeeper(
+        database, claim, lease_s=60.0, heartbeat_s=10.0, shutting_down=never, look_every_s=0.05
+    )
+    with keeper:
         with database.write() as connection:
             connection.execute(jobs.delete().where(jobs.c.id == job_id))
-        until(vigil.should_stop, 5.0)
-        assert vigil.reason is StopReason.LOST
+        until(keeper.should_stop, 5.0)
+        assert keeper.reason is StopReason.LOST

@@ -18,8 +18,9 @@ from app.jobs.records import JobStatus
 from app.jobs.store import claim_job, request_cancel
 from app.tables import artifacts, job_events, job_results
 from tests.worker.conftest import FAILURES, OWNER, Queue, Walk
-from worker.attempt import Attempt, Ending
+from worker.attempt import Ending
 from worker.operations import WorkRefused
+from worker.retry import Retry
 from worker.runner import Runner
 
 MakeRunner = Callable[..., Runner]
@@ -217,18 +218,18 @@ def test_a_database_that_restarts_is_waited_for(
     """Two refused connections cost a pause each, not the job."""
     job_id = queue.add(steps=3)
     pauses: list[float] = []
-    begin = Attempt._persist
+    real = Retry.write
 
-    def flaky(self: Attempt, write: Callable[..., bool], **how: bool) -> None:
+    def flaky(self: Retry, write: Callable[..., bool], **how: bool) -> None:
         def refuse_twice(connection: Any) -> bool:
             if len(pauses) < 2:
                 raise OperationalError("UPDATE", {}, Exception("the database is starting up"))
             return write(connection)
 
         self._sleep = pauses.append
-        begin(self, refuse_twice, **how)
+        real(self, refuse_twice, **how)
 
-    monkeypatch.setattr(Attempt, "_persist", flaky)
+    monkeypatch.setattr(Retry, "write", flaky)
     assert make_runner().run_next() == (Ending.SUCCEEDED, job_id)
     assert pauses == [0.5, 1.0]
 

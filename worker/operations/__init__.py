@@ -1,9 +1,8 @@
-"""What a worker can do, as data: the name of an operation and where its work begins.
+"""The work of the operations: what each has to offer a worker, and where it begins.
 
-An operation is one function ``begin(request, threads) -> Work``. To add one, write a module with such a
-function and name it in `OPERATIONS`; nothing else in the worker changes. Modules are imported on first use,
-so that the pool's parent process never loads the compiler; for the same reason they translate the library's
-errors.
+The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported
+on first use, so that the pool's parent process never loads the compiler; for the same reason such modules
+translate the library's errors.
 """
 
 from __future__ import annotations
@@ -13,7 +12,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-from morphdata.samplefiles.fault import Pickled
+from morphdata.faults import Pickled
+from morphdata.operations import operation_named
 
 Document = dict[str, Any]
 Stop = Callable[[], bool]
@@ -123,20 +123,9 @@ class SpreadWork(Work, Protocol):
 
 Begin = Callable[[Document, int], Work]
 
-OPERATIONS: Mapping[str, str] = {
-    "identify": "worker.operations.identification:begin",
-    "study": "worker.operations.study:begin",
-    "simulate": "worker.operations.simulation:begin",
-    "optimize": "worker.operations.optimisation:begin",
-}
-
 
 class UnknownOperation(Pickled, LookupError):
     """This worker does not know the operation of a job; a newer one may."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(f"this worker knows {', '.join(sorted(OPERATIONS))}, not {name!r}")
-        self.name = name
 
 
 def find_operation(name: str) -> Begin:
@@ -146,8 +135,10 @@ def find_operation(name: str) -> Begin:
     ------
     UnknownOperation : no such operation.
     """
-    if name not in OPERATIONS:
-        raise UnknownOperation(name)
-    module, _, function = OPERATIONS[name].partition(":")
+    try:
+        operation = operation_named(name)
+    except LookupError as error:
+        raise UnknownOperation(f"this worker cannot run it: {error}") from None
+    module, _, function = operation.begin.partition(":")
     begin: Begin = getattr(import_module(module), function)
     return begin

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
-from morphcore.identify import Identification, IdentifyResult, identification_from_document
+from morphcore.identify import Identification, IdentifyResult, identification_from_request
+from morphdata.identify import IdentifyRequest
 from worker.operations import Document, Step, Stop
 from worker.operations.library_work import SearchWork, library_errors, shown
 
@@ -54,7 +55,7 @@ def begin(request: Document, threads: int) -> IdentificationWork:
     WorkRefused : the request cannot be flown.
     """
     with library_errors():
-        return IdentificationWork(identification_from_document(request, threads=threads))
+        return IdentificationWork(identification_from_request(IdentifyRequest.parse(request), threads))
 
 
 def _files(result: IdentifyResult, document: Document) -> dict[str, bytes]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from morphcore.export.schedule_plots import schedule_plots
 from morphcore.export.schedule_tables import schedule_tables
-from morphcore.optimise import ScheduleResult, optimisation_from_document
+from morphcore.optimise import ScheduleResult, optimisation_from_request
+from morphdata.optimize import OptimizeRequest
 from worker.operations import Document
 from worker.operations.library_work import SearchWork, library_errors
 
@@ -17,7 +18,7 @@ def begin(request: Document, threads: int) -> SearchWork[ScheduleResult]:
     WorkRefused : the request cannot be flown, or no schedule keeps its limits.
     """
     with library_errors():
-        return SearchWork(optimisation_from_document(request, threads=threads), _files)
+        return SearchWork(optimisation_from_request(OptimizeRequest.parse(request), threads), _files)
 
 
 def _files(result: ScheduleResult, document: Document) -> dict[str, bytes]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from morphcore.export.study_plots import study_plots, study_table
-from morphcore.identify.study import study_from_document
+from morphcore.identify.study import study_from_request
 from morphcore.identify.study_result import StudyResult
+from morphdata.study import StudyRequest
 from worker.operations import Document
 from worker.operations.library_work import SearchWork, library_errors
 
@@ -17,7 +18,7 @@ def begin(request: Document, threads: int) -> SearchWork[StudyResult]:
     WorkRefused : the request cannot be flown.
     """
     with library_errors():
-        return SearchWork(study_from_document(request, threads=threads), _files)
+        return SearchWork(study_from_request(StudyRequest.parse(request), threads), _files)
 
 
 def _files(_result: StudyResult, document: Document) -> dict[str, bytes]:

@@ -15,7 +15,7 @@ const DESCRIBED = {
   simulate: (asked) => [`${asked.model} model`, links(asked), `${asked.duration_s} s`],
   optimize: (asked) => [`to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
 };
-const OPERATIONS = Object.keys(DESCRIBED);
+const OPERATIONS = document.body.dataset.operations.split(" ");
 
 function described(job) {
   const parts = DESCRIBED[job.operation]?.(job.request) ?? [];

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.http.origins import Doors, refusal
+from app.http.origins import Boundary, refusal
 from app.settings import Settings
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 
@@ -106,9 +106,9 @@ def test_no_answer_opens_the_service_to_other_sites(service: RunningService) -> 
 
 
 @pytest.fixture
-def doors_of(tmp_path: Path) -> Iterator[object]:
+def boundary_of(tmp_path: Path) -> Iterator[object]:
     """Settings on a database of their own."""
-    return lambda **given: Doors.of(
+    return lambda **given: Boundary.of(
         Settings(database_url=f"sqlite:///{tmp_path}/x", broker_url=DEAD_BROKER, **given)
     )
 
@@ -124,32 +124,32 @@ def scope(server: str, client: str, host: str = "127.0.0.1") -> dict[str, object
     }
 
 
-def test_an_open_service_keeps_to_loopback_however_it_listens(doors_of: object) -> None:
+def test_an_open_service_keeps_to_loopback_however_it_listens(boundary_of: object) -> None:
     """`uvicorn --host 0.0.0.0` without MORPHID_HOST does not open the service to the network."""
-    doors = doors_of()  # type: ignore[operator]
-    assert refusal(scope("127.0.0.1", "127.0.0.1"), doors) is None
-    assert refusal(scope("::1", "::1"), doors) is None
+    boundary = boundary_of()  # type: ignore[operator]
+    assert refusal(scope("127.0.0.1", "127.0.0.1"), boundary) is None
+    assert refusal(scope("::1", "::1"), boundary) is None
     socket_file = {**scope("", ""), "server": ("/run/morphid.sock", None), "client": None}
-    assert refusal(socket_file, doors) is None
+    assert refusal(socket_file, boundary) is None
     for server, client in (("192.168.1.5", "192.168.1.9"), ("127.0.0.1", "203.0.113.4")):
-        error = refusal(scope(server, client), doors)
+        error = refusal(scope(server, client), boundary)
         assert error is not None
         assert (error.code, error.status) == ("wrong_host", 421)
 
 
-def test_who_opens_on_purpose_is_open(doors_of: object) -> None:
+def test_who_opens_on_purpose_is_open(boundary_of: object) -> None:
     """MORPHID_ALLOW_OPEN answers the network, by address; by name when the name is allowed."""
-    doors = doors_of(host=EVERYWHERE, allow_open=True, allowed_hosts=f"{NAME}, other.example")  # type: ignore[operator]
-    assert refusal(scope("192.168.1.5", "192.168.1.9", "192.168.1.5:8000"), doors) is None
-    assert refusal(scope("192.168.1.5", "192.168.1.9", NAME.upper()), doors) is None
-    assert refusal(scope("192.168.1.5", "192.168.1.9", "evil.example"), doors) is not None
+    boundary = boundary_of(host=EVERYWHERE, allow_open=True, allowed_hosts=f"{NAME}, other.example")  # type: ignore[operator]
+    assert refusal(scope("192.168.1.5", "192.168.1.9", "192.168.1.5:8000"), boundary) is None
+    assert refusal(scope("192.168.1.5", "192.168.1.9", NAME.upper()), boundary) is None
+    assert refusal(scope("192.168.1.5", "192.168.1.9", "evil.example"), boundary) is not None
 
 
-def test_with_keys_names_are_restricted_on_request(doors_of: object) -> None:
+def test_with_keys_names_are_restricted_on_request(boundary_of: object) -> None:
     """A foreign page has no key, so any name will do, unless the operator lists the names."""
     far = ("192.168.1.5", "203.0.113.4")
-    assert refusal(scope(*far, NAME), doors_of(host=EVERYWHERE)) is None  # type: ignore[operator]
-    strict = doors_of(host=EVERYWHERE, allowed_hosts=NAME)  # type: ignore[operator]
+    assert refusal(scope(*far, NAME), boundary_of(host=EVERYWHERE)) is None  # type: ignore[operator]
+    strict = boundary_of(host=EVERYWHERE, allowed_hosts=NAME)  # type: ignore[operator]
     assert refusal(scope(*far, NAME), strict) is None
     assert refusal(scope(*far, "evil.example"), strict) is not None
 

@@ -9,8 +9,9 @@ import pytest
 from fastapi import FastAPI
 
 from app.http.prefer import wait_seconds
-from app.http.problems import escaped, install_problem_handlers
+from app.http.problems import install_problem_handlers
 from app.schemas.problem import Problem
+from morphdata.refusals import escaped
 from tests.app.running_service import RunningService
 
 
@@ -60,7 +61,7 @@ def test_allow_header_names_every_method(service: RunningService, path: str, all
 def test_unforeseen_error_tells_nothing_of_itself() -> None:
     """An error that nobody foresaw is a 500 problem without its text."""
     app = FastAPI()
-    install_problem_handlers(app, known_fields=list)
+    install_problem_handlers(app)
 
     @app.get("/")
     def fail() -> None:

@@ -167,7 +167,10 @@ BAD_FIELDS = [
         "bound_too_wide",
         "decades",
     ),
-    ("/model/bounds/lag_s", [0.0, 1e3], "/model/bounds/lag_s/1", "bound_out_of_range", "Narrow"),
+    ("/model/bounds/lag_s", [0.1, 1e3], "/model/bounds/lag_s/1", "bound_out_of_range", "Narrow"),
+    ("/model/bounds/lag_s", [0.0, 0.1], "/model/bounds/lag_s/0", "bound_not_positive", "positive"),
+    ("/model/bounds/division", [0.4, 0.5], "/model/bounds/division/0", "bounds_without_room", "1/3"),
+    ("/search", {"method": "cma", "particles": 1}, "/search/particles", "greater_than_equal", "at least 4"),
     ("/model/aero_coefficients", ["lag_s", "lag_s"], "/model/aero_coefficients/1", "name_not_unique", "once"),
     ("/search/particles", 10**6, None, "less_than_equal", "100000"),
     ("/search/method", "genetic", None, "literal_error", "least_squares"),
@@ -190,9 +193,9 @@ def test_bad_field_is_named(
 def test_several_faults_are_told_at_once(service: RunningService) -> None:
     """Independent faults are reported together, at most 20."""
     document = changed("/samples/0/time_s/40", 0.0)
-    document["samples"][1]["sweep_left_rad"][9] = 2.0
+    document["samples"][1]["theta_rad"][9] = 2.0
     pointers = [item["pointer"] for item in fault(post(service, document))["errors"]]
-    assert pointers == ["/samples/0/time_s/40", "/samples/1/sweep_left_rad/9"]
+    assert pointers == ["/samples/0/time_s/40", "/samples/1/theta_rad/9"]
     document["samples"] = [{"bad": 1}] * 60
     assert len(fault(post(service, document))["errors"]) == 20
 
@@ -232,7 +235,7 @@ def test_full_aircraft_is_accepted(service: RunningService) -> None:
         "ei_lag_n_m2": 5e5,
         "gj_n_m2": 3e4,
         "mass_per_length_kg_m": 15.0,
-        "inertia_per_length_kg_m": [0.1, 0.0, 0.1],
+        "inertia_per_length_kg_m": [0.1, 0.2, 0.1],
     }
     tail = {**identify_document()["aircraft"]["surfaces"][0], "name": "tail", "position_m": [-2.5, 0.0, 0.0]}
     del tail["hinge"]

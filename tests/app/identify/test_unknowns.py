@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from morphcore.identify import identification_from_document
+from morphcore.identify import identification_from_request
+from morphdata.identify import IdentifyRequest
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
 from tests.models.test_every_surface_its_own import surface
@@ -34,4 +35,4 @@ def test_the_unknowns_are_those_of_the_search(
         document["model"]["aero_coefficients"] = listed
     document["aircraft"]["surfaces"] += tail
     told = service.client.post("/validate/identify", json=document).json()["cost"]
-    assert told["parameters"] == identification_from_document(document).space.dimension
+    assert told["parameters"] == identification_from_request(IdentifyRequest.parse(document)).space.dimension

@@ -103,8 +103,11 @@ def test_every_filter_finds_its_jobs(full: Database) -> None:
     middle = f"job_{base32(int(1e3 * (FIRST_S + COUNT // 2)), 10)}{ALPHABET[0] * 16}"
     with full.read() as session:
         for wanted, before in itertools.product(FILTERS, (None, middle)):
-            found = [job.id for job in list_jobs(session, OWNER, wanted, before=before, limit=PAGE)]
-            assert found == expected(wanted, before), (wanted, before)
+            found, following = list_jobs(session, OWNER, wanted, cursor=before, limit=PAGE)
+            ids = [job.id for job in found]
+            assert ids == expected(wanted, before), (wanted, before)
+            rest = [] if following is None else expected(wanted, following)
+            assert bool(rest) == bool(ids and expected(wanted, ids[-1])), "a cursor leads on"
 
 
 def statements(database: Database, wanted: JobFilter) -> list[tuple[str, Any]]:
@@ -117,7 +120,7 @@ def statements(database: Database, wanted: JobFilter) -> list[tuple[str, Any]]:
 
     event.listen(database.engine, "before_cursor_execute", note)
     with database.read() as session:
-        list_jobs(session, OWNER, wanted, before=None, limit=PAGE)
+        list_jobs(session, OWNER, wanted, cursor=None, limit=PAGE)
     event.remove(database.engine, "before_cursor_execute", note)
     return sent
 

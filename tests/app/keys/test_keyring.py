@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from sqlalchemy import event, update
 
-from app.afterwards import Afterwards, Write
+from app.background_writer import BackgroundWriter, Write
 from app.database import Database, database_time
 from app.keys import repository
 from app.keys.keyring import FRESH_S, KeyRing, Refusal
@@ -42,7 +42,7 @@ class Noted:
 
 def ring(database: Database, clock: Callable[[], float], noted: Noted | None = None) -> KeyRing:
     """A key ring whose clock and notes are the test's."""
-    return KeyRing(database, cast(Afterwards, noted or Noted()), clock)
+    return KeyRing(database, cast(BackgroundWriter, noted or Noted()), clock)
 
 
 def text_of(made: NewKey) -> KeyText:

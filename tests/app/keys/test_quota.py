@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from sqlalchemy import delete, insert, select, update
 
-from app.database import Database, database_time
+from app.database import Database, Session, database_time
 from app.errors import QuotaExceeded
 from app.keys import quota
 from app.keys.records import Quota, Usage
+from app.leases import Note
 from app.tables import jobs, key_usage, trajectories
 from tests.app.key_holders import make_key
 
@@ -57,6 +59,14 @@ def today(database: Database) -> int:
         return quota.usage_day(session.scalar(select(database_time())) or 0.0)
 
 
+def end_job(session: Session, key_id: str | None, *, estimated: int, flown: int, day: int) -> None:
+    """Let a job that was posted on a day end, as far as the quota sees of it."""
+    row: Any = SimpleNamespace(
+        key_id=key_id, flights_estimated=estimated, flights=flown, created_at=day * quota.DAY_S + 1.0
+    )
+    quota.settle(session, row, Note("succeeded"))
+
+
 def test_jobs_in_flight_are_those_that_have_not_ended(database: Database) -> None:
     """At the limit the next post is refused with limit and use; an ended job makes room."""
     key_id = make_key(database, quota=Quota(max_jobs_in_flight=2)).key.id
@@ -80,11 +90,11 @@ def test_flights_are_charged_by_estimate_and_settled_by_what_was_flown(database:
     assert refused.value.members["quota"]["used"] == 900
     assert int(refused.value.headers["Retry-After"]) <= quota.DAY_S
     with database.write() as session:
-        quota.settle(session, key_id, estimated=900, flown=250, day=today(database))
+        end_job(session, key_id, estimated=900, flown=250, day=today(database))
     assert used(database, key_id).flights_today == 250
     put_job(database, key_id, 2, flights_estimated=750)
     with database.write() as session:
-        quota.settle(session, key_id, estimated=750, flown=1200, day=today(database))
+        end_job(session, key_id, estimated=750, flown=1200, day=today(database))
     assert used(database, key_id).flights_today == 1450, "what was flown is counted even beyond the limit"
     with pytest.raises(QuotaExceeded):
         put_job(database, key_id, 3, flights_estimated=1)
@@ -98,8 +108,8 @@ def test_days_are_counted_apart(database: Database) -> None:
         session.execute(insert(key_usage).values(key_id=key_id, day=day - 1, flights=10))
     put_job(database, key_id, 1, flights_estimated=10)
     with database.write() as session:
-        quota.settle(session, key_id, estimated=10, flown=4, day=day - 1)
-        quota.settle(session, key_id, estimated=100, flown=0, day=day - 2)  # nothing was charged there
+        end_job(session, key_id, estimated=10, flown=4, day=day - 1)
+        end_job(session, key_id, estimated=100, flown=0, day=day - 2)  # nothing was charged there
     with database.read() as session:
         rows = session.execute(select(key_usage.c.day, key_usage.c.flights).order_by(key_usage.c.day))
         assert [tuple(row) for row in rows] == [(day - 1, 4), (day, 10)]
@@ -110,7 +120,7 @@ def test_a_correction_never_gives_credit(database: Database) -> None:
     key_id = make_key(database).key.id
     put_job(database, key_id, 1, flights_estimated=5)
     with database.write() as session:
-        quota.settle(session, key_id, estimated=50, flown=0, day=today(database))
+        end_job(session, key_id, estimated=50, flown=0, day=today(database))
     assert used(database, key_id).flights_today == 0
 
 
@@ -159,7 +169,7 @@ def test_keys_do_not_pay_for_one_another(database: Database) -> None:
     assert used(database, full).jobs_in_flight == used(database, other).jobs_in_flight == 1
     with database.write() as session:
         quota.charge(session, None, flights=10**9, size_bytes=10**12)
-        quota.settle(session, None, estimated=10**9, flown=0, day=0)
+        end_job(session, None, estimated=10**9, flown=0, day=0)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from app.observability import tracing
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
 from tests.waiting import until
-from worker.telling import Phases, told
+from worker.spans import PhaseSpans, attempt_span
 
 pytest.importorskip("opentelemetry.sdk")
 
@@ -52,8 +52,8 @@ def test_one_trace_from_the_caller_to_the_attempt(
     claim = service.claim(answer.json()["id"])
     assert claim.traceparent is not None
     assert claim.request_id == answer.headers["x-request-id"]
-    with told(claim):
-        phases = Phases()
+    with attempt_span(claim):
+        phases = PhaseSpans()
         for phase in ("swarm", "swarm", "polish"):
             phases.note(phase)
         phases.close()
@@ -110,11 +110,9 @@ def test_off_means_off(service: RunningService) -> None:
     answer = service.client.post("/identify", json=identify_document(), headers={"traceparent": CALLER})
     assert service.claim(answer.json()["id"]).traceparent is None
     assert tracing.current_traceparent() is None
-    with tracing.span("nothing") as nothing:
-        nothing.rename("x")
-        nothing.note({"a": 1})
-        nothing.fail("y")
-    tracing.past_span("nothing", seconds=1.0)
+    with tracing.span("nothing", traceparent=CALLER) as nothing:
+        assert not nothing.is_recording()
+        assert tracing.current_trace_id() is None
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from app.jobs import store
+from morphdata.parameters import flown_with
+from morphdata.simulate import SimulateRequest
 from tests.app.calls import assert_named, changed, post
 from tests.app.request_documents import RESULT, Document, identify_document, simulate_document
 from tests.app.running_service import RunningService
@@ -90,15 +92,17 @@ def test_parameters_reach_the_worker(service: RunningService) -> None:
 def test_a_model_is_named_by_its_id(any_service: RunningService) -> None:
     """`model_id` becomes the parameters of that model, flown as it was identified, unless told otherwise."""
     model_id = identified(any_service, **AS_IDENTIFIED)
-    model = stored(any_service, equivalent(model_id=model_id))["model"]
-    assert model == {
-        "kind": "equivalent",
-        # with its defaults, as one that stands in the request
-        "parameters": {**RESULT["model"], "separate_wings": False, **AS_IDENTIFIED},
-        **AS_IDENTIFIED,
-    }
-    other = stored(any_service, equivalent(model_id=model_id, start="trim", step_s=0.002))["model"]
-    assert (other["start"], other["step_s"], other["lattice"]) == ("trim", 0.002, AS_IDENTIFIED["lattice"])
+    read = stored(any_service, equivalent(model_id=model_id))
+    # with its defaults, as one that stands in the request
+    parameters = {**RESULT["model"], "separate_wings": False, **AS_IDENTIFIED}
+    assert read["model"] == {"kind": "equivalent", "parameters": parameters}
+    flown = flown_with(SimulateRequest.parse(read).model)
+    assert (flown.start, flown.step_s) == (AS_IDENTIFIED["start"], AS_IDENTIFIED["step_s"])
+    assert flown.lattice.model_dump() == AS_IDENTIFIED["lattice"]
+    other = stored(any_service, equivalent(model_id=model_id, start="trim", step_s=0.002))
+    flown = flown_with(SimulateRequest.parse(other).model)
+    assert (flown.start, flown.step_s) == ("trim", 0.002)
+    assert flown.lattice.model_dump() == AS_IDENTIFIED["lattice"]
 
 
 def test_start_of_an_identified_model_is_checked(service: RunningService) -> None:

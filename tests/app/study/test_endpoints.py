@@ -52,7 +52,7 @@ def test_cost_is_that_of_all_identifications(service: RunningService) -> None:
         ("/model/links_per_wing", [1.5], "/model/links_per_wing/0", "int_type", "whole"),
         ("/samples/0/sweep_left_rad/57", 1.4, "/samples/0/sweep_left_rad/57", "sweep_out_of_range", "1.3"),
         ("/samples/2/time_s/40", 0.0, "/samples/2/time_s/40", "time_not_rising", "Sort"),
-        ("/model/bounds/lag_s", [0.0, 1e3], "/model/bounds/lag_s/1", "bound_out_of_range", "Narrow"),
+        ("/model/bounds/lag_s", [0.1, 1e3], "/model/bounds/lag_s/1", "bound_out_of_range", "Narrow"),
     ],
 )
 def test_bad_field_is_named(

@@ -14,6 +14,7 @@ from sqlalchemy import ColumnElement, literal, select, update
 from app.database import Database, database_time
 from app.identifiers import new_identifier
 from app.jobs import store
+from app.leases import Note
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import repository
 from app.webhooks.outbox import note_challenge, note_end
@@ -86,7 +87,7 @@ def many_ends(database: Database, count: int, owner: str = OWNER) -> None:
                 error=None,
                 model_id=None,
             )
-            note_end(session, row)
+            note_end(session, row, Note("succeeded"))
 
 
 def deliveries(database: Database, **equal: Any) -> list[Any]:

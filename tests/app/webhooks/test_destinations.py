@@ -252,7 +252,7 @@ def test_a_receiver_that_does_not_answer_the_challenge(database: Database, there
     there.answers_challenges = True
     with database.write() as session:
         shown = reopen_webhook(session, OWNER, hook_id)
-    assert (shown.failures, shown.verified_at, shown.disabled_at) == (0, None, None)
+    assert (shown.failures, shown.status, shown.disabled_at) == (0, "pending", None)
 
 
 def test_reopening_waits_for_nothing(database: Database, there: Receiver) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from sqlalchemy import insert
 from sqlalchemy.exc import IntegrityError
@@ -11,7 +13,7 @@ from app.jobs import store
 from app.jobs.reaper import reap
 from app.tables import webhook_deliveries, webhooks
 from app.webhooks import deliveries as sql
-from app.webhooks.outbox import forget_before, new_delivery
+from app.webhooks.outbox import forget_ended, new_delivery
 from app.webhooks.schemas import Message
 from tests.app.webhooks.hooks import OWNER, deliveries, ended_job, new_hook, new_job
 from tests.app.webhooks.receiver import NOBODY
@@ -115,13 +117,13 @@ def test_old_deliveries_are_forgotten(database: Database) -> None:
     hook_id = new_hook(database, NOBODY)
     old, young, waiting = (ended_job(database) for _ in range(3))
     with database.write() as session:
-        for job_id, finished_at in ((old, 1000.0), (young, 3000.0)):
+        for job_id, finished_at in ((old, time.time() - 3000.0), (young, time.time() - 1000.0)):
             session.execute(
                 webhook_deliveries.update()
                 .where(webhook_deliveries.c.job_id == job_id)
                 .values(status="delivered", next_at=None, finished_at=finished_at)
             )
-        assert forget_before(session, 2000.0) == 1
+        assert forget_ended(session, 2000.0) == 1
     assert {row.job_id for row in deliveries(database, webhook_id=hook_id)} == {young, waiting}
     with database.write() as session:
         session.execute(webhooks.delete())

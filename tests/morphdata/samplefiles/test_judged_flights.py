@@ -14,10 +14,11 @@ import pyarrow.parquet as pq
 import pytest
 import scipy.io
 
-from morphcore import load_trajectory
+from morphcore import Trajectory, load_trajectory
 from morphcore.errors import InvalidInput
-from morphcore.simulate.trajectory import trajectory_from_document
+from morphdata.samplefiles.fault import as_sentence
 from morphdata.samplefiles.flight import INLINE
+from morphdata.samples import InlineSample
 
 ROWS = 40
 T = np.arange(ROWS) * 0.01
@@ -94,8 +95,8 @@ def test_an_inline_sample_is_refused_in_the_same_words(bad: str) -> None:
     changes, said = BAD[bad]
     document = {INLINE[name]: np.asarray(column).tolist() for name, column in (FLIGHT | changes).items()}
     with pytest.raises(InvalidInput) as caught:
-        trajectory_from_document({"name": "x", **document}, "/samples/0")
-    assert caught.value.message == said.format("_rad")
+        InlineSample.parse({"name": "x", **document}, "/samples/0")
+    assert caught.value.message == as_sentence(said.format("_rad"))
     assert caught.value.pointer.startswith(f"/samples/0/{INLINE[next(iter(changes))]}")
     assert caught.value.hint
 
@@ -105,7 +106,7 @@ def test_the_hint_of_angles_and_times_is_a_unit() -> None:
     for bad, unit in (("degrees", "theta_deg"), ("milliseconds", "seconds")):
         document = {INLINE[name]: np.asarray(item).tolist() for name, item in (FLIGHT | BAD[bad][0]).items()}
         with pytest.raises(InvalidInput) as caught:
-            trajectory_from_document({"name": "x", **document}, "")
+            InlineSample.parse({"name": "x", **document})
         assert unit in caught.value.hint
 
 
@@ -159,7 +160,7 @@ def test_an_inline_sample_may_count_from_an_epoch() -> None:
     """As a file does."""
     document = {INLINE[name]: column.tolist() for name, column in FLIGHT.items()}
     document["time_s"] = (MS * 1e-3).tolist()
-    flown = trajectory_from_document({"name": "x", **document}, "")
+    flown = Trajectory.of(InlineSample.parse({"name": "x", **document}))
     np.testing.assert_allclose(flown.time_s, T, atol=3e-7)
     assert not flown.time_s.flags.writeable
 

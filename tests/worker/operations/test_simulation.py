@@ -85,6 +85,7 @@ def test_a_spline_beyond_its_hinge_is_refused() -> None:
             "knot_angle_rad": [0.0, 0.0, 1.2, 1.2],
         }
     }
+    work = find_operation("simulate")(request, 1)
     with pytest.raises(WorkRefused) as refused:
-        find_operation("simulate")(request, 1)
+        next(work.steps(None, lambda: False))
     assert (refused.value.code, refused.value.pointer) == ("invalid_input", "/schedules/both")

@@ -1,0 +1,60 @@
+"""Small writes that no request waits for, such as the note of a key's last use."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from app.database import Database, Session
+
+MOST_WAITING = 1000  # more are dropped: what goes through here is worth less than memory
+STOP_S = 2.0
+
+Write = Callable[[Session], object]
+
+logger = logging.getLogger(__name__)
+
+
+class BackgroundWriter:
+    """One thread that writes in the order of asking; a write that fails is logged and forgotten.
+
+    Parameters
+    ----------
+    database : Database
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._waiting: queue.Queue[Write | None] = queue.Queue(MOST_WAITING)
+        self._thread = threading.Thread(target=self._run, name="background-writer", daemon=True)
+
+    def start(self) -> None:
+        """Begin to write."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write what waits, for `STOP_S` at most, and end."""
+        try:
+            self._waiting.put(None, timeout=STOP_S)
+        except queue.Full:
+            return
+        self._thread.join(STOP_S)
+
+    def put(self, write: Write) -> None:
+        """Have `write` called with a session of its own, soon; never waits."""
+        try:
+            self._waiting.put_nowait(write)
+        except queue.Full:
+            logger.warning("a note was dropped: %d others wait for the database", MOST_WAITING)
+
+    def _run(self) -> None:
+        while (write := self._waiting.get()) is not None:
+            try:
+                with self._database.write() as session:
+                    write(session)
+            except SQLAlchemyError as error:
+                logger.warning("a note was not written: %s", error)

@@ -1,1 +1,0 @@
-"""Identification of an equivalent model from sample flights: the request side."""

@@ -1,0 +1,213 @@
+"""Leased work: a row that one holder may change, for as long as its lease lasts.
+
+Jobs, chunks of spread jobs and webhook deliveries are each a `LeasedTable`. A claim is a compare-and-set that
+raises the row's fence and sets the end of its lease by the database's clock. Whatever a holder writes is
+conditional on its fence, so one that was asleep, cut off or declared dead changes nothing. Every method takes
+a `Session`, leaves the commit to its caller, and returns None when the row was not as the caller believed.
+
+What else has to happen when a row changes or ends subscribes here and runs in the same transaction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from sqlalchemy import Column, ColumnElement, Row, Table, update
+
+from app.database import Session, database_time
+from app.documents import Document
+
+Key = tuple[str | int, ...]
+LeasedRow = Row[*tuple[Any, ...]]
+
+
+class Held(Protocol):
+    """A claim: which row it is for, and with which fence."""
+
+    @property
+    def key(self) -> Key:
+        """Values of the table's key columns."""
+        ...
+
+    @property
+    def fence(self) -> int:
+        """The row's fence as long as the claim holds."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What a change means, for its subscribers.
+
+    Attributes
+    ----------
+    event : str
+        Type of the event in the row's history.
+    payload : mapping, optional
+        Content of the event.
+    result : dict, optional
+        The document that the row ends with.
+    """
+
+    event: str
+    payload: Mapping[str, Any] | None = None
+    result: Document | None = None
+
+
+Subscriber = Callable[[Session, LeasedRow, Note], None]
+
+
+@dataclass(eq=False)
+class LeasedTable:
+    """A table of leased work; it has the columns ``status``, ``fence`` and ``attempt``.
+
+    Attributes
+    ----------
+    table : Table
+    key : sequence of Column
+        The columns that name a row.
+    lease : Column
+        Until when the claim holds, s since 1970 UTC.
+    waiting : str
+        Status of a row that may be claimed.
+    held : sequence of str
+        Statuses while a claim holds; a claim sets the first.
+    ends : collection of str
+        Statuses that a row never leaves.
+    returning : sequence of Column
+        What the methods return of a row.
+    unheld : mapping
+        Columns with their values while nobody holds the row.
+    dated : mapping
+        Columns that every change sets.
+    noted : mapping
+        Columns that every change with a `Note` sets.
+    on_change : list of callable
+        Called after every change with a note.
+    on_end : sequence of callable, or None
+        Called after every change with a note to one of `ends`, in this order; None as long as nobody has said
+        what belongs to an end, and then no row can end.
+    """
+
+    table: Table
+    key: Sequence[Column[Any]]
+    lease: Column[Any]
+    waiting: str
+    held: Sequence[str]
+    ends: Collection[str]
+    returning: Sequence[Column[Any]]
+    unheld: Mapping[str, Any] = field(default_factory=dict)
+    dated: Mapping[str, Any] = field(default_factory=dict)
+    noted: Mapping[str, Any] = field(default_factory=dict)
+    on_change: list[Subscriber] = field(default_factory=list)
+    on_end: Sequence[Subscriber] | None = ()
+
+    def at(self, key: Key) -> tuple[ColumnElement[bool], ...]:
+        """Conditions that select one row."""
+        return tuple(column == value for column, value in zip(self.key, key, strict=True))
+
+    def held_by(self, claim: Held, *statuses: str) -> tuple[ColumnElement[bool], ...]:
+        """Conditions that select the row of a claim as long as the claim holds.
+
+        Parameters
+        ----------
+        *statuses
+            In place of the table's own `held`.
+        """
+        columns = self.table.c
+        return (
+            *self.at(claim.key),
+            columns.fence == claim.fence,
+            columns.status.in_(statuses or self.held),
+        )
+
+    def lost(self, now: ColumnElement[float]) -> ColumnElement[bool]:
+        """Whether a row's lease ran out before its holder gave it up."""
+        return self.table.c.status.in_(self.held) & (self.lease < now)
+
+    def change(
+        self, session: Session, *conditions: ColumnElement[bool], note: Note | None = None, **values: Any
+    ) -> LeasedRow | None:
+        """Compare-and-set on one row.
+
+        Parameters
+        ----------
+        *conditions
+            What must hold of the row.
+        note
+            What the change means; without one it is no news to any subscriber.
+        **values
+            Columns to set.
+
+        Returns
+        -------
+        Row or None
+            The row as it is now (`returning`).
+        """
+        more = {**self.dated, **(self.noted if note is not None else {})}
+        row = session.execute(
+            update(self.table).where(*conditions).values({**more, **values}).returning(*self.returning)
+        ).one_or_none()
+        if row is not None and note is not None:
+            for subscriber in self.on_change:
+                subscriber(session, row, note)
+            if row.status in self.ends:
+                self._ended(session, row, note)
+        return row
+
+    def _ended(self, session: Session, row: LeasedRow, note: Note) -> None:
+        if self.on_end is None:
+            raise RuntimeError(f"nothing has subscribed to the end of {self.table.name}: import app.on_end")
+        for subscriber in self.on_end:
+            subscriber(session, row, note)
+
+    def take(
+        self, session: Session, *conditions: ColumnElement[bool], lease_until: Any, **values: Any
+    ) -> LeasedRow | None:
+        """Take over a row that the conditions select: only its fence and its lease change by that."""
+        leased = {"fence": self.table.c.fence + 1, self.lease.name: lease_until}
+        return self.change(session, *conditions, **{**leased, **values})
+
+    def claim(
+        self, session: Session, key: Key, *conditions: ColumnElement[bool], lease_until: Any, **values: Any
+    ) -> LeasedRow | None:
+        """Claim a waiting row; its attempt is counted."""
+        columns = self.table.c
+        return self.take(
+            session,
+            *self.at(key),
+            columns.status == self.waiting,
+            *conditions,
+            lease_until=lease_until,
+            **{"status": self.held[0], "attempt": columns.attempt + 1, **values},
+        )
+
+    def renew(self, session: Session, claim: Held, lease_s: float) -> None:
+        """Let the lease of a claim end `lease_s` from now; one that does not hold any more is left alone."""
+        lease = {self.lease.name: database_time() + lease_s}
+        session.execute(update(self.table).where(*self.held_by(claim)).values(lease))
+
+    def settle(self, session: Session, claim: Held, *statuses: str, **values: Any) -> LeasedRow | None:
+        """Change the row of a claim that holds, see `held_by`."""
+        return self.change(session, *self.held_by(claim, *statuses), **values)
+
+    def give_back(self, session: Session, claim: Held, **values: Any) -> LeasedRow | None:
+        """Let somebody else claim the row; the attempt is not counted."""
+        freed = {"status": self.waiting, "attempt": self.table.c.attempt - 1, **self.unheld}
+        return self.settle(session, claim, **{**freed, **values})
+
+    def reap(
+        self, session: Session, key: Key, fence: int, *conditions: ColumnElement[bool], **values: Any
+    ) -> LeasedRow | None:
+        """Take a row from a holder that is lost: it writes in vain if it wakes up.
+
+        Parameters
+        ----------
+        fence
+            As the reaper saw it; any number of reapers may run at once.
+        """
+        columns = self.table.c
+        freed = {"fence": columns.fence + 1, **self.unheld}
+        return self.change(session, *self.at(key), columns.fence == fence, *conditions, **{**freed, **values})

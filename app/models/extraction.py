@@ -1,0 +1,69 @@
+"""Model extraction: which identified model a finished job leaves, and its row.
+
+That of an identification, the recommended one of a study. A model that does not fly the samples it was fitted
+to is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from sqlalchemy import update
+
+from app.database import Session
+from app.documents import Document
+from app.identifiers import new_identifier
+from app.jobs.records import JobStatus
+from app.jobs.store import load_request
+from app.leases import LeasedRow, Note
+from app.models.repository import insert_model
+from app.tables import jobs
+from morphdata.parameters import has_flown
+
+
+def store_extracted(session: Session, job: LeasedRow, note: Note) -> None:
+    """Store the model in the result of a job that has succeeded, if there is one."""
+    if job.status != JobStatus.SUCCEEDED.value or note.result is None:
+        return
+    identified = extracted_model(job.operation, note.result)
+    if identified is None:
+        return
+    model_id = new_identifier("model")
+    insert_model(
+        session,
+        model_id=model_id,
+        owner=job.owner,
+        job_id=job.id,
+        key_id=job.key_id,
+        request=load_request(session, job.id),
+        identified=identified,
+    )
+    session.execute(update(jobs).where(jobs.c.id == job.id).values(model_id=model_id))
+
+
+def extracted_model(operation: str, result: Document) -> Document | None:
+    """Find the identified model in a result, as an object with its ``model`` and its ``fit``.
+
+    None for results that hold none.
+    """
+    find = MODELS_IN_RESULTS.get(operation)
+    found = None if find is None else find(result)
+    if found is None or found.get("model") is None or not has_flown(found.get("fit")):
+        return None
+    return found
+
+
+def _identified(result: Document) -> Document | None:
+    return result
+
+
+def _recommended(result: Document) -> Document | None:
+    links = (result.get("recommended") or {}).get("links_per_wing")
+    rows = (row for row in result.get("rows") or () if links is not None and row["links_per_wing"] == links)
+    return next(rows, None)
+
+
+MODELS_IN_RESULTS: Mapping[str, Callable[[Document], Document | None]] = {
+    "identify": _identified,
+    "study": _recommended,
+}

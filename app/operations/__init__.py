@@ -1,0 +1,1 @@
+"""The operations at the API: a call each, made of their descriptors."""

@@ -1,0 +1,177 @@
+"""What a request refers to by an id becomes part of it: uploaded flights, identified models, jobs' models.
+
+One step for all operations: wherever in a request an id stands, what it names takes its place.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import BaseModel
+
+from app.database import Session
+from app.documents import Document
+from app.errors import JobNotFound, ModelNotFound
+from app.jobs import repository as jobs
+from app.jobs.rows import get_job
+from app.models import repository as models
+from app.models.extraction import extracted_model
+from app.trajectories import repository as trajectories
+from morphdata.execution import Request
+from morphdata.faults import Fault, InvalidInput
+from morphdata.identify import total_rows_faults
+from morphdata.parameters import Parameters
+
+Asked = TypeVar("Asked", bound=Request)
+
+
+class Reference(NamedTuple):
+    """An id in a request: the JSON pointer of the object that holds it, its field, the id."""
+
+    at: str
+    field: str
+    id: str
+
+    @property
+    def pointer(self) -> str:
+        """JSON pointer of the id."""
+        return f"{self.at}/{self.field}"
+
+
+def resolved(session: Session, owner: str, request: Asked) -> Asked:
+    """Return the request with everything inline that it refers to.
+
+    Raises
+    ------
+    InvalidInput
+        Something does not exist, or does not fit the rest of the request; every fault is named.
+    """
+    found = list(_references(request))
+    if not found:
+        return request
+    _require_rows(session, owner, [item for item in found if item.field == "trajectory_id"], request)
+    document = request.document()
+    faults: list[Fault] = []
+    for item in found:
+        try:
+            _put(document, item, RESOLVERS[item.field](session, owner, item))
+        except InvalidInput as error:
+            faults += error.faults
+    if faults:
+        raise InvalidInput.of(faults)
+    try:
+        return type(request).parse(document)
+    except InvalidInput as error:
+        raise InvalidInput.of([_told(fault, found) for fault in error.faults]) from None
+
+
+def _references(value: object, pointer: str = "") -> Iterator[Reference]:
+    """Find every id in a request, in its order."""
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            part = getattr(value, name)
+            if name in RESOLVERS and part is not None:
+                yield Reference(pointer, name, part)
+            else:
+                yield from _references(part, f"{pointer}/{name}")
+    elif isinstance(value, list) and value and isinstance(value[0], BaseModel):
+        for number, item in enumerate(value):
+            yield from _references(item, f"{pointer}/{number}")
+
+
+def _put(document: Document, reference: Reference, found: Document) -> None:
+    """Put what was found in the place of an id; what the request itself says there counts more."""
+    place: Any = document
+    for key in reference.at.split("/")[1:]:
+        place = place[int(key)] if isinstance(place, list) else place[key]
+    del place[reference.field]
+    place.update({**found, **place})
+
+
+def _told(fault: Fault, references: list[Reference]) -> Fault:
+    """Name the id instead of a model that the client has not sent."""
+    for item in references:
+        if item.field != "trajectory_id" and f"{fault.pointer}/".startswith(f"{item.at}/parameters/"):
+            return Fault(fault.code, fault.detail, item.pointer, fault.hint)
+    return fault
+
+
+def _require_rows(session: Session, owner: str, uploads: list[Reference], request: Request) -> None:
+    """Look whether the flights exist and are not too long, before any row is read.
+
+    A short request may name a flight of 100,000 rows many times.
+    """
+    rows = trajectories.row_counts(session, owner, [item.id for item in uploads])
+    faults = [
+        Fault(
+            "trajectory_not_found",
+            f"There is no trajectory {item.id}.",
+            item.pointer,
+            "Upload it with POST /trajectories first.",
+        )
+        for item in uploads
+        if item.id not in rows
+    ]
+    inline = sum(
+        len(sample.time_s) for sample in getattr(request, "samples", []) if hasattr(sample, "time_s")
+    )
+    faults += total_rows_faults(inline + sum(rows.get(item.id, 0) for item in uploads))
+    if faults:
+        raise InvalidInput.of(faults)
+
+
+def _flight(session: Session, owner: str, reference: Reference) -> Document:
+    stored, columns = trajectories.get_trajectory(session, owner, reference.id)
+    return {"name": stored.name, **columns}
+
+
+def _model(session: Session, owner: str, reference: Reference) -> Document:
+    try:
+        _, document = models.get_model(session, owner, reference.id)
+    except ModelNotFound as error:
+        raise InvalidInput.of(
+            [Fault("model_not_found", error.detail, reference.pointer, error.hint)]
+        ) from None
+    return {"parameters": _as_given(document["model"])}
+
+
+def _model_of_job(session: Session, owner: str, reference: Reference) -> Document:
+    """Find the model that a job left, whole or as its best so far."""
+    try:
+        job = get_job(session, owner, reference.id)
+    except JobNotFound as error:
+        raise InvalidInput.of([Fault("job_not_found", error.detail, reference.pointer, error.hint)]) from None
+    text = jobs.result_json(session, owner, job.id)
+    left = None if text is None else extracted_model(job.operation, json.loads(text))
+    if left is None:
+        state = "has ended" if job.finished else f"is {job.status.value}"
+        hint = "Wait for its end, or cancel it: what it has found by then is its result."
+        fault = Fault(
+            "no_model",
+            f"Job {job.id} ({job.operation}) {state} and has left no model.",
+            reference.pointer,
+            "Name an identification or a study with a result." if job.finished else hint,
+        )
+        raise InvalidInput.of([fault])
+    return {"parameters": _as_given(left["model"])}
+
+
+def _as_given(model: Document) -> Document:
+    """Give a stored model in the form that the same parameters get when a request holds them outright.
+
+    So a job's request, in which references are resolved, makes the same job when it is posted again. A model
+    that no request could hold any more, of an earlier version say, stays as it is.
+    """
+    try:
+        return Parameters.parse(model).model_dump(exclude_none=True)
+    except InvalidInput:
+        return model
+
+
+RESOLVERS: Mapping[str, Callable[[Session, str, Reference], Document]] = {
+    "trajectory_id": _flight,
+    "model_id": _model,
+    "job_id": _model_of_job,
+}

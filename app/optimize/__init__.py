@@ -1,1 +1,0 @@
-"""Optimisation of a morph schedule: the request side."""

@@ -1,0 +1,35 @@
+"""Pages of a list: newest first, each page's cursor is the id of the last row that was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Column, Row, Select
+
+from app.database import Session
+
+Rows = Sequence[Row[*tuple[Any, ...]]]
+
+
+def read_page(
+    session: Session, query: Select[Any], ids: Column[str], *, cursor: str | None, limit: int
+) -> tuple[Rows, str | None]:
+    """Read one page of what a query selects.
+
+    Parameters
+    ----------
+    ids
+        Column with the identifiers, which rise with time.
+    cursor
+        Of the page before; None for the first page.
+
+    Returns
+    -------
+    tuple
+        At most `limit` rows, and the cursor of the next page; None on the last.
+    """
+    if cursor is not None:
+        query = query.where(ids < cursor)
+    rows = session.execute(query.order_by(ids.desc()).limit(limit + 1)).all()
+    return rows[:limit], rows[limit - 1].id if len(rows) > limit else None

@@ -1,1 +1,0 @@
-"""Simulation of one flight with any of the three models: the request side."""

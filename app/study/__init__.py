@@ -1,1 +1,0 @@
-"""Study of the number of links per wing: the request side."""

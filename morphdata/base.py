@@ -1,0 +1,190 @@
+"""Base and building blocks of the documents: strict, bounded, no NaN, no unknown field, every fault named."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import reprlib
+from collections.abc import Iterator
+from functools import cache
+from numbers import Integral
+from pathlib import Path
+from typing import Annotated, Any, Self, get_args
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    FailFast,
+    Field,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from morphdata.faults import Fault, InvalidInput
+from morphdata.refusals import FAULTS, faults_of
+from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
+
+SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
+MAX_ROWS = MOST_ROWS  # of one sample
+MIN_ROWS = FEWEST_ROWS
+SHOWN_ITEMS = 4  # of a list, at a prompt
+LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
+
+
+class Document(BaseModel):
+    """Base of everything that a client sends: a misspelt field is an error, text is not a number.
+
+    A document refuses to be built of what is wrong, with `InvalidInput` that names every fault, whether it
+    is parsed or constructed in Python.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    def __init__(self, /, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise _refused(error, fields, type(self)) from None
+
+    # pydantic would call an __init__ of ours for every nested object, too, and not see where an error is from
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def parse(cls, value: Any, pointer: str = "") -> Self:
+        """Build the document of parsed JSON.
+
+        Parameters
+        ----------
+        value : object
+            Parsed JSON; objects in it may be documents already.
+        pointer : str
+            Where it stands in a larger document, for errors.
+
+        Raises
+        ------
+        InvalidInput
+            Naming every fault.
+        """
+        try:
+            return cls.model_validate(value)
+        except ValidationError as error:
+            raise _refused(error, value, cls, pointer) from None
+
+    @classmethod
+    def load(cls, path: str | Path, pointer: str = "") -> Self:
+        """Read the document from a JSON file.
+
+        Raises
+        ------
+        InvalidInput
+            The file cannot be read, or naming every fault of the document.
+        """
+        try:
+            document = json.loads(Path(path).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InvalidInput(f"{path} does not exist", hint="check the path") from None
+        except OSError as error:
+            raise InvalidInput(f"{path} cannot be read: {error.strerror}", hint="check the path") from None
+        except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of absurd numbers
+            raise InvalidInput(f"{path} is not JSON: {error}", hint="see the examples") from None
+        if not isinstance(document, dict):
+            raise InvalidInput(f"{path} holds no JSON object", hint="see the examples")
+        return cls.parse(document, pointer)
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what is wrong across the fields, with pointers relative to this object.
+
+        It is called when each field by itself is right.
+        """
+        return iter(())
+
+    def __repr__(self) -> str:
+        """A few lines: names instead of objects, ends instead of long lists."""
+        return "\n  ".join([type(self).__name__, *(f"{name} = {_brief(value)}" for name, value in self)])
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(repr(self))}</pre>"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        found = tuple(self.faults())
+        if found:
+            raise PydanticCustomError(FAULTS, "the fields contradict each other", {FAULTS: found})
+        return self
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain_values(cls, given: Any) -> Any:
+        """Take 3.0 where a whole number is wanted, as JSON Schema does; tuples and arrays for lists."""
+        if not isinstance(given, dict):
+            return given
+        whole = _whole_fields(cls)
+        return {
+            name: _whole(_listed(value)) if name in whole else _listed(value) for name, value in given.items()
+        }
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, Document):
+        return str(getattr(value, "name", type(value).__name__))
+    if isinstance(value, list) and len(value) > SHOWN_ITEMS:
+        return f"{len(value)} items from {_brief(value[0])} to {_brief(value[-1])}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_brief, value))}]"
+    return reprlib.repr(value)
+
+
+def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer: str = "") -> InvalidInput:
+    return InvalidInput.of(faults_of(error.errors(include_url=False), value, model, pointer))
+
+
+@cache
+def _whole_fields(model: type[BaseModel]) -> tuple[str, ...]:
+    """Names of the fields whose only numbers are whole ones."""
+    kinds = {name: set(_kinds(field.annotation)) for name, field in model.model_fields.items()}
+    return tuple(name for name, found in kinds.items() if int in found and float not in found)
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    yield annotation
+    for part in get_args(annotation):
+        yield from _kinds(part)
+
+
+def _listed(value: Any) -> Any:
+    """Return what Python code gives for a list, a tuple or an array of numpy, as a list."""
+    return list(value) if isinstance(value, tuple) else value.tolist() if hasattr(value, "tolist") else value
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_whole(item) for item in value]
+    if isinstance(value, float):
+        return int(value) if value.is_integer() else value
+    return value if isinstance(value, bool) or not isinstance(value, Integral) else int(value)  # numpy's own
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0.0, le=1000.0)]
+Angle = Annotated[float, Field(ge=-math.pi, le=math.pi)]
+Vector3 = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
+Position = Annotated[list[Annotated[float, Field(ge=-1000.0, le=1000.0)]], Field(min_length=3, max_length=3)]
+SampleName = Annotated[str, Field(pattern=SAMPLE_NAME_PATTERN)]
+Text = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_]+$")]
+
+# FailFast: one bad row is named, not a hundred thousand
+TimeSeries = Annotated[
+    list[Annotated[float, Field(ge=-LATEST_DATE_S, le=LATEST_DATE_S)]],
+    FailFast(),
+    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+    AfterValidator(from_first_row),
+]
+AngleSeries = Annotated[
+    list[Annotated[float, Field(ge=-1e6, le=1e6)]],  # what is no angle, `samplefiles.flight` says with a hint
+    FailFast(),
+    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+]

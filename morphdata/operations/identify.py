@@ -1,0 +1,150 @@
+"""The operation ``identify``, and what it would cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from morphdata.aircraft import Surface
+from morphdata.identify import (
+    CostEstimate,
+    IdentifyRequest,
+    IdentifyResult,
+    SamplesRequest,
+    Search,
+)
+from morphdata.operations.descriptor import Operation, after_budget
+from morphdata.samples import InlineSample
+
+# nominal figures, to an order of magnitude: what a request leaves out is the solver's choice
+SWARM_PARTICLES = {"pso": 200, "cma": 32}
+PAPER_PARTICLES = 2500
+SWARM_GENERATIONS = {"pso": 100, "cma": 200}
+DESCENT_ITERATIONS = 20
+# trial steps of an iteration; its Jacobian flies a parameter set a parameter and one more
+DESCENT_TRIALS = 24
+REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
+REFERENCE_LINKS = 3
+CORRECTIONS = 4  # that may be searched; of symmetric samples all but the profile drag
+ASYMMETRIC_RAD = 0.01  # a sample is asymmetric whose sweeps differ, or that rolls or yaws, by more
+REPORT_TIME_S = 120.0  # uncertainty, plots, writing
+
+
+def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
+    """Estimate flights and computing time of one identification.
+
+    Parameters
+    ----------
+    request : SamplesRequest
+        With the rows of its samples.
+    links : int, optional
+        Links per wing; those of the request when left out.
+    """
+    links = max(request.model.numbers_of_links()) if links is None else links
+    samples = list(request.inline_samples().values())
+    training = [sample for sample in samples if sample.role == "train"]
+    parameters = _parameter_count(request, links, training)
+    sets = _parameter_sets(request.search, parameters)
+    flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
+    return CostEstimate(
+        samples=len(samples),
+        rows=sum(len(sample.time_s) for sample in samples),
+        parameters=parameters,
+        flights=sets * len(training),
+        flight_s=flight_s,
+        core_s=flight_s / REAL_TIME_FACTOR * max(links / REFERENCE_LINKS, 1.0),
+    )
+
+
+def _parameter_count(request: SamplesRequest, links: int, training: Sequence[InlineSample]) -> int:
+    """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections.
+
+    Every flexible surface has its own except mirror images; those of a pair always share the profile drag.
+    """
+    model, surfaces = request.model, request.aircraft.surfaces
+    groups = _mirror_groups(surfaces)
+    if model.aero_coefficients is None:
+        drag = any(_asymmetric(sample) for sample in training)
+        corrections = CORRECTIONS - 1 + drag
+    else:
+        drag = "profile_drag" in model.aero_coefficients
+        corrections = len(model.aero_coefficients)
+    sets = sum(surface.flexible for surface in surfaces) if model.separate_wings else groups
+    return 7 * (links - 1) * sets + corrections + drag * (groups - 1)
+
+
+def _mirror_groups(surfaces: Sequence[Surface]) -> int:
+    """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
+    waiting: list[Surface] = []
+    groups = 0
+    for surface in (each for each in surfaces if each.flexible):
+        side: Literal["right", "left"] = "left" if surface.side == "right" else "right"
+        hinge = surface.hinge
+        changes = {
+            "side": side,
+            "position_m": _across(surface.position_m),
+            "hinge": hinge and hinge.model_copy(update={"position_m": _across(hinge.position_m)}),
+        }
+        image = next(
+            (w for w in waiting if w == surface.model_copy(update={**changes, "name": w.name})), None
+        )
+        if image is None:
+            groups += 1
+            waiting.append(surface)
+        else:
+            waiting.remove(image)
+    return groups
+
+
+def _across(position_m: list[float] | None) -> list[float] | None:
+    return position_m and [position_m[0], -position_m[1], position_m[2]]
+
+
+def _asymmetric(sample: InlineSample) -> bool:
+    apart = max(abs(a - b) for a, b in zip(sample.sweep_left_rad, sample.sweep_right_rad, strict=True))
+    turned = max(max(angle) - min(angle) for angle in (sample.phi_rad, sample.psi_rad))
+    return max(apart, turned) > ASYMMETRIC_RAD
+
+
+def _parameter_sets(search: Search, parameters: int) -> int:
+    """Count the parameter sets that a search flies through every training sample."""
+    if search.method not in SWARM_PARTICLES and search.preset != "paper":
+        return DESCENT_ITERATIONS * (parameters + 1 + DESCENT_TRIALS)
+    method = "pso" if search.preset == "paper" else search.method
+    particles = search.particles or (PAPER_PARTICLES if search.preset == "paper" else SWARM_PARTICLES[method])
+    return particles * (search.generations or SWARM_GENERATIONS[method])
+
+
+def samples_summary(request: SamplesRequest) -> dict[str, Any]:
+    """Give what a listing shows of a request with samples."""
+    return {
+        "aircraft": request.aircraft.name,
+        "method": request.search.method,
+        "samples": [
+            {"name": sample.name, "role": sample.role, "rows": len(sample.time_s)}
+            for sample in request.inline_samples().values()
+        ],
+    }
+
+
+def _summary(request: IdentifyRequest) -> dict[str, Any]:
+    return {**samples_summary(request), "links_per_wing": request.model.links_per_wing}
+
+
+IDENTIFY = Operation(
+    name="identify",
+    subject="From sample flights to an equivalent model.",
+    help="Finds the equivalent model (rigid links, springs and dampers) that repeats the attitude of sample "
+    "flights.",
+    noun="an identification",
+    title="Identify an equivalent model from sample flights",
+    description="The samples with the role `train` are fitted; those with the role `held_out` are flown and "
+    "reported only.",
+    request=IdentifyRequest,
+    result=IdentifyResult,
+    cost_model=CostEstimate,
+    cost=cost,
+    summary=_summary,
+    begin="worker.operations.identification:begin",
+    deadline_s=after_budget(REPORT_TIME_S),
+)

@@ -1,0 +1,50 @@
+"""The operation ``simulate``, and what it would cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from morphdata.operations.descriptor import Operation
+from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest, SimulateResult
+
+# nominal figures, to an order of magnitude, of a flight alone on one core
+STEP_CORE_S = {"rigid": 5e-5, "equivalent": 1e-4, "flexible": 2e-3}
+START_CORE_S = 1.0  # trim, the lattice along the morph, tables and plots
+
+
+def _cost(request: SimulateRequest) -> FlightCost:
+    return FlightCost(
+        rows=request.rows,
+        steps=request.steps,
+        flight_s=request.duration_s,
+        core_s=START_CORE_S + request.steps * STEP_CORE_S[request.model.kind],
+    )
+
+
+def _summary(request: SimulateRequest) -> dict[str, Any]:
+    model = request.model
+    known = model.known if isinstance(model, EquivalentFlightModel) else None
+    return {
+        "aircraft": request.aircraft.name,
+        "model": model.kind,
+        "links_per_wing": None if known is None else known.links_per_wing,
+        "duration_s": request.duration_s,
+    }
+
+
+SIMULATE = Operation(
+    name="simulate",
+    subject="Flights of the rigid, the equivalent and the flexible model.",
+    help="Flies one morph with a rigid, an equivalent or a flexible model.",
+    noun="a simulation",
+    title="Fly a model through a morph",
+    description="With `Prefer: wait=30` the job of a rigid or an equivalent model has usually ended when the "
+    "answer comes. A flight keeps no checkpoint: where its worker is lost, another flies it again from the "
+    "start.",
+    request=SimulateRequest,
+    result=SimulateResult,
+    cost_model=FlightCost,
+    cost=_cost,
+    summary=_summary,
+    begin="worker.operations.simulation:begin",
+)

@@ -1,0 +1,47 @@
+"""The operation ``study``, and what it would cost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from morphdata.identify import CostEstimate
+from morphdata.operations import identify
+from morphdata.operations.descriptor import Operation, after_budget
+from morphdata.study import StudyRequest, StudyResult
+
+REPORT_TIME_S = 300.0  # uncertainty and timing of up to eight models
+
+
+def _cost(request: StudyRequest) -> CostEstimate:
+    parts = [identify.cost(request, links) for links in request.model.links_per_wing]
+    return CostEstimate(
+        samples=parts[0].samples,
+        rows=parts[0].rows,
+        parameters=max(part.parameters for part in parts),
+        flights=sum(part.flights for part in parts),
+        flight_s=sum(part.flight_s for part in parts),
+        core_s=sum(part.core_s for part in parts),
+    )
+
+
+def _summary(request: StudyRequest) -> dict[str, Any]:
+    return {**identify.samples_summary(request), "compared_links": request.model.links_per_wing}
+
+
+STUDY = Operation(
+    name="study",
+    subject="How many links a model should have.",
+    help="Does so for several numbers of links per wing and recommends one.",
+    noun="a study",
+    title="Compare models of several sizes",
+    description="A model is identified for every number of links per wing from the same samples; accuracy "
+    "and cost of each are reported, and one is recommended. The recommended model becomes one of yours: see "
+    "`model_id` of the job.",
+    request=StudyRequest,
+    result=StudyResult,
+    cost_model=CostEstimate,
+    cost=_cost,
+    summary=_summary,
+    begin="worker.operations.study:begin",
+    deadline_s=after_budget(REPORT_TIME_S),
+)

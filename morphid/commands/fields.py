@@ -1,0 +1,182 @@
+"""The options of a command out of the fields of its request: type, choices, default and help are the field's.
+
+What a value may be is judged by the request alone; the command line only reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from inspect import Parameter, get_annotations
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
+
+import typer
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from morphdata.options import Option
+from morphid.exits import CommandError, Exit
+from morphid.files import read_json
+
+MAX_SHOWN = 10_000  # larger limits tell nobody anything
+
+
+@dataclass(frozen=True)
+class FieldOption:
+    """An option of a command, and the field that it fills in.
+
+    Parameters
+    ----------
+    pointer : JSON pointer of the field.
+    flag : as the user writes it.
+    parameter : of the command's function.
+    read : makes the field's value of what was given on the command line.
+    """
+
+    pointer: str
+    flag: str
+    parameter: Parameter
+    read: Callable[[Any], Any]
+
+
+class Form(NamedTuple):
+    """How a field is written on the command line.
+
+    Parameters
+    ----------
+    kind : type that the command line's parser gives.
+    metavar : stands for the value in the help; None for the type's name.
+    read : makes the field's value of it.
+    remark : for the help.
+    """
+
+    kind: Any
+    metavar: str | None
+    read: Callable[[Any], Any]
+    remark: str = ""
+
+
+def field_options(request: type[BaseModel]) -> list[FieldOption]:
+    """Find the fields of a request that are options; where several have one flag, the first has it."""
+    found: dict[str, FieldOption] = {}
+    for option in _options(request, ""):
+        found.setdefault(option.flag, option)
+    return list(found.values())
+
+
+def _options(model: type[BaseModel], pointer: str) -> Iterator[FieldOption]:
+    own = get_annotations(model)
+    # what a request adds to another's is what it is about
+    for name, field in sorted(model.model_fields.items(), key=lambda item: item[0] not in own):
+        at = f"{pointer}/{name}"
+        mark = next((item for item in field.metadata if isinstance(item, Option)), None)
+        if mark is not None:
+            yield _field_option(mark, at, field)
+            continue
+        for kind in _kinds(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _options(kind, at)
+
+
+def _kinds(annotation: Any) -> list[Any]:
+    """List the types that a field may have, out of unions and annotations, None aside."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _kinds(get_args(annotation)[0])
+    if origin in (None, list, Literal):
+        return [] if annotation is type(None) else [annotation]
+    return [kind for part in get_args(annotation) for kind in _kinds(part)]
+
+
+def _field_option(mark: Option, pointer: str, field: FieldInfo) -> FieldOption:
+    form = _form(mark.flag, field)
+    word = mark.flag.removeprefix("--")
+    declared = f"{mark.flag}/--no-{word}" if field.default is True else mark.flag
+    option = typer.Option(
+        declared,
+        help=f"{field.description or ''} {form.remark}".replace("`", "").strip(),
+        rich_help_panel=mark.group,
+        metavar=form.metavar,
+        show_default=_shown_default(field.default),
+    )
+    required = field.is_required()
+    parameter = Parameter(
+        word.replace("-", "_"),
+        Parameter.KEYWORD_ONLY,
+        default=Parameter.empty if required else None,
+        annotation=Annotated[form.kind if required else form.kind | None, option],
+    )
+    return FieldOption(pointer, mark.flag, parameter, form.read)
+
+
+def _shown_default(default: Any) -> str | bool:
+    if isinstance(default, list):
+        return ",".join(str(item) for item in default)
+    if isinstance(default, BaseModel):
+        return ",".join(f"{value:g}" for value in default.model_dump().values())
+    return str(default) if isinstance(default, int | float | str) and not isinstance(default, bool) else False
+
+
+def _form(flag: str, field: FieldInfo) -> Form:
+    kind = _kinds(field.annotation)[0]
+    if get_origin(kind) is Literal:
+        choices = get_args(kind)
+        remark = f"One of {', '.join(choices)}." if len(choices) > 1 else ""
+        return Form(str, choices[0] if len(choices) == 1 else "NAME", str, remark)
+    if kind in (bool, int, float, str):
+        return Form(kind, _limits(field) if kind is int else None, kind)
+    if get_origin(kind) is list:
+        return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
+    names = list(kind.model_fields)
+    members = {member for inner in kind.model_fields.values() for member in _kinds(inner.annotation)}
+    if members == {float}:
+        example = ",".join("1" for _ in names)
+        return Form(str, ",".join(names), lambda text: _object(names, _numbers(flag, text, float, example)))
+    if members and all(get_origin(member) is list for member in members):
+        return Form(list[str], "NAME=LOW:HIGH", lambda texts: _ranges(flag, texts))
+    return Form(Path, "FILE", read_json)
+
+
+def _limits(field: FieldInfo) -> str | None:
+    """Show the least and the greatest whole number that a field takes, where both are known."""
+    low, high = (
+        next((getattr(item, name) for item in field.metadata if hasattr(item, name)), None)
+        for name in ("ge", "le")
+    )
+    return None if low is None or high is None or high > MAX_SHOWN else f"{low}..{high}"
+
+
+def _numbers(flag: str, text: str, kind: Callable[[str], Any], example: str) -> list[Any]:
+    """Read numbers with commas between them; ``example`` has as many as are wanted, or any number."""
+    try:
+        found = [kind(word) for word in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or (kind is float and len(found) != len(example.split(","))):
+        what = "whole numbers" if kind is int else f"{len(example.split(','))} numbers"
+        raise CommandError(
+            f"{flag} {text}: not {what} with commas between", code=Exit.USAGE, hint=f"write {flag} {example}"
+        )
+    return found
+
+
+def _object(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    return dict(zip(names, values, strict=True))
+
+
+def _ranges(flag: str, texts: Sequence[str]) -> dict[str, list[float]]:
+    """Read ``lift_factor=0.8:1.2``."""
+    found = {}
+    for text in texts:
+        name, _, pair = text.partition("=")
+        low, _, high = pair.partition(":")
+        try:
+            found[name] = [float(low), float(high)]
+        except ValueError:
+            raise CommandError(
+                f"{flag} {text}: this is no NAME=LOW:HIGH",
+                code=Exit.USAGE,
+                hint=f"write {flag} lift_factor=0.8:1.2; repeat it for further parameters",
+            ) from None
+    return found

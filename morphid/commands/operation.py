@@ -1,0 +1,143 @@
+"""The command of an operation, made of its descriptor; what is particular to one stands in its own module."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from inspect import Parameter, Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from morphdata.operations.descriptor import Operation
+from morphdata.options import VEHICLE
+from morphid.commands import options
+from morphid.commands.fields import FieldOption, field_options
+from morphid.files import matching_files, require_place
+from morphid.request import Request
+from morphid.screen import print_json, reports_errors
+
+if TYPE_CHECKING:
+    from morphid.running import Answer
+
+Values = Mapping[str, Any]
+
+SAMPLES = {
+    "sample": Annotated[
+        list[Path],
+        typer.Option(
+            "--sample",
+            help="Sample flights to fit: CSV, JSON, Parquet, MATLAB; several, or a pattern.",
+            rich_help_panel=VEHICLE,
+        ),
+    ],
+    "held_out": Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--held-out",
+            help="Sample flights to predict, not to fit; several, or a pattern.",
+            rich_help_panel=VEHICLE,
+        ),
+    ],
+}
+RUNNING = {
+    "url": options.AtUrl,
+    "api_key": options.AtUrlKey,
+    "json_out": options.JsonFile,
+    "plots": options.Plots,
+}
+
+
+def nothing(*_given: Any) -> None:
+    """Do nothing."""
+
+
+@dataclass(frozen=True)
+class Particulars:
+    """What a command has beside the fields of its request.
+
+    Parameters
+    ----------
+    show : prints a result for people.
+    options : its own options, by the names of their values.
+    fill : ``fill(request, values)`` puts the values of its own options into the request, before those of the
+        fields.
+    fills : flags of those fields that `fill` puts in itself.
+    out : help of ``--out``, a file that `save` writes; "" where there is none.
+    save : ``save(answer, path)`` writes it.
+    """
+
+    show: Callable[[Values], None] = print_json
+    options: Mapping[str, Any] = field(default_factory=dict)
+    fill: Callable[[Request, Values], None] = nothing
+    fills: Collection[str] = ()
+    out: str = ""
+    save: Callable[[Answer, Path], None] = nothing
+
+
+def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., None]:
+    """Make the function of a command, as typer wants it."""
+    fields = field_options(operation.request)
+    has_samples = "samples" in operation.request.model_fields
+
+    def command(**values: Any) -> None:
+        from morphid.running import hand_over, run
+
+        for name, flag in (("json_out", "--json"), ("out", "--out")):
+            require_place(values.get(name), flag)
+        request = Request(operation.name)
+        if has_samples:
+            for name, role, flag in (("sample", "train", "--sample"), ("held_out", "held_out", "--held-out")):
+                request.add_samples(matching_files(values[name] or [], flag), role, flag)
+        own.fill(request, values)
+        for option in (option for option in fields if option.flag not in own.fills):
+            _fill_field(request, option, values[option.parameter.name])
+        answer = run(request, values["url"], values["api_key"])
+        if values.get("out") is not None and answer.result is not None:
+            own.save(answer, values["out"])
+        hand_over(answer, own.show, json_out=values["json_out"], plots=values["plots"])
+
+    made = reports_errors(command)
+    vehicle = [option.parameter for option in fields if option.pointer in ("/aircraft", "/flight")]
+    others = [option.parameter for option in fields if option.parameter not in vehicle]
+    made.__name__ = operation.name
+    made.__doc__ = f"{operation.title}."
+    made.__signature__ = Signature(  # type: ignore[attr-defined]  # what typer goes by
+        [
+            *vehicle,
+            *_parameters(SAMPLES if has_samples else {}),
+            *_parameters(own.options),
+            *others,
+            *_parameters({"out": _out_option(own.out)} if own.out else {}),
+            *_parameters(RUNNING),
+        ]
+    )
+    return made
+
+
+def _out_option(description: str) -> Any:
+    return Annotated[Path | None, options.answer_option("--out", help=description)]
+
+
+def _parameters(annotations: Mapping[str, Any]) -> list[Parameter]:
+    return [
+        Parameter(
+            name,
+            Parameter.KEYWORD_ONLY,
+            default=Parameter.empty if name == "sample" else None,
+            annotation=annotation,
+        )
+        for name, annotation in annotations.items()
+    ]
+
+
+def _fill_field(request: Request, option: FieldOption, given: Any) -> None:
+    """Put the value of an option into the field that it stands for; what is not given is left out."""
+    if given is None or given == []:
+        return
+    value = option.read(given)
+    words = " ".join(given) if isinstance(given, list) else given
+    request.put(
+        option.pointer, value, f"{option.flag} {words}" if isinstance(value, dict | list) else option.flag
+    )
