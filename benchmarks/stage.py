@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.kernels.one_stage import one_stage
+from morphcore.aero.kernels.loads import L_SLOW_DECAY
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import (
     ChainModel,
     LaneConstants,
     ParameterBatch,
-    lag_weights,
     lane_constants,
     to_lanes,
 )
@@ -29,6 +29,7 @@ from morphcore.models.kernels.layout import (
     joint_rows_of_scratch,
     state_rows,
 )
+from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.plan import FlightPlan, OperatorTable, hinge_rows
@@ -38,7 +39,6 @@ from morphcore.simulate.trim import Trim, trimmed_state
 Array = NDArray[np.float64]
 Air = Callable[[Array], Array]
 
-LAG_COLUMN = 10  # of a link's constants: decay and weight of the slow lag state, then of the fast one
 MOST_MOMENTS = 64  # kept; each holds a lattice operator
 SAME_TIME_S = 1e-9  # times closer than that are one
 
@@ -124,7 +124,8 @@ class Stages:
         laid: LaneConstants = lane_constants(model, batch, 1.0)
         laid.set_thrust(found.force_B, found.moment_B)
         self._rows, self._ranges = laid.rows[0], laid.ranges[0]
-        self._lag_s = to_lanes(batch.lag[:, None] * model.relative_chord)[0]
+        lag_s = np.stack([model.on_surface(batch, s)["lag_s"] for s in range(len(model.surfaces))], axis=1)
+        self._lag_s = to_lanes(np.repeat(lag_s, model.surfaces[:, 1], axis=1))[0]
         state = to_lanes(trimmed_state(model, batch, course.fine, found))[0]
         self.width = state.shape[1]
         _, self.joint_rates, self.slow, self.fast, self.previous, _ = state_rows(
@@ -165,7 +166,7 @@ class Stages:
             rows = self._rows.copy()
             weights = self.lag_weights(step_s)
             for link in range(self.model.links):
-                column = LINKS_C + LINK_ROWS * link + LAG_COLUMN
+                column = LINKS_C + LINK_ROWS * link + L_SLOW_DECAY
                 rows[column : column + 4] = weights[link].T
             self._constants[key] = rows
         return self._constants[key]

@@ -18,7 +18,7 @@ from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
@@ -321,6 +321,7 @@ class IdentifyRequest(SamplesRequest):
         known = None if warm_start is None else parameters_in(warm_start.parameters)
         if known is None:
             return
+        yield from model_surfaces_faults(self.aircraft, known, "/search/warm_start/parameters")
         at, links = "/search/warm_start/parameters", self.model.links_per_wing
         if known.links_per_wing != links:
             yield Fault(

@@ -18,7 +18,7 @@ from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
@@ -251,6 +251,7 @@ class OptimizeRequest(Request):
         """Check aircraft, model and morph together, and the size of the search."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
+        yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
         yield from self._hinge_faults()
         yield from self._time_faults()
         if self.flights > MAX_FLIGHTS:

@@ -12,6 +12,7 @@ from morphdata.base import Document, Identifier
 from morphdata.faults import Fault
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 from morphdata.options import MODEL, Option
+from morphdata.refusals import escaped
 
 MAX_LINKS = 8
 MAX_WINGS = 16
@@ -46,6 +47,32 @@ class Corrections(Document):
     lag_s: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
+class SurfaceParameters(Document):
+    """Parameters of one flexible surface."""
+
+    division: Shares
+    stiffness_nm_rad: Joints
+    damping_nms_rad: Joints
+    profile_drag: Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class MirroredParameters(Document):
+    """A surface with the parameters of its mirror image."""
+
+    mirror_of: str = Field(description="Name of the surface whose parameters they are.")
+
+
+def _whose(value: Any) -> str:
+    mirrored = "mirror_of" in value if isinstance(value, dict) else isinstance(value, MirroredParameters)
+    return "mirrored" if mirrored else "own"
+
+
+OwnOrMirrored = Annotated[
+    Annotated[SurfaceParameters, Tag("own")] | Annotated[MirroredParameters, Tag("mirrored")],
+    Discriminator(_whose),
+]
+
+
 class Parameters(Document):
     """The `model` of an identification's result, as it stands there."""
 
@@ -63,6 +90,15 @@ class Parameters(Document):
         description="The same of the dampings."
     )
     aero: Corrections
+    surfaces: dict[str, OwnOrMirrored] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=MAX_WINGS,
+        description="Of an aircraft whose flexible surfaces are not one mirror pair: by name, each one's "
+        "own parameters. `division`, `stiffness_nm_rad`, `damping_nms_rad` and `aero.profile_drag` are then "
+        "those of the largest. Without it these are taken for the largest, and the others are as far from "
+        "their own beam theory.",
+    )
     lattice: Lattice | None = Field(default=None, description="With which the model was identified.")
     step_s: StepS | None = None
     start: Start | None = None
@@ -70,38 +106,58 @@ class Parameters(Document):
     @property
     def divisions(self) -> list[list[float]]:
         """One list of shares per wing, or one for all."""
-        shared = [share for share in self.division if isinstance(share, float)]
-        return [shared] if shared else [row for row in self.division if isinstance(row, list)]
+        return _rows(self.division)
 
     def faults(self) -> Iterator[Fault]:
         """The lists have the lengths that the number of links asks for, and the shares make a whole span."""
-        links, rows = self.links_per_wing, self.divisions
-        shapes: dict[str, tuple[int, ...]] = {
-            "division": (len(rows), links),
-            "stiffness_nm_rad": (len(rows), links - 1, AXES),
-            "damping_nms_rad": (len(rows), links - 1, AXES),
-        }
-        for name, shape in shapes.items():
-            allowed = {shape, shape[1:]} if len(rows) == 1 else {shape}
-            if links == 1:  # no joints: [] and a [] per wing are the same
-                allowed |= {(0,), (len(rows), 0)}
-            if _shape(getattr(self, name)) not in allowed:
-                wanted = " x ".join(str(number) for number in (shape if len(rows) > 1 else shape[1:]))
+        yield from _structure_faults(self, self.links_per_wing)
+        surfaces = self.surfaces or {}
+        for name, own in surfaces.items():
+            at = f"/surfaces/{escaped(name)}"
+            if isinstance(own, SurfaceParameters):
+                yield from (fault.under(at) for fault in _structure_faults(own, self.links_per_wing))
+            elif isinstance(surfaces.get(own.mirror_of, own), MirroredParameters):
                 yield Fault(
-                    "wrong_shape",
-                    f"{name} does not hold {wanted} numbers, as {links} links per wing ask.",
-                    f"/{name}",
-                    "Give the model of an identification's result as it stands there.",
+                    "mirrors_nothing",
+                    f"{name!r} mirrors {own.mirror_of!r}, which has no parameters.",
+                    f"{at}/mirror_of",
+                    "Name a surface with parameters of its own.",
                 )
-        for shares in rows:
-            if abs(sum(shares) - 1.0) > SUM_TOLERANCE:
-                yield Fault(
-                    "division_not_whole",
-                    f"The shares of the span add up to {sum(shares):g}.",
-                    "/division",
-                    "They must add up to 1.",
-                )
-                break
+
+
+def _rows(division: list[float] | list[list[float]]) -> list[list[float]]:
+    shared = [share for share in division if isinstance(share, float)]
+    return [shared] if shared else [row for row in division if isinstance(row, list)]
+
+
+def _structure_faults(own: Parameters | SurfaceParameters, links: int) -> Iterator[Fault]:
+    rows = _rows(own.division)
+    shapes: dict[str, tuple[int, ...]] = {
+        "division": (len(rows), links),
+        "stiffness_nm_rad": (len(rows), links - 1, AXES),
+        "damping_nms_rad": (len(rows), links - 1, AXES),
+    }
+    for name, shape in shapes.items():
+        allowed = {shape, shape[1:]} if len(rows) == 1 else {shape}
+        if links == 1:  # no joints: [] and a [] per wing are the same
+            allowed |= {(0,), (len(rows), 0)}
+        if _shape(getattr(own, name)) not in allowed:
+            wanted = " x ".join(str(number) for number in (shape if len(rows) > 1 else shape[1:]))
+            yield Fault(
+                "wrong_shape",
+                f"{name} does not hold {wanted} numbers, as {links} links per wing ask.",
+                f"/{name}",
+                "Give the model of an identification's result as it stands there.",
+            )
+    for shares in rows:
+        if abs(sum(shares) - 1.0) > SUM_TOLERANCE:
+            yield Fault(
+                "division_not_whole",
+                f"The shares of the span add up to {sum(shares):g}.",
+                "/division",
+                "They must add up to 1.",
+            )
+            break
 
 
 def _shape(values: list[Any]) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, start_faults
+from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
@@ -128,6 +128,8 @@ class SimulateRequest(Request):
             )
         if self.model.kind != "rigid":
             yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
+        if isinstance(self.model, KnownModel):
+            yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
 
 
 class FlightCost(BaseModel):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from morphdata.aircraft import Aircraft
 from morphdata.faults import Fault
 from morphdata.flight import Flight
+from morphdata.parameters import Parameters
 
 ANGLE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly zero
 
@@ -72,4 +73,28 @@ def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:
             "No surface is both hinged and flexible.",
             "/aircraft/surfaces",
             "Give a wing a hinge, and do not set its flexible to false.",
+        )
+
+
+def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer: str) -> Iterator[Fault]:
+    """Check that an equivalent model has parameters for every flexible surface of an aircraft."""
+    if model is None:
+        return
+    flexible = [surface.name for surface in aircraft.surfaces if surface.flexible]
+    hint = "Give the model that was identified for this aircraft."
+    if model.surfaces:
+        for name in (each for each in flexible if each not in model.surfaces):
+            yield Fault(
+                "surface_without_parameters",
+                f"The flexible surface {name!r} has no parameters.",
+                f"{pointer}/surfaces",
+                hint,
+            )
+    elif len(model.divisions) not in (1, len(flexible)):
+        yield Fault(
+            "other_number_of_wings",
+            f"The parameters are of {len(model.divisions)} wings, the aircraft has {len(flexible)} flexible "
+            "surfaces.",
+            f"{pointer}/division",
+            hint,
         )

@@ -12,7 +12,7 @@ class ResultWarning(BaseModel):
 
     code: str = Field(
         description="Stable, for programs: `at_bound`, `large_error`, `large_alpha`, `compressible`, "
-        "`steep_pitch`, `looks_like_degrees`, `surfaces_overlap`, `wings_differ`, `diverged` (a flight that "
+        "`steep_pitch`, `looks_like_degrees`, `surfaces_overlap`, `diverged` (a flight that "
         "the answer does not rest on), `verification_failed`, `not_flyable` (of a partial result: nothing "
         "has flown yet).",
         examples=["at_bound"],

@@ -18,10 +18,12 @@ JOINTS = ("stiffness_nm_rad", "damping_nms_rad")
 
 def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
     """Give the parameters of a model by the names that its uncertainty has, in their order."""
-    separate = bool(model.get("separate_wings"))
+    named = {f"{name}.": own for name, own in (model.get("surfaces") or {}).items() if "mirror_of" not in own}
 
-    def wings(name: str) -> Sequence[tuple[str, Sequence[Any]]]:
-        values = model[name]
+    def wings(name: str) -> Sequence[tuple[str, Any]]:
+        if named:
+            return [(prefix, own[name]) for prefix, own in named.items()]
+        separate, values = model.get("separate_wings"), model[name]
         return [(f"wing_{i}.", own) for i, own in enumerate(values, 1)] if separate else [("", values)]
 
     for wing, shares in wings("division"):
@@ -33,7 +35,13 @@ def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
                 values = joint if isinstance(joint, Sequence) else [joint] * len(AXES)
                 for axis, value in zip(AXES, values, strict=True):
                     yield f"{wing}{name}.joint_{j}.{axis}", value
-    yield from model["aero"].items()
+    own_corrections = set.intersection(*map(set, named.values())) if named else set()
+    for name, value in model["aero"].items():
+        yield from (
+            ((f"{wing}{name}", own) for wing, own in wings(name))
+            if name in own_corrections
+            else [(name, value)]
+        )
 
 
 def model_table(result: Document) -> Table:

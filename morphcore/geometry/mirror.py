@@ -6,6 +6,7 @@ Then one half is flown, which stands for both (models/equivalent.py), and nothin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,27 +32,40 @@ class Mirror:
         return out
 
 
+def mirror_groups(surfaces: Sequence[Surface]) -> tuple[tuple[int, ...], ...]:
+    """Indices of the surfaces by mirror pair, in order of first appearance.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Two are a pair if all values of one are those of the other, mirrored.
+
+    Returns
+    -------
+    tuple of tuples of int
+        Groups (first, image) and (first,): every surface is in one of them.
+    """
+    groups = []
+    waiting = list(range(len(surfaces)))
+    while waiting:
+        first = waiting.pop(0)
+        reflection = _reflection(surfaces[first])
+        image = [k for k in waiting if replace(surfaces[k], name=reflection.name) == reflection][:1]
+        waiting = [k for k in waiting if k not in image]
+        groups.append((first, *image))
+    return tuple(groups)
+
+
 def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
     """The symmetry of an aircraft in a flight condition; None where anything differs at all.
 
     Wind does not count: a uniform one carries the aircraft along.
     """
-    if not (_is_symmetric(aircraft.fuselage) and _starts_straight(flight)):
+    groups = mirror_groups(aircraft.surfaces)
+    paired = all(len(group) > 1 for group in groups)
+    if not (paired and _is_symmetric(aircraft.fuselage) and _starts_straight(flight)):
         return None
-    own, image = [], []
-    waiting = list(range(len(aircraft.surfaces)))
-    while waiting:
-        first = waiting.pop(0)
-        reflection = _reflection(aircraft.surfaces[first])
-        found = next(
-            (k for k in waiting if replace(aircraft.surfaces[k], name=reflection.name) == reflection), None
-        )
-        if found is None:
-            return None
-        waiting.remove(found)
-        own.append(first)
-        image.append(found)
-    return Mirror(tuple(own), tuple(image))
+    return Mirror(tuple(group[0] for group in groups), tuple(group[1] for group in groups))
 
 
 def _reflection(surface: Surface) -> Surface:

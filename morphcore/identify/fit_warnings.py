@@ -12,6 +12,7 @@ from morphcore.frames import wrap_angle
 from morphcore.geometry.obstacle import obstacle
 from morphcore.geometry.surface import Surface
 from morphcore.identify.cost import shared_trims
+from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.simulate.chain_motion import chain_motion
@@ -37,7 +38,6 @@ UNSEEN_HINT = (
     "the samples do not determine this, and the value means little: take fewer links, or samples that "
     "show more"
 )
-UNLIKE_WINGS = 0.02  # relative difference of stiffness or mass beyond which wings are not alike
 
 
 def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: EquivalentModel) -> NotFlyable:
@@ -81,11 +81,9 @@ def fit_warnings(
         error = not_flyable(run.model, lost, run.settings)
         found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
     found += _of_samples(fits)
-    found += _of_bounds(at_bound, undetermined)
+    found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
     found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft.surfaces) for fit in fits]))
-    if not run.settings.separate_wings:
-        found += _of_wings(aircraft.surfaces)
     return tuple(found)
 
 
@@ -116,55 +114,25 @@ def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
         )
 
 
-def _of_bounds(at_bound: Mapping[str, str], undetermined: Collection[str]) -> Iterable[ResultWarning]:
+def _of_bounds(
+    space: SearchSpace, at_bound: Mapping[str, str], undetermined: Collection[str]
+) -> Iterable[ResultWarning]:
     """One warning for each kind of parameter and end of its range; those that are not seen, apart."""
     kinds: dict[tuple[str, str, bool], list[str]] = {}
     for name, end in at_bound.items():
-        kind = next(part for part in name.split(".") if not part.startswith("wing_"))
-        kinds.setdefault((kind, end, name in undetermined), []).append(name)
+        kinds.setdefault((space.parameter(name).name, end, name in undetermined), []).append(name)
     for (kind, end, unseen), names in kinds.items():
         shown = ", ".join(names[:SHOWN_NAMES])
         more = f" and {len(names) - SHOWN_NAMES} more" if len(names) > SHOWN_NAMES else ""
+        hint = space.parameter(names[0]).at_bound.get(
+            end, f"the best value may lie beyond: widen model.bounds.{kind}"
+        )
         yield ResultWarning(
             "at_bound",
             f"{shown}{more} ended at the {end} bound of the search",
-            UNSEEN_HINT if unseen else _bound_hint(kind, end),
+            UNSEEN_HINT if unseen else hint,
             f"/model/bounds/{kind}",
         )
-
-
-def _bound_hint(kind: str, end: str) -> str:
-    if kind == "division":
-        return "the best value may lie beyond: try another number of links"
-    if (kind, end) == ("profile_drag", "lower"):
-        return "no drag is less than none: the samples may show something that the model lacks"
-    return f"the best value may lie beyond: widen model.bounds.{kind}"
-
-
-def _of_wings(surfaces: Sequence[Surface]) -> Iterable[ResultWarning]:
-    """Flexible surfaces that share their parameters and are not built alike."""
-    flexible = [(number, surface) for number, surface in enumerate(surfaces) if surface.flexible]
-    if not flexible:
-        return
-    first = flexible[0][1]
-    for number, surface in flexible[1:]:
-        if not _alike(first, surface):
-            yield ResultWarning(
-                "wings_differ",
-                f"{surface.name!r} is not built like {first.name!r}, and both share the parameters of one "
-                "model",
-                "set model.separate_wings to identify each by itself",
-                f"/aircraft/surfaces/{number}",
-            )
-
-
-def _alike(one: Surface, other: Surface) -> bool:
-    fractions = np.linspace(0.0, 1.0, 5)
-    sections = [surface.section_at(fractions * surface.span_m) for surface in (one, other)]
-    pairs = [(one.span_m, other.span_m)] + [
-        tuple(getattr(section, name) for section in sections) for name in ("ei_flap", "ei_lag", "gj", "mass")
-    ]
-    return all(np.allclose(a, b, rtol=UNLIKE_WINGS, atol=0.0) for a, b in pairs)
 
 
 def _angles(fit: SampleFit, surfaces: Sequence[Surface]) -> np.ndarray:

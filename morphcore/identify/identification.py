@@ -86,10 +86,11 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
+        self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         sought: Sequence[str] | None = self.settings.aero_coefficients
         if sought is None:
-            sought = corrections_told([sample for sample in samples if sample.role == "train"])
-        self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
+            training = [sample for sample in samples if sample.role == "train"]
+            sought = corrections_told(self.model.parameters, training)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,

@@ -1,59 +1,120 @@
-"""The unknowns of an identification and the coordinates in which they are searched.
-
-Stiffness, damping and lag time are searched as logarithms; the division lengths, which sum to the span, as
-log-ratios to the last link (Aitchison 1982, the additive log-ratio: a box in them is inside the simplex); the
-other corrections linearly, in units of their natural size. So all coordinates are of order one and a
-difference step fits all.
-"""
+"""The unknowns of an identification: which parameters of which surfaces, and the box they are searched in."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
+from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, physical_guess
+from morphcore.models.parameters import CutSurface, Parameter
+from morphcore.models.transforms import Transform
 
 Array = NDArray[np.float64]
+Interval = tuple[float | None, float | None]
 
-AERO_COEFFICIENTS = ("lift_factor", "centre_shift_m", "profile_drag", "lag_s")
-AXIS_NAMES = ("flap", "torsion", "lag")
-STIFFNESS_FACTOR = 10.0  # either way from beam theory: a chain of few links is off by less than three
-DAMPING_FACTOR = 30.0
-LAG_FACTOR = 10.0
-RATIO_RANGE = 1.5  # of the log-ratios: a link may be 4.5 times shorter or longer than the last
-LIFT_RANGE = (0.6, 1.5)
-LIFT_UNIT = 0.2
-CENTRE_RANGE_CHORDS = 0.15
-CENTRE_UNIT_CHORDS = 0.05
-DRAG_RANGE = (0.0, 0.08)
-DRAG_UNIT = 0.01
-BOUND_NAMES = ("stiffness_nm_rad", "damping_nms_rad", "division", *AERO_COEFFICIENTS)
 LARGEST_DECADES = 12.0
 BOUND_TOLERANCE = 1e-3  # of the box's width; half a per cent of a stiffness
 WARM_START = "/search/warm_start"  # where a request says what to begin from
 
 
 @dataclass(frozen=True)
-class SearchSpace:
-    """Box of search coordinates and the way from them to parameters.
+class Unknown:
+    """One parameter of one surface, of a mirror pair or of the aircraft.
 
-    names : what each coordinate stands for. lower, upper, guess : (d,). wing_sets : 1, or the number of
-    flexible surfaces.
-    free_aero : the corrections that are searched; the others keep the guess.
+    Attributes
+    ----------
+    parameter : Parameter
+        Its kind.
+    links : int
+        Links per wing.
+    prefix : str
+        Of its names; "" where there is no other of its kind.
+    sets : tuple of int
+        Sets of a batch that have it; none of the aircraft's.
+    surfaces : tuple of int
+        Indices of the surfaces that have it; none of the aircraft's.
+    transform : Transform
+        How it is searched.
+    lower, upper, guess : ndarray, shape (d,)
+        Box and physical guess in search coordinates; d = 0 where it is fixed.
     """
 
-    model: ChainModel
-    names: tuple[str, ...]
+    parameter: Parameter
+    links: int
+    prefix: str
+    sets: tuple[int, ...]
+    surfaces: tuple[int, ...]
+    transform: Transform
     lower: Array
     upper: Array
     guess: Array
-    wing_sets: int
+
+    @property
+    def searched(self) -> bool:
+        """Whether it is searched, and not fixed."""
+        return self.guess.size > 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its m values."""
+        return tuple(f"{self.prefix}{name}" for name in self.parameter.names(self.links))
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names of its d search coordinates; none where it is fixed."""
+        names = self.parameter.coordinate_names(self.links) if self.searched else ()
+        return tuple(f"{self.prefix}{name}" for name in names)
+
+    def of(self, batch: ParameterBatch) -> Array:
+        """Its values (p, m) in a batch."""
+        values = batch[self.parameter.name]
+        return (values[:, self.sets[0]] if self.sets else values).reshape(batch.particles, -1)
+
+
+@dataclass(frozen=True)
+class SearchSpace:
+    """Box of search coordinates and the way from them to parameters.
+
+    Attributes
+    ----------
+    model : ChainModel
+    unknowns : tuple of Unknown
+        In the order of coordinates and reports, fixed ones included.
+    free_aero : tuple of str
+        Names of the corrections that are searched.
+    fixed : ParameterBatch
+        The values (one particle) of all that is not.
+    """
+
+    model: ChainModel
+    unknowns: tuple[Unknown, ...]
     free_aero: tuple[str, ...]
     fixed: ParameterBatch = field(repr=False)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """What each coordinate stands for."""
+        return tuple(name for unknown in self.unknowns for name in unknown.coordinate_names)
+
+    @cached_property
+    def lower(self) -> Array:
+        """(d,) lower bounds."""
+        return np.concatenate([unknown.lower for unknown in self.unknowns])
+
+    @cached_property
+    def upper(self) -> Array:
+        """(d,) upper bounds."""
+        return np.concatenate([unknown.upper for unknown in self.unknowns])
+
+    @cached_property
+    def guess(self) -> Array:
+        """(d,) the physical guess."""
+        return np.concatenate([unknown.guess for unknown in self.unknowns])
 
     @property
     def dimension(self) -> int:
@@ -65,27 +126,27 @@ class SearchSpace:
         """Links per wing."""
         return self.model.links_per_wing
 
+    def _parts(self) -> Iterator[tuple[Unknown, slice, slice]]:
+        """All unknowns with their places among the coordinates and among the named values."""
+        x, named = 0, 0
+        for unknown in self.unknowns:
+            d, m = unknown.guess.size, len(unknown.names)
+            yield unknown, slice(x, x + d), slice(named, named + m)
+            x, named = x + d, named + m
+
     def decode(self, x: Array) -> ParameterBatch:
         """Parameters of search points (p, d)."""
         x = np.atleast_2d(x)
-        p, w, n = x.shape[0], self.wing_sets, self.links
-        ratios, stiffness, damping, aero = np.split(
-            x, np.cumsum([w * (n - 1), 3 * w * (n - 1), 3 * w * (n - 1)]), axis=1
-        )
-        ratios = np.concatenate([ratios.reshape(p, w, n - 1), np.zeros((p, w, 1))], axis=2)
-        shares = np.exp(ratios - ratios.max(axis=2, keepdims=True))
-        values = {name: np.repeat(getattr(self.fixed, _FIELDS[name]), p) for name in AERO_COEFFICIENTS}
-        for name, column in zip(self.free_aero, aero.T, strict=True):
-            values[name] = _decode_aero(name, column, self._chord)
-        return ParameterBatch(
-            division=shares / shares.sum(axis=2, keepdims=True),
-            stiffness=np.exp(stiffness).reshape(p, w, n - 1, 3),
-            damping=np.exp(damping).reshape(p, w, n - 1, 3),
-            lift_factor=values["lift_factor"],
-            centre_shift=values["centre_shift_m"],
-            profile_drag=values["profile_drag"],
-            lag=values["lag_s"],
-        )
+        values = {name: np.repeat(value, x.shape[0], axis=0) for name, value in self.fixed.values.items()}
+        for unknown, at, _ in self._parts():
+            if unknown.searched:
+                found, out = unknown.transform.inverse(x[:, at]), values[unknown.parameter.name]
+                if unknown.sets:
+                    for k in unknown.sets:
+                        out[:, k] = found.reshape(out[:, k].shape)
+                else:
+                    out[:] = found.reshape(out.shape)
+        return ParameterBatch(values, self.fixed.surfaces)
 
     def encode(self, batch: ParameterBatch) -> Array:
         """The search point (d,) of a model (one particle), moved into the bounds.
@@ -94,85 +155,88 @@ class SearchSpace:
 
         Raises
         ------
-        InvalidInput : it has other links than are sought, or wings of its own where all are sought alike.
+        InvalidInput
+            It has other links than are searched, wings of their own where mirror images are searched alike,
+            or other surfaces.
         """
         if batch.links != self.links:
             raise InvalidInput(
-                f"the search seeks {self.links} links per wing, the model to begin from has {batch.links}",
+                f"the search is for {self.links} links per wing, the model to begin from has {batch.links}",
                 pointer=WARM_START,
                 hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
             )
-        wings = batch.division.shape[1]
-        if wings not in (1, self.wing_sets):
-            raise InvalidInput(
-                f"the search would begin from a model with {wings} wings of their own",
-                pointer=WARM_START,
-                hint="set model.separate_wings, or begin from a model whose wings are alike",
-            )
-        shares = np.repeat(batch.division, self.wing_sets // wings, axis=1)
-        stiffness = np.repeat(batch.stiffness, self.wing_sets // wings, axis=1)
-        damping = np.repeat(batch.damping, self.wing_sets // wings, axis=1)
-        with np.errstate(divide="ignore"):  # no stiffness or damping at all: the lower bound stands for it
-            parts = [
-                np.log(shares[0, :, :-1] / shares[0, :, -1:]).ravel(),
-                np.log(stiffness[0]).ravel(),
-                np.log(damping[0]).ravel(),
-                *(
-                    _encode_aero(name, getattr(batch, _FIELDS[name])[:1], self._chord)
-                    for name in self.free_aero
-                ),
-            ]
-        return np.asarray(np.clip(np.concatenate(parts), self.lower, self.upper))
-
-    @property
-    def _chord(self) -> float:
-        return self.model.aircraft.surfaces[0].mean_chord_m
+        try:
+            batch = fitted(self.model, batch)
+        except InvalidInput as error:
+            raise InvalidInput(error.message, pointer=WARM_START, hint=error.hint) from None
+        chosen = self.model.set_of(batch)
+        x = self.guess.copy()
+        for unknown, at, _ in self._parts():
+            if not unknown.searched or unknown.parameter.name not in batch.values:
+                continue
+            values = batch[unknown.parameter.name]
+            if unknown.sets:
+                given = {chosen[k] for k in unknown.surfaces}
+                if len(given) > 1 and unknown.parameter.scope == "surface":
+                    raise InvalidInput(
+                        "the search would begin from a model whose wings have parameters of their own",
+                        pointer=WARM_START,
+                        hint="set model.separate_wings, or begin from a model whose wings are alike",
+                    )
+                values = values[0, min(given)]
+            x[at] = unknown.transform.forward(values.reshape(-1))
+        return np.asarray(np.clip(x, self.lower, self.upper))
 
     def flatten(self, batch: ParameterBatch) -> Array:
         """Named parameters in SI units (p, m), ordered as ``parameter_names``, fixed ones included."""
-        p = batch.particles
-        aero = np.stack([getattr(batch, _FIELDS[name]) for name in AERO_COEFFICIENTS], axis=1)
-        return np.concatenate(
-            [
-                batch.division.reshape(p, -1),
-                batch.stiffness.reshape(p, -1),
-                batch.damping.reshape(p, -1),
-                aero,
-            ],
-            axis=1,
-        )
+        return np.concatenate([unknown.of(batch) for unknown in self.unknowns], axis=1)
 
-    @property
+    @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the columns of ``flatten``."""
-        wings = [""] if self.wing_sets == 1 else [f"wing_{i + 1}." for i in range(self.wing_sets)]
-        joints = [f"joint_{j + 1}.{axis}" for j in range(self.links - 1) for axis in AXIS_NAMES]
-        return (
-            *(f"{wing}division.{k + 1}" for wing in wings for k in range(self.links)),
-            *(f"{wing}stiffness_nm_rad.{joint}" for wing in wings for joint in joints),
-            *(f"{wing}damping_nms_rad.{joint}" for wing in wings for joint in joints),
-            *AERO_COEFFICIENTS,
-        )
+        return tuple(name for unknown in self.unknowns for name in unknown.names)
 
-    @property
+    @cached_property
     def searched(self) -> NDArray[np.bool_]:
         """(m,) which named parameters are searched; the others are fixed."""
-        joints = self.links > 1
-        own = [joints] * (len(self.parameter_names) - len(AERO_COEFFICIENTS))
-        return np.array([*own, *(name in self.free_aero for name in AERO_COEFFICIENTS)])
+        return np.array([unknown.searched for unknown in self.unknowns for _ in unknown.names])
 
     @property
     def parameter_limits(self) -> Array:
-        """(m, 2) least and greatest value of each named parameter within the box, SI units."""
-        box = self.flatten(self.decode(np.stack([self.lower, self.upper]))).T
-        n, w = self.links, self.wing_sets
-        ratios = [bound[: w * (n - 1)].reshape(w, n - 1) for bound in (self.lower, self.upper)]
-        # the last link's ratio to itself is one
-        low, high = (np.exp(np.concatenate([bound, np.zeros((w, 1))], axis=1)) for bound in ratios)
-        least = low / (low + high.sum(axis=1, keepdims=True) - high)
-        most = high / (high + low.sum(axis=1, keepdims=True) - low)
-        box[: w * n] = np.stack([least.ravel(), most.ravel()], axis=1)
-        return np.asarray(box)
+        """(m, 2) smallest and largest value of each named parameter within the box, SI units."""
+        box = np.repeat(self.flatten(self.fixed).T, 2, axis=1)
+        for unknown, _, named in self._parts():
+            if unknown.searched:
+                box[named] = np.stack(unknown.transform.limits(unknown.lower, unknown.upper), axis=1)
+        return box
+
+    def interval_rates(self, values: Array) -> Array:
+        """(m,) how fast the coordinate in which an interval is even changes with its value; 0 of fixed ones.
+
+        values : (m,) of the named parameters, SI units.
+        """
+        rates = np.zeros(values.shape)
+        for unknown, _, named in self._parts():
+            if unknown.searched:
+                rates[named] = unknown.transform.derivative(values[named])
+        return rates
+
+    def intervals(self, values: Array, half: Array, at_bound: Mapping[str, str]) -> dict[str, Interval]:
+        """Interval of each searched parameter: its ends where the half widths (m,), in coordinates, put them.
+
+        A side that ends beyond the box, or at whose bound the parameter lies, is not bounded by the samples.
+        """
+        found = {}
+        limits = self.parameter_limits
+        for unknown, _, named in self._parts():
+            if not unknown.searched:
+                continue
+            ends = np.stack(unknown.transform.interval(values[named], half[named]), axis=1)
+            for name, (low, high), (least, most) in zip(unknown.names, ends, limits[named], strict=True):
+                inside = low >= least and at_bound.get(name) != "lower"
+                below = high <= most and at_bound.get(name) != "upper"
+                found[name] = (float(low) if inside else None, float(high) if below else None)
+        return found
 
     def at_bound(self, x: Array) -> dict[str, str]:
         """Named parameters whose search coordinate in x (d,) lies at its bound, and which: "lower", "upper".
@@ -180,141 +244,123 @@ class SearchSpace:
         A link's length is searched as its ratio to the last link's, and stands for that ratio here.
         """
         near = BOUND_TOLERANCE * (self.upper - self.lower)
-        at = np.select([x <= self.lower + near, x >= self.upper - near], ["lower", "upper"], "")
+        ends = np.select([x <= self.lower + near, x >= self.upper - near], ["lower", "upper"], "")
         return {
-            name.replace("log_ratio", "division"): str(end)
-            for name, end in zip(self.names, at, strict=True)
+            name: str(end)
+            for unknown, at, _ in self._parts()
+            for name, end in zip(unknown.names, ends[at], strict=False)  # the last share has no coordinate
             if end
         }
 
-
-_FIELDS = {
-    "lift_factor": "lift_factor",
-    "centre_shift_m": "centre_shift",
-    "profile_drag": "profile_drag",
-    "lag_s": "lag",
-}
-
-
-def _decode_aero(name: str, x: Array, chord: float) -> Array:
-    if name == "lag_s":
-        return np.exp(x)
-    if name == "lift_factor":
-        return 1.0 + LIFT_UNIT * x
-    return x * (CENTRE_UNIT_CHORDS * chord if name == "centre_shift_m" else DRAG_UNIT)
-
-
-def _encode_aero(name: str, value: Array | float, chord: float) -> Array:
-    value = np.asarray(value, dtype=np.float64)
-    if name == "lag_s":
-        return np.log(value)
-    if name == "lift_factor":
-        return (value - 1.0) / LIFT_UNIT
-    return np.asarray(value / (CENTRE_UNIT_CHORDS * chord if name == "centre_shift_m" else DRAG_UNIT))
+    def parameter(self, name: str) -> Parameter:
+        """The kind of a named parameter."""
+        return next(unknown.parameter for unknown in self.unknowns if name in unknown.names)
 
 
 def search_space(
     model: ChainModel,
     *,
     separate_wings: bool = False,
-    aero_coefficients: Sequence[str] = AERO_COEFFICIENTS,
+    aero_coefficients: Sequence[str] | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
 ) -> SearchSpace:
     """The unknowns of a model, bounded around beam and thin-airfoil theory.
 
-    ``bounds`` overrides them: low and high in SI units for any of ``BOUND_NAMES``.
+    Parameters
+    ----------
+    model : ChainModel
+    separate_wings : bool
+        Whether both surfaces of a mirror pair have parameters of their own.
+    aero_coefficients : sequence of str, optional
+        The corrections to search; None: all.
+    bounds : mapping of str to (float, float), optional
+        Low and high in SI units, by the name of a parameter, in the place of its own.
 
     Raises
     ------
-    InvalidInput : a bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
+    InvalidInput
+        A bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
     """
-    given = dict(bounds or {})
-    for name, pair in given.items():
-        _check_bound(name, pair)
-    for index, name in enumerate(aero_coefficients):
-        if name not in AERO_COEFFICIENTS:
+    known = {parameter.name: parameter for parameter in model.parameters}
+    for name, pair in (bounds or {}).items():
+        _check_bound(known, name, pair)
+    corrections = [parameter.name for parameter in model.parameters if parameter.correction]
+    for index, name in enumerate(aero_coefficients or ()):
+        if name not in corrections:
             raise InvalidInput(
                 f"{name!r} is not an aerodynamic correction",
                 pointer=f"/model/aero_coefficients/{index}",
-                hint=f"use some of {', '.join(AERO_COEFFICIENTS)}",
+                hint=f"use some of {', '.join(corrections)}",
             )
-    free_aero = tuple(name for name in AERO_COEFFICIENTS if name in aero_coefficients)
-    flexible = max(1, len(model.aircraft.flexible_surfaces))
-    wing_sets = flexible if separate_wings else 1
-    fixed = physical_guess(model, wing_sets=wing_sets)
-    n, chord = model.links_per_wing, model.aircraft.surfaces[0].mean_chord_m
-    wings = [""] if wing_sets == 1 else [f"wing_{i + 1}." for i in range(wing_sets)]
-    joints = [f"joint_{j + 1}.{axis}" for j in range(n - 1) for axis in AXIS_NAMES]
-    names = [f"{wing}log_ratio.{k + 1}" for wing in wings for k in range(n - 1)]
-    guess = [np.zeros(wing_sets * (n - 1))]
-    half = [_ratio_range(n, given.get("division")) * np.ones(wing_sets * (n - 1))]
-    lower, upper = [-half[0]], [half[0]]
-    for label, value, factor in (
-        ("stiffness_nm_rad", fixed.stiffness, STIFFNESS_FACTOR),
-        ("damping_nms_rad", np.maximum(fixed.damping, 1e-6 * fixed.stiffness), DAMPING_FACTOR),
-    ):
-        names += [f"{wing}{label}.{joint}" for wing in wings for joint in joints]
-        centre = np.log(value.ravel())
-        low, high = centre - np.log(factor), centre + np.log(factor)
-        if label in given:
-            low, high = (np.full_like(centre, np.log(bound)) for bound in given[label])
-        guess.append(np.clip(centre, low, high))
-        lower.append(low)
-        upper.append(high)
-    ranges = {
-        "lift_factor": LIFT_RANGE,
-        "centre_shift_m": (-CENTRE_RANGE_CHORDS * chord, CENTRE_RANGE_CHORDS * chord),
-        "profile_drag": DRAG_RANGE,
-        "lag_s": (model.natural_lag_s / LAG_FACTOR, model.natural_lag_s * LAG_FACTOR),
-    }
-    for name in free_aero:
-        low, high = (_encode_aero(name, bound, chord) for bound in given.get(name, ranges[name]))
-        names.append(name)
-        guess.append(np.clip(_encode_aero(name, getattr(fixed, _FIELDS[name])[0], chord), low, high)[None])
-        lower.append(low[None])
-        upper.append(high[None])
-    return SearchSpace(
-        model=model,
-        names=tuple(names),
-        lower=np.concatenate(lower),
-        upper=np.concatenate(upper),
-        guess=np.concatenate(guess),
-        wing_sets=wing_sets,
-        free_aero=free_aero,
-        fixed=fixed,
-    )
+    free = tuple(name for name in corrections if aero_coefficients is None or name in aero_coefficients)
+    fixed = physical_guess(model, separate_wings=separate_wings)
+    unknowns = []
+    for parameter in model.parameters:
+        for prefix, surfaces in _owners(model, parameter, separate_wings=separate_wings):
+            searched = parameter.name in free or not parameter.correction
+            given = (bounds or {}).get(parameter.name) if searched else None
+            unknowns.append(_unknown(model, fixed, parameter, prefix, surfaces, given, searched=searched))
+    return SearchSpace(model=model, unknowns=tuple(unknowns), free_aero=free, fixed=fixed)
 
 
-def _ratio_range(links: int, bound: Sequence[float] | None) -> float:
-    """Half width of the log-ratios for which every share stays inside [low, high]."""
-    if bound is None or links == 1:
-        return RATIO_RANGE
-    low, high = bound
-    if not low * links < 1.0 < high * links:
-        raise InvalidInput(
-            f"division bounds {low:g}..{high:g} leave no room for {links} links",
-            pointer="/model/bounds/division",
-            hint=f"they must hold 1/{links}",
-        )
-    # the extreme shares of a box of log-ratios +-r: 1 / (1 + e^r + (n - 2) e^r) at least, the mirror image at
-    # most
-    smallest = np.log((1.0 / low - 1.0) / (links - 1)) if low > 0 else RATIO_RANGE
-    largest = np.log((links - 1) / (1.0 / high - 1.0)) if high < 1 else RATIO_RANGE
-    return float(min(RATIO_RANGE, smallest / 2, largest / 2))
+def _owners(
+    model: ChainModel, parameter: Parameter, *, separate_wings: bool
+) -> list[tuple[str, tuple[int, ...]]]:
+    """Who has values of a parameter of its own: prefix of the names, and indices of the surfaces."""
+    if parameter.scope == "aircraft":
+        return [("", ())]
+    separate = separate_wings and parameter.scope == "surface"
+    groups = model.sets(separate_wings=separate)
+    if len(groups) == 1:
+        return [("", groups[0])]
+    if len(model.pairs) == 1:
+        return [(f"wing_{number}.", group) for number, group in enumerate(groups, start=1)]
+    return [(f"{model.label(group)}.", group) for group in groups]
 
 
-def _check_bound(name: str, pair: Sequence[float]) -> None:
+def _unknown(
+    model: ChainModel,
+    fixed: ParameterBatch,
+    parameter: Parameter,
+    prefix: str,
+    surfaces: tuple[int, ...],
+    bounds: Sequence[float] | None,
+    *,
+    searched: bool,
+) -> Unknown:
+    chosen = model.set_of(fixed)
+    sets = tuple(sorted({chosen[k] for k in surfaces}))
+    surface = model.aircraft.surfaces[surfaces[0]] if surfaces else model.reference_surface
+    values = fixed[parameter.name]
+    values = (values[0, sets[0]] if sets else values[0]).reshape(-1)
+    transform = parameter.transform(surface)
+    if searched and bounds is not None:
+        low, high = bounds
+        lower, upper = transform.box(low, high, values.size)
+    elif searched:
+        cut = CutSurface(surface, model.flight, fixed["division"][:, sets[0] if sets else 0])
+        lower, upper = parameter.bounds(cut)
+    else:
+        lower = upper = np.zeros(0)
+    guess = transform.forward(values) if lower.size else lower
+    # no damping at all has no logarithm: its search begins in the middle
+    guess = np.where(np.isfinite(guess), guess, 0.5 * (lower + upper))
+    guess = np.clip(guess, lower, upper)
+    return Unknown(parameter, model.links_per_wing, prefix, sets, surfaces, transform, lower, upper, guess)
+
+
+def _check_bound(known: Mapping[str, Parameter], name: str, pair: Sequence[float]) -> None:
     pointer = f"/model/bounds/{name}"
-    if name not in BOUND_NAMES:
-        raise InvalidInput(f"{name} has no bounds", pointer=pointer, hint=f"use {', '.join(BOUND_NAMES)}")
+    if name not in known:
+        raise InvalidInput(f"{name} has no bounds", pointer=pointer, hint=f"use {', '.join(known)}")
     low, high = pair
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidInput(f"{name} is bounded by {low:g}..{high:g}", pointer=pointer, hint="give low < high")
-    if name in ("stiffness_nm_rad", "damping_nms_rad", "lag_s", "lift_factor") and low <= 0:
+    if known[name].positive and low <= 0:
         raise InvalidInput(
             f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must be greater than 0"
         )
-    if name in ("profile_drag", "division") and low < 0:
+    if known[name].minimum == 0.0 and low < 0:
         raise InvalidInput(
             f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must not be negative"
         )

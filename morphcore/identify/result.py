@@ -70,7 +70,9 @@ class IdentifyResult(Shown):
         }
 
     def _model_document(self) -> dict[str, Any]:
+        named = self.parameters.surfaces is not None
         return parameters_document(self.parameters) | {
+            **({"separate_wings": self.settings.separate_wings} if named else {}),
             "lattice": self.settings.lattice.to_document(),
             "step_s": self.settings.step_s,
             "start": self.settings.start,
@@ -83,9 +85,10 @@ class IdentifyResult(Shown):
         return Summary(
             f"IdentifyResult: {self.parameters.links} links per wing",
             {
-                "stiffness, N m/rad": self.parameters.stiffness,
-                "damping, N m s/rad": self.parameters.damping,
-                "division": self.parameters.division,
+                **{
+                    f"{parameter.name}, {parameter.unit}": self.parameters[parameter.name]
+                    for parameter in self.model.parameters
+                },
                 "search": {name: self.search.get(name) for name in ("method", "seed", "flights", "wall_s")},
             },
             ("sample", "role", "J rigid, rad^2", "J identified", *angles),

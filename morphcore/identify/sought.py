@@ -6,12 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from morphcore.identify.parameters import AERO_COEFFICIENTS
+from morphcore.models.parameters import Parameter
 from morphcore.simulate.trajectory import Trajectory
 
-# the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and a
-# fit would put it where it mends other errors of pitch
-ASYMMETRIC_ALONE = ("profile_drag",)
 # 0.6 degrees: above what the noise of an attitude sensor makes of a symmetric flight, and far below what a
 # flight shows that can tell a drag
 ASYMMETRIC_RAD = 0.01
@@ -24,8 +21,7 @@ def asymmetric(sample: Trajectory) -> bool:
     return bool(max(apart, turned) > ASYMMETRIC_RAD)
 
 
-def corrections_told(training: Sequence[Trajectory]) -> tuple[str, ...]:
-    """The aerodynamic corrections that the flights to fit can tell."""
-    if any(asymmetric(sample) for sample in training):
-        return AERO_COEFFICIENTS
-    return tuple(name for name in AERO_COEFFICIENTS if name not in ASYMMETRIC_ALONE)
+def corrections_told(parameters: Sequence[Parameter], training: Sequence[Trajectory]) -> tuple[str, ...]:
+    """The corrections among a model's parameters that the flights to fit can tell."""
+    uneven = any(asymmetric(sample) for sample in training)
+    return tuple(each.name for each in parameters if each.correction and (uneven or not each.asymmetric))

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from morphcore.identify.parameters import CENTRE_UNIT_CHORDS, DRAG_UNIT, LIFT_UNIT, SearchSpace
+from morphcore.identify.parameters import Interval, SearchSpace
 from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
-Interval = tuple[float | None, float | None]
 
 # standard deviation along a direction, in search coordinates (factor e for a stiffness), beyond which
 UNSEEN_SPREAD = 1.0
@@ -109,9 +108,9 @@ def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) 
     slope = (named[1:] - named[0]).T / probe
     standard_error = np.sqrt(np.maximum(np.einsum("md,de,me->m", slope, covariance, slope), 0.0))
     at_bound = space.at_bound(x)
-    rates = _own_rates(space, named[0])
+    rates = space.interval_rates(named[0])
     half = float(stdtrit(freedom, 0.5 + 0.5 * PROBABILITY)) * standard_error * rates
-    intervals = _intervals(space, named[0], half, at_bound)
+    intervals = space.intervals(named[0], half, at_bound)
     wide = {
         name
         for name, spread in zip(space.parameter_names, standard_error * rates, strict=True)
@@ -129,59 +128,6 @@ def uncertainty(space: SearchSpace, x: Array, residual: Array, jacobian: Array) 
         undetermined=tuple(name for name, ends in intervals.items() if ends == (None, None) or name in wide),
         at_bound=tuple(at_bound),
     )
-
-
-def _shape(name: str) -> str:
-    """In which coordinate a parameter's interval is even: "log", "odds" or "linear"."""
-    if "division" in name:
-        return "odds"
-    return "log" if "stiffness" in name or "damping" in name or name == "lag_s" else "linear"
-
-
-def _own_rates(space: SearchSpace, value: Array) -> Array:
-    """(m,) by how much the coordinate of each parameter changes with its value, per SI unit."""
-    chord = space.model.aircraft.surfaces[0].mean_chord_m
-    units = {
-        "lift_factor": LIFT_UNIT,
-        "centre_shift_m": CENTRE_UNIT_CHORDS * chord,
-        "profile_drag": DRAG_UNIT,
-    }
-    rates = []
-    for name, at, searched in zip(space.parameter_names, value, space.searched, strict=True):
-        if not searched:
-            rates.append(0.0)
-        elif _shape(name) == "odds":
-            rates.append(1.0 / (at * (1.0 - at)))
-        else:
-            rates.append(1.0 / at if _shape(name) == "log" else 1.0 / units[name])
-    return np.array(rates)
-
-
-def _intervals(
-    space: SearchSpace, value: Array, half: Array, at_bound: dict[str, str]
-) -> dict[str, Interval]:
-    """Interval of each searched parameter: its ends where the half widths (m,), in coordinates, put them.
-
-    A side that ends beyond the box, or at whose bound the parameter lies, is not bounded by the samples.
-    """
-    rates, found = _own_rates(space, value), {}
-    for name, at, width, rate, limits, searched in zip(
-        space.parameter_names, value, half, rates, space.parameter_limits, space.searched, strict=True
-    ):
-        if not searched:
-            continue
-        with np.errstate(over="ignore"):
-            if _shape(name) == "log":
-                ends = at * np.exp(-width), at * np.exp(width)
-            elif _shape(name) == "odds":
-                odds = at / (1.0 - at)
-                ends = tuple(1.0 / (1.0 + np.exp(-sign * width) / odds) for sign in (-1.0, 1.0))
-            else:
-                ends = at - width / rate, at + width / rate
-        low = ends[0] >= limits[0] and at_bound.get(name) != "lower"
-        high = ends[1] <= limits[1] and at_bound.get(name) != "upper"
-        found[name] = (float(ends[0]) if low else None, float(ends[1]) if high else None)
-    return found
 
 
 def _finite(value: float) -> float | None:

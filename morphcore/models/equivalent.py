@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import AERO_ROWS, JONES_B1, JONES_B2, JONES_MEAN_LAG
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
+from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import whole_number
-from morphcore.geometry.mirror import Mirror, mirror_of
+from morphcore.geometry.mirror import Mirror, mirror_groups, mirror_of
 from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
 from morphcore.models.kernels.layout import (
-    AERO_C,
     FORCE_C,
     LINKS_C,
     MOMENT_C,
     joint_rows_of_scratch,
     state_rows,
 )
-from morphcore.models.links import drag_areas, joint_stiffness, link_edges, link_masses, strip_overlap
+from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
@@ -33,47 +32,60 @@ from morphdata.parameters import MAX_LINKS
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-NEUTRAL_LIFT_FACTOR = 1.0
-SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
-
 
 @dataclass(frozen=True, repr=False)
 class ParameterBatch(Shown):
-    """Parameters of many equivalent models of one aircraft (p particles, w wing sets, n links).
+    """Parameters of many equivalent models of one aircraft (p particles, w sets, n links).
 
-    ``w`` is 1 where all flexible surfaces share their parameters, else the number of flexible surfaces.
-
-    division : (p, w, n) fractions of the span, summing to one. stiffness, damping : (p, w, n - 1, 3) of flap,
-    torsion, lag, N m/rad and N m s/rad. lift_factor (-), centre_shift (m, forward positive), profile_drag
-    (-), lag (s) : (p,).
+    Attributes
+    ----------
+    values : mapping of str to ndarray
+        By the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span that sum
+        to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and lag;
+        ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``centre_shift_m`` (forward positive) and
+        ``lag_s`` (p,): those of its largest surface, others have them in proportion to their chords.
+    surfaces : tuple of tuples of str, optional
+        Names of the surfaces of each set. None: one set is that of all flexible surfaces, which are one
+        mirror pair; several are those of the flexible surfaces in the aircraft's order.
     """
 
-    division: Array
-    stiffness: Array
-    damping: Array
-    lift_factor: Array
-    centre_shift: Array
-    profile_drag: Array
-    lag: Array
+    values: Mapping[str, Array]
+    surfaces: tuple[tuple[str, ...], ...] | None = None
+
+    def __getitem__(self, name: str) -> Array:
+        """The values of one parameter."""
+        return self.values[name]
 
     @property
     def particles(self) -> int:
         """Number of parameter sets."""
-        return int(self.division.shape[0])
+        return int(self["division"].shape[0])
 
     @property
-    def wing_sets(self) -> int:
-        """Sets of wing parameters, w."""
-        return int(self.division.shape[1])
+    def sets(self) -> int:
+        """Sets of values that surfaces have, w."""
+        return int(self["division"].shape[1])
 
     @property
     def links(self) -> int:
         """Links per flexible surface."""
-        return int(self.division.shape[2])
+        return int(self["division"].shape[2])
 
     def select(self, index: NDArray[np.int64] | slice) -> ParameterBatch:
-        """Some of the parameter sets."""
-        return ParameterBatch(**{name: value[index] for name, value in vars(self).items()})
+        """Some of the particles."""
+        return replace(self, values={name: value[index] for name, value in self.values.items()})
+
+    def changed(self, **values: Array) -> ParameterBatch:
+        """The same with other values of some parameters.
+
+        Raises
+        ------
+        KeyError
+            It has no such parameter.
+        """
+        if not values.keys() <= self.values.keys():
+            raise KeyError(f"of {', '.join(values)} only {', '.join(self.values)} are parameters")
+        return replace(self, values={**self.values, **values})
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,16 +146,112 @@ class ChainModel(Shown):
         return int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
 
     @property
-    def relative_chord(self) -> Array:
-        """Chord of each link's surface over the first surface's, (links,): it scales the lag times."""
-        chords = [s.mean_chord_m for s in self.aircraft.surfaces]
-        return np.repeat(np.array(chords) / chords[0], self.surfaces[:, 1])
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that can be identified, in the order of reports."""
+        return tuple(CHAIN_PARAMETERS)
 
-    @property
-    def natural_lag_s(self) -> float:
-        """Mean lag of Jones' indicial function at the flight's airspeed and the first surface's chord."""
-        chord = self.aircraft.surfaces[0].mean_chord_m
-        return JONES_MEAN_LAG * chord / (2 * self.flight.airspeed_m_s)
+    @cached_property
+    def reference_surface(self) -> Surface:
+        """The largest surface, whose chord lengths and times of the whole aircraft refer to."""
+        return max(self.aircraft.surfaces, key=lambda surface: (surface.area_m2, surface.mean_chord_m))
+
+    @cached_property
+    def flexible(self) -> tuple[int, ...]:
+        """Indices of the surfaces that bend; of the largest where none does."""
+        surfaces = self.aircraft.surfaces
+        found = tuple(k for k, surface in enumerate(surfaces) if surface.flexible)
+        return found or (surfaces.index(self.reference_surface),)
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[int, ...], ...]:
+        """Indices of the flexible surfaces by mirror pair; a surface without an image is alone.
+
+        The largest come first, then names decide: the same in whatever order the aircraft has them.
+        """
+        groups = mirror_groups([self.aircraft.surfaces[k] for k in self.flexible])
+        return tuple(sorted((tuple(self.flexible[k] for k in group) for group in groups), key=self._rank))
+
+    def _rank(self, group: Sequence[int]) -> tuple[float, str]:
+        return -self.aircraft.surfaces[group[0]].area_m2, self.label(group)
+
+    def label(self, group: Sequence[int]) -> str:
+        """The name of a surface, or of the right one of a mirror pair."""
+        surfaces = [self.aircraft.surfaces[k] for k in group]
+        return min(surfaces, key=lambda surface: surface.side != "right").name
+
+    def sets(self, *, separate_wings: bool = False) -> tuple[tuple[int, ...], ...]:
+        """Indices of the surfaces that share a set of parameters: mirror pairs, or each by itself."""
+        if not separate_wings:
+            return self.pairs
+        if len(self.pairs) == 1:
+            return tuple((k,) for k in self.flexible)
+        return tuple(sorted(((k,) for group in self.pairs for k in group), key=self._rank))
+
+    def set_names(self, sets: Sequence[Sequence[int]]) -> tuple[tuple[str, ...], ...] | None:
+        """Whose a batch's sets are, by name, the label first; None where all flexible surfaces are a pair."""
+        if len(self.pairs) == 1:
+            return None
+        names = [[self.aircraft.surfaces[k].name for k in group] for group in sets]
+        first = [self.label(group) for group in sets]
+        return tuple(
+            (label, *(name for name in group if name != label))
+            for label, group in zip(first, names, strict=True)
+        )
+
+    def set_of(self, batch: ParameterBatch) -> tuple[int, ...]:
+        """Which set of a batch each surface has; -1 for those that do not bend.
+
+        Raises
+        ------
+        InvalidInput
+            The batch has no set for a surface, or half an aircraft would have wings that differ.
+        """
+        surfaces = self.aircraft.surfaces
+        chosen = [-1] * len(surfaces)
+        if batch.surfaces is None:
+            if batch.sets not in (1, len(self.flexible)) or batch.sets < len(self.pairs):
+                raise InvalidInput(
+                    f"the parameters are of {batch.sets} wings, the model has {len(self.flexible)}",
+                    pointer="/model/parameters/division",
+                    hint="give the model of this aircraft",
+                )
+            for number, k in enumerate(self.flexible):
+                chosen[k] = min(number, batch.sets - 1)
+            return tuple(chosen)
+        known = {name: k for k, names in enumerate(batch.surfaces) for name in names}
+        for k in self.flexible:
+            own = {known.get(surfaces[k].name)} | {known.get(s.name) for s in self.lattice.images[k : k + 1]}
+            if len(own) > 1 or None in own:
+                raise InvalidInput(
+                    f"the parameters have none for the surface {surfaces[k].name!r} and what mirrors it",
+                    pointer="/model/parameters/surfaces",
+                    hint=f"they are for {', '.join(known)}: give the model of this aircraft",
+                )
+            chosen[k] = known[surfaces[k].name]
+        return tuple(chosen)
+
+    def is_even(self, batch: ParameterBatch) -> bool:
+        """Whether mirror images share their parameters: then half the aircraft can stand for it."""
+        chosen, mirror = self.set_of(batch), self.mirror
+        return mirror is not None and all(
+            chosen[k] == chosen[image] for k, image in zip(mirror.own, mirror.image, strict=True)
+        )
+
+    def on_surface(self, batch: ParameterBatch, number: int) -> dict[str, Array]:
+        """Values (p, ...) of all parameters on one surface: the batch's, in proportion, or its own guess."""
+        surface, chosen = self.aircraft.surfaces[number], self.set_of(batch)[number]
+        links = int(self.surfaces[number, 1])
+        cut = CutSurface(surface, self.flight, np.full((batch.particles, links), 1.0 / links))
+        values = {}
+        for parameter in self.parameters:
+            known = batch.values.get(parameter.name)
+            if parameter.scope == "aircraft" and known is not None:
+                values[parameter.name] = known * parameter.in_proportion(surface, self.reference_surface)
+            elif parameter.scope != "aircraft" and known is not None and surface.flexible:
+                values[parameter.name] = known[:, chosen]
+            else:
+                values[parameter.name] = parameter.guess(cut)
+        return values
 
 
 def chain_model(
@@ -178,34 +286,69 @@ def _chain_model(
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
 
 
-def physical_guess(model: ChainModel, division: Array | None = None, *, wing_sets: int = 1) -> ParameterBatch:
+def physical_guess(
+    model: ChainModel, division: Array | None = None, *, separate_wings: bool = False
+) -> ParameterBatch:
     """Parameters from beam and thin-airfoil theory: k = EI / l, c = beta k, neutral corrections, Jones' lag.
 
-    ``division`` (p, w, n) defaults to one particle of equal links. Where all wings share parameters the first
-    flexible surface gives them.
+    Every flexible surface has those of its own beam, mirror images share them unless wings are separate.
+
+    Parameters
+    ----------
+    model : ChainModel
+    division : ndarray, shape (p, w, n) or (p, 1, n), optional
+        Shares of the span of each set of `ChainModel.sets`, or of all alike; None: one particle of equal
+        links.
+    separate_wings : bool
+        Whether both surfaces of a mirror pair have a set of their own.
     """
+    sets = model.sets(separate_wings=separate_wings)
     n = model.links_per_wing
-    if division is None:
-        division = np.full((1, wing_sets, n), 1.0 / n)
-    flexible = model.aircraft.flexible_surfaces or model.aircraft.surfaces[:1]
-    particles = division.shape[0]
-    stiffness = np.stack(
-        [
-            joint_stiffness(s, link_edges(division[:, i], s.span_m))
-            for i, s in enumerate(flexible[: division.shape[1]])
-        ],
-        axis=1,
-    )
-    beta = np.array([s.material.stiffness_damping_s for s in flexible[: division.shape[1]]])
+    shares = np.full((1, 1, n), 1.0 / n) if division is None else division
+    shares = np.broadcast_to(shares, (shares.shape[0], len(sets), n))
+    cuts = [
+        CutSurface(model.aircraft.surfaces[group[0]], model.flight, shares[:, k])
+        for k, group in enumerate(sets)
+    ]
+    reference = CutSurface(model.reference_surface, model.flight, shares[:, 0])
     return ParameterBatch(
-        division=division,
-        stiffness=stiffness,
-        damping=stiffness * beta[:, None, None],
-        lift_factor=np.full(particles, NEUTRAL_LIFT_FACTOR),
-        centre_shift=np.zeros(particles),
-        profile_drag=np.full(particles, flexible[0].profile_drag),
-        lag=np.full(particles, model.natural_lag_s),
+        {
+            parameter.name: parameter.guess(reference)
+            if parameter.scope == "aircraft"
+            else np.stack([parameter.guess(cut) for cut in cuts], axis=1)
+            for parameter in model.parameters
+        },
+        model.set_names(sets),
     )
+
+
+def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
+    """Return parameters as the surfaces of a model have them.
+
+    A single set for an aircraft of several unlike flexible surfaces is that of its largest one. The others
+    are off their own beam theory by the same factors, and keep their own profile drag.
+
+    Raises
+    ------
+    InvalidInput
+        The batch is of another aircraft.
+    """
+    if batch.surfaces is None and batch.sets == 1 < len(model.pairs):
+        guess = physical_guess(model, batch["division"])
+        values = dict(batch.values)
+        for parameter in model.parameters:
+            known, own = batch.values.get(parameter.name), guess[parameter.name]
+            if known is None or parameter.scope == "aircraft":
+                continue
+            if parameter.scope == "surface" and parameter.positive:
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    factor = np.where(own[:, 0] > 0.0, known[:, 0] / own[:, 0], 1.0)
+                own = own * factor[:, None]
+            values[parameter.name] = own.copy()
+            values[parameter.name][:, 0] = known[:, 0]
+        batch = ParameterBatch(values, guess.surfaces)
+    model.set_of(batch)
+    return batch
 
 
 @dataclass(frozen=True)
@@ -240,63 +383,56 @@ def from_lanes(blocks: Array, particles: int) -> Array:
     return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:particles])
 
 
-def lag_weights(lag_s: Array, step_s: float) -> Array:
-    """Weights (..., 4) of one step of both of Jones' exponentials for mean lag times (...), s.
-
-    For each of slow and fast: the decay e = exp(-h / T), and 1 - (1 - e) T / h.
-    """
-    weights = []
-    for semichords in (1.0 / JONES_B1, 1.0 / JONES_B2):
-        z = step_s / np.maximum(lag_s * semichords / JONES_MEAN_LAG, SHORTEST_LAG_S)
-        weights += [np.exp(-z), 1.0 + np.expm1(-z) / z]
-    return np.stack(weights, axis=-1)
-
-
 def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> LaneConstants:
-    """Lay a batch of parameters out for the kernels and for steps of ``step_s``.
+    """Lay a batch of parameters out for the kernels.
+
+    Parameters
+    ----------
+    model : ChainModel
+        What flies: the aircraft, or half of it.
+    batch : ParameterBatch
+        As the model's surfaces have them (see `fitted`).
+    step_s : float
+        Time step, s.
 
     Raises
     ------
-    ValueError : half an aircraft cannot have wings of different parameters.
+    InvalidInput
+        The batch is of another aircraft, or half an aircraft would have wings that differ.
     """
-    if model.lattice.images and batch.wing_sets > 1:
-        raise ValueError("wings with parameters of their own need the whole aircraft")
     particles = batch.particles
     links = np.zeros((particles, model.links, LINK_ROWS))
-    stiffness, damping, overlap = [], [], []
     touched = np.zeros((particles, model.links, 2), dtype=np.int64)
-    wing = 0
-    for surface, part, row in zip(
-        model.aircraft.surfaces, model.lattice.lattices, model.surfaces, strict=True
+    every = []
+    for number, (surface, part, row) in enumerate(
+        zip(model.aircraft.surfaces, model.lattice.lattices, model.surfaces, strict=True)
     ):
-        first, count = row[0], row[1]
+        first, count = int(row[0]), int(row[1])
         mine = slice(first, first + count)
-        if surface.flexible:
-            chosen = min(wing, batch.division.shape[1] - 1)
-            wing += 1
-            edges = link_edges(batch.division[:, chosen], surface.span_m)
-            stiffness.append(batch.stiffness[:, chosen].reshape(particles, -1))
-            damping.append(batch.damping[:, chosen].reshape(particles, -1))
-            drag = batch.profile_drag
-        else:
-            edges = np.tile([0.0, surface.span_m], (particles, 1))
-            drag = np.full(particles, surface.profile_drag)
-        links[:, mine, :7] = link_masses(surface, edges)
-        links[:, first + 1 : first + count, 7] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
-        area, centroid = drag_areas(surface, edges)
-        links[:, mine, 8] = area * drag[:, None]
-        links[:, mine, 9] = centroid
-        weight, middle = strip_overlap(surface, part, edges)
-        overlap.append(np.stack([weight, middle], axis=-1).reshape(particles, -1))
-        is_touched = weight > 0.0
-        touched[:, mine, 0] = np.argmax(is_touched, axis=1)
-        touched[:, mine, 1] = part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)
-    weights = lag_weights(batch.lag[:, None] * model.relative_chord, step_s)
-    weights[..., ::2] **= 0.5  # the step carries the lag states by halves
-    links[:, :, 10:] = weights
-    values = np.zeros((particles, LINKS_C))
-    values[:, AERO_C : AERO_C + AERO_ROWS] = np.stack([batch.lift_factor, batch.centre_shift], axis=1)
-    rows = np.concatenate([values, links.reshape(particles, -1), *stiffness, *damping, *overlap], axis=1)
+        laid = SurfaceRows(
+            surface,
+            part,
+            step_s,
+            links[:, mine],
+            stiffness=np.zeros((particles, 3 * (count - 1))),
+            damping=np.zeros((particles, 3 * (count - 1))),
+            overlap=np.zeros((particles, 2 * part.spanwise * count)),
+            touched=touched[:, mine],
+        )
+        values = model.on_surface(batch, number)
+        for parameter in model.parameters:
+            parameter.apply(laid, values[parameter.name])
+        every.append(laid)
+    rows = np.concatenate(
+        [
+            np.zeros((particles, LINKS_C)),
+            links.reshape(particles, -1),
+            *(surface.stiffness for surface in every),
+            *(surface.damping for surface in every),
+            *(surface.overlap for surface in every),
+        ],
+        axis=1,
+    )
     low = to_lanes(touched[..., 0].astype(np.float64)).min(axis=2)
     high = to_lanes(touched[..., 1].astype(np.float64)).max(axis=2)
     return LaneConstants(to_lanes(rows), np.stack([low, high], axis=-1).astype(np.int64), particles)

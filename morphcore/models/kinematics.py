@@ -64,15 +64,14 @@ def link_poses(
     particles = q_joint.shape[0]
     R_BL = np.empty((particles, model.links, 3, 3))
     r_B = np.empty((particles, model.links, 3))
-    joint, wing = 0, 0
+    joint, chosen = 0, model.set_of(batch)
     for s, surface in enumerate(model.aircraft.surfaces):
         first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
         R_BL[:, first] = hinges[s, :9].reshape(3, 3)
         r_B[:, first] = hinges[s, H_ORIGIN:]
         lengths = np.zeros((particles, 0))
         if surface.flexible:
-            edges = link_edges(batch.division[:, min(wing, batch.division.shape[1] - 1)], surface.span_m)
-            wing += 1
+            edges = link_edges(batch["division"][:, chosen[s]], surface.span_m)
             lengths = surface.span_sign * np.diff(edges, axis=1)
         for k in range(1, count):
             link = first + k
@@ -87,13 +86,12 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
     """Tips of the elastic axes (p, s, 3) in B relative to each surface's root, m."""
     R_BL, r_B = link_poses(model, batch, hinges, q_joint)
     tips = np.empty((q_joint.shape[0], len(model.aircraft.surfaces), 3))
-    wing = 0
+    chosen = model.set_of(batch)
     for s, surface in enumerate(model.aircraft.surfaces):
         last = int(model.surfaces[s, 0] + model.surfaces[s, 1]) - 1
         length = np.full(q_joint.shape[0], surface.span_m)
         if surface.flexible:
-            length = surface.span_m * batch.division[:, min(wing, batch.division.shape[1] - 1), -1]
-            wing += 1
+            length = surface.span_m * batch["division"][:, chosen[s], -1]
         tips[:, s] = (
             r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
         )

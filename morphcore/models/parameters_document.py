@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from morphcore.models.equivalent import ParameterBatch
-from morphdata.parameters import AXES, Parameters, WholeResult
+from morphcore.models.parameters import CHAIN_PARAMETERS
+from morphdata.parameters import AXES, Parameters, SurfaceParameters, WholeResult
 
+Array = NDArray[np.float64]
 Document = dict[str, Any]
 
 
@@ -24,8 +27,7 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
     Returns
     -------
-    ParameterBatch
-        Of one particle.
+    ParameterBatch of one particle.
 
     Raises
     ------
@@ -39,40 +41,74 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
 
 def parameter_batch(given: Parameters) -> ParameterBatch:
-    """Return the parameters of a document as a batch of one particle; the division adds up to 1 exactly."""
-    wings, links = len(given.divisions), given.links_per_wing
-    division = np.array(given.divisions)
-    joints = (1, wings, links - 1, AXES)
+    """Return the parameters of a document as a batch of one particle; each division adds up to 1 exactly."""
+    links, wings = given.links_per_wing, len(given.divisions)
+    values = _structure(given, wings, links)
+    whole = set()
+    for parameter in CHAIN_PARAMETERS:
+        if not parameter.correction:
+            continue
+        value = np.full(1, getattr(given.aero, parameter.name, parameter.default), dtype=np.float64)
+        if parameter.scope == "aircraft":
+            whole.add(parameter.name)
+        values[parameter.name] = value if parameter.scope == "aircraft" else np.tile(value, wings)
+    surfaces = None
+    if given.surfaces:
+        owners = {name: [name] for name, own in given.surfaces.items() if isinstance(own, SurfaceParameters)}
+        for name, own in given.surfaces.items():
+            if not isinstance(own, SurfaceParameters):
+                owners[own.mirror_of].append(name)
+        sets = [own for own in given.surfaces.values() if isinstance(own, SurfaceParameters)]
+        rows = [_structure(own, 1, links) for own in sets]
+        for parameter in CHAIN_PARAMETERS:
+            if parameter.correction and parameter.scope != "aircraft":
+                for row, own in zip(rows, sets, strict=True):
+                    row[parameter.name] = np.full(1, getattr(own, parameter.name, parameter.default))
+        values |= {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+        surfaces = tuple(tuple(names) for names in owners.values())
     return ParameterBatch(
-        division=(division / division.sum(axis=1, keepdims=True))[None],
-        stiffness=np.array(given.stiffness_nm_rad, dtype=np.float64).reshape(joints),
-        damping=np.array(given.damping_nms_rad, dtype=np.float64).reshape(joints),
-        lift_factor=np.array([given.aero.lift_factor]),
-        centre_shift=np.array([given.aero.centre_shift_m]),
-        profile_drag=np.array([given.aero.profile_drag]),
-        lag=np.array([given.aero.lag_s]),
+        {name: value if name in whole else value[None] for name, value in values.items()}, surfaces
     )
+
+
+def _structure(given: Parameters | SurfaceParameters, wings: int, links: int) -> dict[str, Array]:
+    """Division (w, n), stiffness and damping (w, n - 1, 3) of w wings."""
+    division = np.array(given.division, dtype=np.float64).reshape(wings, links)
+    joints = (wings, links - 1, AXES)
+    return {
+        "division": division / division.sum(axis=1, keepdims=True),
+        "stiffness_nm_rad": np.array(given.stiffness_nm_rad, dtype=np.float64).reshape(joints),
+        "damping_nms_rad": np.array(given.damping_nms_rad, dtype=np.float64).reshape(joints),
+    }
 
 
 def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
     """Write one parameter set of a batch as a ``model`` object; ``parameters_from_document`` reads it back.
 
-    Shared parameters are written flat; where each wing has its own, with one more leading axis.
+    Shared parameters are written flat; where each wing has its own, with one more leading axis. Where the
+    batch names the surfaces of its sets, the flat ones are those of the first and ``surfaces`` has all.
     """
-    shared = batch.division.shape[1] == 1
+    flat = batch.sets == 1 or batch.surfaces is not None
     values = {
-        "division": batch.division[particle],
-        "stiffness_nm_rad": batch.stiffness[particle],
-        "damping_nms_rad": batch.damping[particle],
+        parameter.name: batch[parameter.name][particle]
+        for parameter in CHAIN_PARAMETERS
+        if parameter.name in batch.values
     }
-    return {
+    structure = [p.name for p in CHAIN_PARAMETERS if not p.correction]
+    corrections = [p for p in CHAIN_PARAMETERS if p.correction and p.name in values]
+    document: Document = {
         "links_per_wing": batch.links,
-        "separate_wings": not shared,
-        **{name: (value[0] if shared else value).tolist() for name, value in values.items()},
+        "separate_wings": not flat,
+        **{name: (values[name][0] if flat else values[name]).tolist() for name in structure},
         "aero": {
-            "lift_factor": float(batch.lift_factor[particle]),
-            "centre_shift_m": float(batch.centre_shift[particle]),
-            "profile_drag": float(batch.profile_drag[particle]),
-            "lag_s": float(batch.lag[particle]),
+            p.name: float(values[p.name] if p.scope == "aircraft" else values[p.name][0]) for p in corrections
         },
     }
+    if batch.surfaces is not None:
+        own = [*structure, *(p.name for p in corrections if p.scope != "aircraft")]
+        document["surfaces"] = {
+            name: {"mirror_of": names[0]} if i else {key: values[key][k].tolist() for key in own}
+            for k, names in enumerate(batch.surfaces)
+            for i, name in enumerate(names)
+        }
+    return document

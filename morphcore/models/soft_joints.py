@@ -21,16 +21,13 @@ def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
     The moment at a distance y from the root is q (L - y)^2 / 2 under a load q per length.
     """
     load_n_m = load_per_length(model.aircraft, model.flight)
-    wing = 0
     worst: tuple[float, str, int, float] = (LARGEST_SLOPE_RAD, "", 0, 0.0)
-    for surface in model.aircraft.surfaces:
+    for surface, own in zip(model.aircraft.surfaces, model.set_of(batch), strict=True):
         if not surface.flexible:
             continue
-        own = min(wing, batch.wing_sets - 1)
-        wing += 1
-        joints_m = link_edges(batch.division[:1, own], surface.span_m)[0, 1:-1]
+        joints_m = link_edges(batch["division"][:1, own], surface.span_m)[0, 1:-1]
         moment = 0.5 * load_n_m * (surface.span_m - joints_m) ** 2
-        for joint, stiffness in enumerate(batch.stiffness[0, own, :, 0]):
+        for joint, stiffness in enumerate(batch["stiffness_nm_rad"][0, own, :, 0]):
             carries = stiffness > NO_STIFFNESS * moment[joint]
             angle = float(moment[joint] / stiffness) if carries else float("inf")
             if angle > worst[0]:

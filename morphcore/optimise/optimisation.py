@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from morphcore.errors import FlightDiverged, InvalidInput, NotFlyable, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles
-from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
+from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.soft_joints import chain_obstacle, soft_joint
 from morphcore.optimise.feasible import constant_rate, morph_space, require_schedules, rounded_up
 from morphcore.optimise.flights import SAMPLE_S, MorphFlights, sample_times
@@ -125,7 +125,13 @@ class ScheduleOptimisation:
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
-        return common_path(self.chain("rigid")[0], *ends, may_halve=self.parameters.wing_sets == 1)
+        return common_path(self.chain("rigid")[0], *ends, may_halve=self.is_even)
+
+    @cached_property
+    def is_even(self) -> bool:
+        """Whether both sides have the same parameters, so that half the aircraft can stand for it."""
+        model, batch = self.chain("equivalent")
+        return model.is_even(batch)
 
     @property
     def step_s(self) -> float:
@@ -141,11 +147,12 @@ class ScheduleOptimisation:
         constant = self.constant(self.morph.duration_s)
         flight = [constant] * len(self.aircraft.surfaces), busiest_part([constant], self.times_s)
         chains = [self.chain(name) for name in ("rigid", "equivalent")]
-        halved = self.parameters.wing_sets == 1
         steps_s = []
         for model, batch in chains:
             with naming_obstacles(partial(chain_obstacle, model, batch)):
-                found = choose_step(model, [flight], batch, start=self.start, may_halve=halved, stop=stop)
+                found = choose_step(
+                    model, [flight], batch, start=self.start, may_halve=self.is_even, stop=stop
+                )
             steps_s.append(found.step_s)
         return min(steps_s)
 
@@ -153,7 +160,8 @@ class ScheduleOptimisation:
         """One of the models that are searched with, and its parameters."""
         if name == "equivalent":
             links = self.parameters.links
-            return chain_model(self.aircraft, self.flight, links, self.lattice), self.parameters
+            model = chain_model(self.aircraft, self.flight, links, self.lattice)
+            return model, fitted(model, self.parameters)
         rigid = chain_model(self.aircraft, self.flight, 1, self.lattice)
         return rigid, physical_guess(rigid)
 

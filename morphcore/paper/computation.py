@@ -46,8 +46,9 @@ def benchmark_swarm(model: ChainModel, particles: int, seed: int = SWARM_SEED) -
     n = model.links_per_wing
     division = rng.dirichlet(np.full(n, DIVISION_CONCENTRATION), (particles, 1))
     batch = physical_guess(model, division)
-    factor = np.exp(rng.normal(0.0, STIFFNESS_SPREAD, batch.stiffness.shape))
-    return ParameterBatch(**{**vars(batch), "stiffness": batch.stiffness * factor})
+    stiffness = batch["stiffness_nm_rad"]
+    factor = np.exp(rng.normal(0.0, STIFFNESS_SPREAD, stiffness.shape))
+    return batch.changed(stiffness_nm_rad=stiffness * factor)
 
 
 def computation_inputs(settings: PaperSettings) -> Document:

@@ -42,7 +42,7 @@ def chain_flight(
     ----------
     at : (k,) rows of the grid to report. Others as in `flight.simulate`.
     """
-    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=batch.wing_sets == 1)
+    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch))
     flown = plan.flown(model)
     found = trim(flown, batch, plan, start=start).require()
     constants = lane_constants(flown, batch, grid.step_s)

@@ -16,7 +16,7 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
 from morphcore.geometry.surface import beyond_range
-from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
+from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.flexible import flexible_model
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.shown import Shown, Summary
@@ -171,7 +171,7 @@ def flight_steps(  # noqa: PLR0913 - as above
             hinged = [own for surface, own in zip(aircraft.surfaces, each, strict=True) if surface.hinge]
             longest_s = choose_step(
                 chain, [(each, busiest_part(hinged, times))], batch, start=start,
-                air_velocity_N=smooth, may_halve=batch.wing_sets == 1, stop=stop,
+                air_velocity_N=smooth, may_halve=chain.is_even(batch), stop=stop,
             ).step_s  # fmt: skip
             grid = time_grid(times, longest_s)
         air = _air(environment, flight, rng)
@@ -259,7 +259,8 @@ def _flyer(aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: Latt
                 pointer="/model",
                 hint="choose one with ParameterBatch.select, or fly them together with fly_batch",
             )
-        return _chain_flyer(chain_model(aircraft, flight, model.links, lattice), model)
+        chain = chain_model(aircraft, flight, model.links, lattice)
+        return _chain_flyer(chain, fitted(chain, model))
     if model == "rigid":
         chain = chain_model(aircraft, flight, 1, lattice)
         return _chain_flyer(chain, physical_guess(chain))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.models.kernels.layout import LINKS_C
@@ -15,10 +16,7 @@ from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
 
-LAG_DECAYS = (
-    10,
-    12,
-)  # rows of a link's constants: decay of the slow and the fast lag, each before its weight
+LAG_DECAYS = (L_SLOW_DECAY, L_FAST_DECAY)  # each before its weight
 CHUNK = 64  # instants: bounds the memory of the interpolated operators
 
 

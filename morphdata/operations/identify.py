@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
+from morphdata.aircraft import Surface
 from morphdata.identify import (
     CostEstimate,
     IdentifyRequest,
     IdentifyResult,
     SamplesRequest,
     Search,
-    SoughtModel,
 )
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
@@ -43,7 +43,7 @@ def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
     links = max(request.model.numbers_of_links()) if links is None else links
     samples = list(request.inline_samples().values())
     training = [sample for sample in samples if sample.role == "train"]
-    parameters = _parameter_count(request.model, links, training)
+    parameters = _parameter_count(request, links, training)
     sets = _parameter_sets(request.search, parameters)
     flight_s = sets * sum(sample.time_s[-1] - sample.time_s[0] for sample in training)
     return CostEstimate(
@@ -56,13 +56,48 @@ def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
     )
 
 
-def _parameter_count(model: SoughtModel, links: int, training: Sequence[InlineSample]) -> int:
-    """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections."""
+def _parameter_count(request: SamplesRequest, links: int, training: Sequence[InlineSample]) -> int:
+    """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections.
+
+    Every flexible surface has its own except mirror images; those of a pair always share the profile drag.
+    """
+    model, surfaces = request.model, request.aircraft.surfaces
+    groups = _mirror_groups(surfaces)
     if model.aero_coefficients is None:
-        corrections = CORRECTIONS - (not any(_asymmetric(sample) for sample in training))
+        drag = any(_asymmetric(sample) for sample in training)
+        corrections = CORRECTIONS - 1 + drag
     else:
+        drag = "profile_drag" in model.aero_coefficients
         corrections = len(model.aero_coefficients)
-    return 7 * (links - 1) * (2 if model.separate_wings else 1) + corrections
+    sets = sum(surface.flexible for surface in surfaces) if model.separate_wings else groups
+    return 7 * (links - 1) * sets + corrections + drag * (groups - 1)
+
+
+def _mirror_groups(surfaces: Sequence[Surface]) -> int:
+    """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
+    waiting: list[Surface] = []
+    groups = 0
+    for surface in (each for each in surfaces if each.flexible):
+        side: Literal["right", "left"] = "left" if surface.side == "right" else "right"
+        hinge = surface.hinge
+        changes = {
+            "side": side,
+            "position_m": _across(surface.position_m),
+            "hinge": hinge and hinge.model_copy(update={"position_m": _across(hinge.position_m)}),
+        }
+        image = next(
+            (w for w in waiting if w == surface.model_copy(update={**changes, "name": w.name})), None
+        )
+        if image is None:
+            groups += 1
+            waiting.append(surface)
+        else:
+            waiting.remove(image)
+    return groups
+
+
+def _across(position_m: list[float] | None) -> list[float] | None:
+    return position_m and [position_m[0], -position_m[1], position_m[2]]
 
 
 def _asymmetric(sample: InlineSample) -> bool:

@@ -7,9 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2, JONES_MEAN_LAG, lagged_motion
+from morphcore.aero.kernels.loads import (
+    JONES_A1,
+    JONES_A2,
+    JONES_B1,
+    JONES_B2,
+    JONES_MEAN_LAG,
+    L_FAST_DECAY,
+    L_FAST_WEIGHT,
+    L_LIFT,
+    L_SLOW_DECAY,
+    lagged_motion,
+)
 from morphcore.lanes import TOGETHER, lane_type
-from morphcore.models.equivalent import chain_model, lag_weights, lane_constants, physical_guess
+from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import lag_from_stage, lag_to_stage
@@ -43,7 +55,7 @@ def settled(model, batch, angles, twist_B):
 
 def dragless(model, **changes):
     """Beam theory's guess without profile drag."""
-    return replace(physical_guess(model), profile_drag=np.zeros(1), **changes)
+    return physical_guess(model).changed(profile_drag=np.zeros((1, len(model.pairs))), **changes)
 
 
 def compared(model, angles, twist_B):
@@ -127,7 +139,7 @@ def test_cutting_a_wing_changes_nothing(links):
 def test_corrections():
     """The lift factor scales circulation and what it induces; the centre's shift moves the force."""
     model = example_model(1)
-    plain, shifted = dragless(model), dragless(model, centre_shift=np.array([0.02]))
+    plain, shifted = dragless(model), dragless(model, centre_shift_m=np.array([0.02]))
     lifted = dragless(model, lift_factor=np.array([1.2]))
     base, moved, more = (
         lane_loads(model, batch, *settled(model, batch, (0.3, 0.3), SINKING)).wrench
@@ -159,7 +171,7 @@ def test_zero_lag_is_quasi_steady():
     """Without lag the loads follow the motion of the instant, whatever the motion before."""
     rng = np.random.default_rng(0)
     model = example_model(3)
-    instantaneous, lagging = dragless(model, lag=np.zeros(1)), dragless(model)
+    instantaneous, lagging = dragless(model, lag_s=np.zeros(1)), dragless(model)
     plan, state = settled(model, lagging, (0.3, 0.5), SINKING)
     steady = lane_loads(model, lagging, plan, state).wrench
     # slow, fast and previous motion of another past; without lag they are one and the same
@@ -174,9 +186,9 @@ def test_zero_lag_is_quasi_steady():
 def lag_response(motion, lag_s, step_s):
     """What the circulation answers to (k,) for a motion (k,) of one link, sampled in every step's stage."""
     link = np.zeros((LINK_ROWS, TOGETHER))
-    link[10:] = lag_weights(np.array(lag_s), step_s)[:, None]
-    link[10::2] **= 0.5  # decays over half a step, as the step takes them
-    aero = np.array([1.0, 0.0])[:, None] * np.ones(TOGETHER)
+    link[L_SLOW_DECAY : L_FAST_WEIGHT + 1] = lag_weights(np.array(lag_s), step_s)[:, None]
+    link[[L_SLOW_DECAY, L_FAST_DECAY]] **= 0.5  # over half a step, as the step takes them
+    link[L_LIFT] = 1.0
     slow, fast, previous = np.zeros((3, 3, TOGETHER))
     previous[:] = motion[0]  # a jump just before the start, if there is one
     effective, out, stage = np.empty((3, TOGETHER)), [], np.empty((3, 3, TOGETHER))
@@ -185,7 +197,7 @@ def lag_response(motion, lag_s, step_s):
     for value in motion:
         twist = np.full((6, TOGETHER), value)
         to_stage(lanes, link, slow, fast, previous, *stage)
-        lagged(lanes, link, twist, *stage, aero, effective)
+        lagged(lanes, link, twist, *stage, effective)
         out.append(effective[0, 0])
         from_stage(lanes, link, twist, stage[0], stage[1], slow, fast, previous)
     return np.array(out)

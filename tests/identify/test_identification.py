@@ -88,8 +88,10 @@ def test_finds_the_parameters_that_flew_the_sample() -> None:
     for fit in result.fits:
         assert fit.J("identified") < 1e-5 * fit.J("initial")  # type: ignore[operator]
     found = result.parameters
-    np.testing.assert_allclose(found.stiffness[0, 0, 0, 0], batch.stiffness[0, 0, 0, 0], rtol=0.03)
-    np.testing.assert_allclose(found.lift_factor, batch.lift_factor, rtol=0.03)
+    np.testing.assert_allclose(
+        found["stiffness_nm_rad"][0, 0, 0, 0], batch["stiffness_nm_rad"][0, 0, 0, 0], rtol=0.03
+    )
+    np.testing.assert_allclose(found["lift_factor"], batch["lift_factor"], rtol=0.03)
 
 
 @pytest.mark.parametrize("search", [QUICK, SWARM, EVOLUTION, replace(QUICK, method="least_squares")])
@@ -184,9 +186,9 @@ def test_a_diverged_flight_costs_much_but_not_infinity() -> None:
     """Parameters with which nothing flies cost much but not infinity, and leave their neighbours alone."""
     model = chain_model(reference_aircraft(), reference_flight(), 2)
     guess = physical_guess(model)
-    wild = replace(guess, lift_factor=np.array([1e6]))
-    both = type(guess)(
-        **{name: np.concatenate([value, getattr(wild, name)]) for name, value in vars(guess).items()}
+    wild = guess.changed(lift_factor=np.array([1e6]))
+    both = guess.changed(
+        **{name: np.concatenate([value, wild[name]]) for name, value in guess.values.items()}
     )
     cases = sample_cases(model, [shortened(example("rate_0.8"), 60)])
     pair, alone = costs(model, both, cases, "trim"), costs(model, guess, cases, "trim")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import pickle
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -162,7 +161,7 @@ def test_a_morph_that_never_flies_is_none(monkeypatch: pytest.MonkeyPatch) -> No
 def test_joints_that_are_too_soft_are_named() -> None:
     """An optimisation with a model whose joints carry nothing: its parameters are the cause, not the wing."""
     run = optimisation(links=2)
-    soft = replace(run.parameters, stiffness=1e-3 * run.parameters.stiffness)
+    soft = run.parameters.changed(stiffness_nm_rad=1e-3 * run.parameters["stiffness_nm_rad"])
     weak = type(run)(
         reference_aircraft(), reference_flight(), soft, morph=run.morph, limits=run.limits, verify="none"
     )

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from morphcore.identify import Identification, identify
-from morphcore.identify.parameters import AERO_COEFFICIENTS
 from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.identify import EquivalentModel, IdentifySearch
@@ -20,6 +19,7 @@ from tests.identify.flights import (
     shortened,
 )
 
+AERO_COEFFICIENTS = ("lift_factor", "centre_shift_m", "profile_drag", "lag_s")
 WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag")
 LISTED = ("profile_drag", "lag_s")
 

@@ -77,7 +77,9 @@ def test_shared_wings_begin_separate_ones() -> None:
     separate = search_space(CHAIN, separate_wings=True)
     known = parameters_from_document(MODEL)
     both = separate.decode(separate.encode(known))
-    np.testing.assert_allclose(both.stiffness[0], np.repeat(known.stiffness[0], separate.wing_sets, axis=0))
+    np.testing.assert_allclose(
+        both["stiffness_nm_rad"][0], np.repeat(known["stiffness_nm_rad"][0], 2, axis=0)
+    )
     with pytest.raises(InvalidInput) as error:
         search_space(CHAIN).encode(both)
     assert error.value.pointer == "/search/warm_start"

@@ -145,20 +145,23 @@ def odd_aircraft(rng: np.random.Generator) -> Aircraft:
 
 
 def random_batch(
-    rng: np.random.Generator, model: ChainModel, particles: int, *, wing_sets: int = 1
+    rng: np.random.Generator, model: ChainModel, particles: int, *, separate_wings: bool = False
 ) -> ParameterBatch:
     """Uneven divisions, stiffness and damping about the physical guess, corrections away from neutral."""
     n = model.links_per_wing
-    division = rng.dirichlet(np.full(n, 8.0), size=(particles, wing_sets))
-    guess = physical_guess(model, division)
-    return replace(
-        guess,
-        stiffness=guess.stiffness * np.exp(rng.uniform(-1.5, 1.5, size=guess.stiffness.shape)),
-        damping=guess.damping * np.exp(rng.uniform(-1.5, 1.5, size=guess.stiffness.shape)),
+    division = rng.dirichlet(
+        np.full(n, 8.0), size=(particles, len(model.sets(separate_wings=separate_wings)))
+    )
+    guess = physical_guess(model, division, separate_wings=separate_wings)
+    return guess.changed(
+        stiffness_nm_rad=guess["stiffness_nm_rad"]
+        * np.exp(rng.uniform(-1.5, 1.5, size=guess["stiffness_nm_rad"].shape)),
+        damping_nms_rad=guess["damping_nms_rad"]
+        * np.exp(rng.uniform(-1.5, 1.5, size=guess["stiffness_nm_rad"].shape)),
         lift_factor=rng.uniform(0.8, 1.2, size=particles),
-        centre_shift=rng.uniform(-0.03, 0.03, size=particles),
-        profile_drag=rng.uniform(0.0, 0.05, size=particles),
-        lag=guess.lag * np.exp(rng.uniform(-1.0, 1.0, size=particles)),
+        centre_shift_m=rng.uniform(-0.03, 0.03, size=particles),
+        profile_drag=rng.uniform(0.0, 0.05, size=guess["profile_drag"].shape),
+        lag_s=guess["lag_s"] * np.exp(rng.uniform(-1.0, 1.0, size=particles)),
     )
 
 

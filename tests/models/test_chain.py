@@ -49,7 +49,11 @@ def drag_wrenches(model, batch, particle, tree, motion, density):
     link = 0
     for s, surface in enumerate(model.aircraft.surfaces):
         ends = link_ends(model, batch, s, particle)
-        drag = batch.profile_drag[particle] if surface.flexible else surface.profile_drag
+        drag = (
+            batch["profile_drag"][particle, model.set_of(batch)[s]]
+            if surface.flexible
+            else surface.profile_drag
+        )
         for start, end in pairwise(ends):
             a, b = surface.chord_at(start), surface.chord_at(end)
             length = end - start
@@ -78,7 +82,7 @@ def test_articulated_pass_is_the_dense_solution(links):
     flight = replace(example_flight(), wind_N=WIND_N)
     model = small_model(odd_aircraft(rng), flight, links)
     particles = 5
-    batch = replace(random_batch(rng, model, particles, wing_sets=4), lift_factor=np.zeros(particles))
+    batch = random_batch(rng, model, particles).changed(lift_factor=np.zeros(particles))
     hinges = random_hinges(rng, model)
     state = random_state(rng, model, particles, speed=30.0)
     force_B, moment_B = 1e3 * rng.normal(size=(2, particles, 3))

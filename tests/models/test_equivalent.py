@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,18 +11,17 @@ from morphcore.lanes import TOGETHER, lane_width
 from morphcore.models.equivalent import (
     chain_model,
     from_lanes,
-    lag_weights,
     lane_constants,
     physical_guess,
     to_lanes,
 )
+from morphcore.models.parameters import lag_weights
 from morphcore.simulate.batch import state_rates
 from morphcore.simulate.plan import STEP_S
 from tests.models.chains import (
     example_aircraft,
     example_flight,
     instant,
-    odd_aircraft,
     random_batch,
     random_hinges,
     random_state,
@@ -58,31 +55,29 @@ def test_natural_lag_is_jones_mean():
     model = small_model(example_aircraft(), example_flight(), 2)
     s = np.linspace(0.0, 600.0, 600_001)
     deficit = JONES_A1 * np.exp(-JONES_B1 * s) + JONES_A2 * np.exp(-JONES_B2 * s)
-    assert model.natural_lag_s == pytest.approx(np.trapezoid(deficit, s) * 0.3 / (2 * 150.0), rel=1e-5)
+    natural_lag_s = physical_guess(model)["lag_s"][0]
+    assert natural_lag_s == pytest.approx(np.trapezoid(deficit, s) * 0.3 / (2 * 150.0), rel=1e-5)
 
 
 def test_physical_guess_has_beta_damping():
     """c = beta k, neutral corrections, the surface's own profile drag."""
     model = small_model(example_aircraft(), example_flight(), 3)
     guess = physical_guess(model)
-    np.testing.assert_allclose(guess.damping, 0.004 * guess.stiffness)
-    assert guess.lift_factor[0] == 1.0
-    assert guess.centre_shift[0] == 0.0
-    assert guess.profile_drag[0] == 0.01
-    assert guess.division.shape == (1, 1, 3)
+    np.testing.assert_allclose(guess["damping_nms_rad"], 0.004 * guess["stiffness_nm_rad"])
+    assert guess["lift_factor"][0] == 1.0
+    assert guess["centre_shift_m"][0] == 0.0
+    assert guess["profile_drag"][0, 0] == 0.01
+    assert guess["division"].shape == (1, 1, 3)
 
 
-def test_wing_sets():
-    """Wings with their own parameters take them in the order of the flexible surfaces; shared ones share."""
+def test_positional_sets():
+    """Sets without names are those of the flexible surfaces in order; one without a name is everyone's."""
     rng = np.random.default_rng(0)
-    model = small_model(odd_aircraft(rng), example_flight(), 2)
-    apart = random_batch(rng, model, 1, wing_sets=4)
-    same = replace(
-        apart, **{name: getattr(apart, name)[:, :1] for name in ("division", "stiffness", "damping")}
-    )
-    repeated = replace(
-        same, **{name: getattr(same, name).repeat(4, axis=1) for name in ("division", "stiffness", "damping")}
-    )
+    model = small_model(example_aircraft(), example_flight(), 2)
+    apart = random_batch(rng, model, 1, separate_wings=True)
+    own = ("division", "stiffness_nm_rad", "damping_nms_rad", "profile_drag")
+    same = apart.changed(**{name: apart[name][:, :1] for name in own})
+    repeated = same.changed(**{name: same[name].repeat(2, axis=1) for name in own})
     rows = [lane_constants(model, batch, STEP_S).rows for batch in (same, repeated, apart)]
     np.testing.assert_array_equal(rows[0], rows[1])
     assert (rows[0] != rows[2]).any()
@@ -114,7 +109,7 @@ def test_accelerations_are_continuous_in_the_division():
     plan = instant(model, random_hinges(rng, model))
 
     def rates(fraction):
-        there = replace(batch, division=np.array([[[fraction, 1.0 - fraction]]]))
+        there = batch.changed(division=np.array([[[fraction, 1.0 - fraction]]]))
         found = state_rates(model, plan, 0, lane_constants(model, there, STEP_S), state)
         return found[0, 4 : 13 + 2 * model.coordinates]
 
@@ -138,12 +133,11 @@ def test_a_stiff_chain_is_the_rigid_wing():
     found = []
     for model in (rigid, chain):
         guess = physical_guess(model)
-        batch = replace(
-            guess,
-            lag=np.zeros(1),
-            profile_drag=np.zeros(1),
-            stiffness=1e9 * guess.stiffness,
-            damping=0.0 * guess.damping,
+        batch = guess.changed(
+            lag_s=np.zeros(1),
+            profile_drag=np.zeros((1, 1)),
+            stiffness_nm_rad=1e9 * guess["stiffness_nm_rad"],
+            damping_nms_rad=0.0 * guess["damping_nms_rad"],
         )
         n = model.coordinates
         state = np.concatenate([start[:, :13], np.zeros((1, 2 * n + 9 * model.links))], axis=1)

@@ -25,7 +25,7 @@ def test_links_are_where_the_tree_has_them(links):
     """Poses in B of every link, hinges and gimbals turned at random, are the tree's."""
     rng = np.random.default_rng(links)
     model = small_model(odd_aircraft(rng), example_flight(), links)
-    batch, hinges = random_batch(rng, model, 3, wing_sets=4), random_hinges(rng, model)
+    batch, hinges = random_batch(rng, model, 3), random_hinges(rng, model)
     state = random_state(rng, model, 3)
     state[:, :4], state[:, 10:13] = [1.0, 0.0, 0.0, 0.0], 0.0
     rows = instant(model, hinges).hinges[0]

@@ -16,6 +16,7 @@ from morphcore.models.parameters_document import parameters_document
 from morphid.main import app
 from morphid.model_table import model_table, named_parameters, shown_interval
 from tests.identify.flights import reference_aircraft, reference_flight
+from tests.models.test_every_surface_its_own import chain
 from tests.morphid.played_service import Play, PlayedService
 from tests.morphid.test_identify import RESULT, arguments
 
@@ -57,10 +58,21 @@ def test_names_are_those_of_the_uncertainty(separate: bool) -> None:  # noqa: FB
     """Names and values are the library's, in its order: no interval stands beside another parameter."""
     model = chain_model(reference_aircraft(), reference_flight(), 3)
     space = search_space(model, separate_wings=separate)
-    batch = physical_guess(model, wing_sets=space.wing_sets)
+    batch = physical_guess(model, separate_wings=separate)
     found = dict(named_parameters(parameters_document(batch)))
     expected = dict(zip(space.parameter_names, space.flatten(batch)[0].tolist(), strict=True))
     assert list(found.items()) == list(expected.items())
+
+
+def test_surfaces_that_are_not_alike_have_rows_of_their_own() -> None:
+    """Wings and a flexible tail: the names of the library's search, mirror images once."""
+    model = chain()
+    space = search_space(model)
+    batch = physical_guess(model)
+    found = dict(named_parameters(parameters_document(batch)))
+    expected = dict(zip(space.parameter_names, space.flatten(batch)[0].tolist(), strict=True))
+    assert found == expected
+    assert "right tail.profile_drag" in found
 
 
 def test_rows_have_intervals_and_marks() -> None:

@@ -7,7 +7,9 @@ import threading
 import numpy as np
 import pytest
 
+from morphcore.aero.kernels.loads import L_LIFT
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.models.kernels.layout import LINKS_C
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
 from morphcore.simulate.plan import STEP_S, common_path
@@ -143,7 +145,7 @@ def test_stop_is_asked_within_long_flights(flights, monkeypatch):
 def test_a_diverged_flight_is_charged(flights):
     """A flight that leaves the numbers costs much, but not infinity, and its neighbours nothing."""
     wild = flights.constants.rows.copy()
-    flights.constants.rows[:, 6] = 1e7  # lift factor
+    flights.constants.rows[:, LINKS_C + L_LIFT] = 1e7  # of the innermost link
     try:
         lost = flights.fly(SCHEDULES[:1], torque=False)
     finally:

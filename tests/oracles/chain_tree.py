@@ -44,7 +44,7 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
             column.append(value)  # type: ignore[attr-defined]
         return len(parent) - 1
 
-    wing = 0
+    chosen = model.set_of(batch)
     for s, surface in enumerate(model.aircraft.surfaces):
         ends = link_ends(model, batch, s, particle)
         root, pivot = _root(surface), _pivot(surface)
@@ -55,8 +55,6 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
         else:
             about, count = surface.hinge.axis_index, max(hinge) + 1
             body = add(0, about, surface.rotation_sign, pivot, first, -1, count)
-        chosen = min(wing, batch.division.shape[1] - 1)
-        wing += surface.flexible
         where = root - pivot
         for k in range(1, ends.size - 1):
             where = where + np.array([0.0, surface.span_sign * (ends[k] - ends[k - 1]), 0.0])
@@ -65,8 +63,8 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
                 mass = link if about == LAG else np.zeros((6, 6))
                 body = add(body, about, 1.0, where, mass, len(stiffness), -1)
                 where = np.zeros(3)
-                stiffness.append(float(batch.stiffness[particle, chosen, k - 1, about]))
-                damping.append(float(batch.damping[particle, chosen, k - 1, about]))
+                stiffness.append(float(batch["stiffness_nm_rad"][particle, chosen[s], k - 1, about]))
+                damping.append(float(batch["damping_nms_rad"][particle, chosen[s], k - 1, about]))
     return Tree(
         parent=np.array(parent, dtype=np.int64),
         axis=np.array(axis, dtype=np.int64),
@@ -106,8 +104,7 @@ def link_ends(model: ChainModel, batch: ParameterBatch, surface: int, particle: 
     of = model.aircraft.surfaces[surface]
     if not of.flexible:
         return np.array([0.0, of.span_m])
-    before = sum(other.flexible for other in model.aircraft.surfaces[:surface])
-    division = batch.division[particle, min(before, batch.division.shape[1] - 1)]
+    division = batch["division"][particle, model.set_of(batch)[surface]]
     inboard: Array = of.span_m * (np.cumsum(division) - division)
     return np.append(inboard, of.span_m)
 

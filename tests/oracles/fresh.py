@@ -23,7 +23,8 @@ from morphcore.aero.kernels.loads import JONES_A1, JONES_A2, JONES_B1, JONES_B2,
 from morphcore.aero.vlm import influence
 from morphcore.errors import FlightDiverged, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
-from morphcore.models.equivalent import SHORTEST_LAG_S, ChainModel, ParameterBatch
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.models.parameters import SHORTEST_LAG_S
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
@@ -77,15 +78,18 @@ class FreshModel:
     def __init__(self, model: ChainModel, batch: ParameterBatch, particle: int = 0) -> None:
         self.model = model
         self.tree: Tree = chain_tree(model, batch, particle)
-        self.lift_factor = float(batch.lift_factor[particle])
-        self.centre_shift = float(batch.centre_shift[particle])
+        own = batch.select(slice(particle, particle + 1))
+        values = [model.on_surface(own, s) for s in range(len(model.aircraft.surfaces))]
+        self.lift_factor = float(own["lift_factor"][0])
+        shift = np.array([value["centre_shift_m"][0] for value in values])
+        self.centre_shift_L = np.outer(np.repeat(shift, model.surfaces[:, 1]), [1.0, 0.0, 0.0])
         self.bodies, self.origins = link_bodies(model)
         self.hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
-        lag_s = float(batch.lag[particle]) * model.relative_chord[model.surfaces[:, 0]]
+        lag_s = np.array([value["lag_s"][0] for value in values])
         per_ring = lag_s[model.lattice.table.panel_surface] / JONES_MEAN_LAG
         self.lag_times = np.maximum(np.stack([per_ring / JONES_B1, per_ring / JONES_B2]), SHORTEST_LAG_S)
         self._carry_lattice(batch, particle)
-        self._cut_drag_areas(batch, particle)
+        self._cut_drag_areas(batch, particle, [float(value["profile_drag"][0]) for value in values])
 
     def _carry_lattice(self, batch: ParameterBatch, particle: int) -> None:
         """Tie corners, control points (midway between both edges of their strip) and edges to the links."""
@@ -122,14 +126,13 @@ class FreshModel:
         self.controls: Array = np.concatenate(controls)
         self.edges: Array = 0.5 * (self.corners[table.edge_start] + self.corners[table.edge_end])
 
-    def _cut_drag_areas(self, batch: ParameterBatch, particle: int) -> None:
+    def _cut_drag_areas(self, batch: ParameterBatch, particle: int, drag: Sequence[float]) -> None:
         """Drag area Cd A of each link, m^2, and its centroid in link axes, m: trapezia."""
         areas, centroids = [], []
         for s, surface in enumerate(self.model.aircraft.surfaces):
             ends = link_ends(self.model, batch, s, particle)
-            drag = float(batch.profile_drag[particle]) if surface.flexible else surface.profile_drag
             length, inner, outer = np.diff(ends), surface.chord_at(ends[:-1]), surface.chord_at(ends[1:])
-            areas.append(drag * 0.5 * (inner + outer) * length)
+            areas.append(drag[s] * 0.5 * (inner + outer) * length)
             y = surface.span_sign * length * (inner + 2.0 * outer) / (3.0 * (inner + outer))
             centroids.append(np.stack([0.0 * y, y, 0.0 * y], axis=1))
         self.drag_area: Array = np.concatenate(areas)
@@ -196,7 +199,7 @@ class FreshModel:
         on_links = np.einsum("kba,eb->eka", R_BL, forces.force_B)
         force_L = np.einsum("ek,eka->ka", self.edges[..., 0], on_links)
         moment_L = np.cross(self.edges[..., 1:], on_links).sum(axis=0)
-        moment_L += np.cross([self.centre_shift, 0.0, 0.0], force_L)
+        moment_L += np.cross(self.centre_shift_L, force_L)
         return FreshLoads(self._on_bodies(force_L, moment_L, v_L, omega_L, R_BL, wind_B), circulation)
 
     def lagged(self, circulation: Array, lag: Array, length_s: float) -> Array:

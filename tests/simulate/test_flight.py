@@ -126,12 +126,14 @@ def test_stiff_joints_tend_to_the_rigid_model(
 
     Without profile drag: that acts at the middle of each link, and a rigid wing is one long link.
     """
-    guess = replace(guess, profile_drag=np.zeros(1))
+    guess = guess.changed(profile_drag=np.zeros((1, 1)))
     one_link = physical_guess(chain_model(aircraft, flight, 1, COARSE))
-    stiff = replace(guess, stiffness=1e6 * guess.stiffness, damping=1e6 * guess.damping)
+    stiff = guess.changed(
+        stiffness_nm_rad=1e6 * guess["stiffness_nm_rad"], damping_nms_rad=1e6 * guess["damping_nms_rad"]
+    )
     schedules = [MORPH, Hold()]
     rigid = fly(
-        aircraft, flight, schedules, model=replace(one_link, profile_drag=np.zeros(1)), **EASY
+        aircraft, flight, schedules, model=one_link.changed(profile_drag=np.zeros((1, 1))), **EASY
     ).trajectory
     almost = fly(aircraft, flight, schedules, model=stiff, **EASY).trajectory
     soft = fly(aircraft, flight, schedules, model=guess, **EASY).trajectory
@@ -222,10 +224,12 @@ def test_a_wing_without_stiffness_is_no_flight(
     aircraft: Aircraft, flight: Flight, guess: ParameterBatch
 ) -> None:
     """Too soft to carry the aircraft: no trim. Joints that push away from rest: divergence, with its time."""
-    soft = replace(guess, stiffness=1e-4 * guess.stiffness, damping=0.0 * guess.damping)
+    soft = guess.changed(
+        stiffness_nm_rad=1e-4 * guess["stiffness_nm_rad"], damping_nms_rad=0.0 * guess["damping_nms_rad"]
+    )
     with pytest.raises(TrimNotFound):
         fly(aircraft, flight, [MORPH, Hold()], model=soft, **EASY)
-    soft = replace(guess, stiffness=-guess.stiffness)
+    soft = guess.changed(stiffness_nm_rad=-guess["stiffness_nm_rad"])
     with pytest.raises(FlightDiverged) as caught:
         fly(aircraft, flight, [MORPH, MORPH], model=soft, start="given", **EASY)
     assert 0.0 <= caught.value.time_s < 1.0

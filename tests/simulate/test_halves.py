@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from morphcore.aero.operator import lattice_operator
+from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.mirror import mirror_of
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
@@ -191,5 +192,5 @@ def test_wings_of_their_own_need_the_whole() -> None:
     """Half an aircraft refuses parameters that differ from wing to wing."""
     model = example_model(2)
     assert model.half is not None
-    with pytest.raises(ValueError, match="whole"):
-        lane_constants(model.half, physical_guess(model, np.full((1, 2, 2), 0.5), wing_sets=2), 0.005)
+    with pytest.raises(InvalidInput, match="of 2 wings"):
+        lane_constants(model.half, physical_guess(model, separate_wings=True), 0.005)

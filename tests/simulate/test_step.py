@@ -119,7 +119,9 @@ def vacuum_drifts(step_s, schedules, *, links=3, gravity=0.0):
     rng = np.random.default_rng(0)
     model = small_model(example_aircraft(), airless(example_flight(), gravity=gravity), links)
     guess = physical_guess(model)
-    batch = replace(guess, stiffness=1e-3 * guess.stiffness, damping=0.0 * guess.damping)
+    batch = guess.changed(
+        stiffness_nm_rad=1e-3 * guess["stiffness_nm_rad"], damping_nms_rad=0.0 * guess["damping_nms_rad"]
+    )
     state = random_state(rng, model, 1, speed=10.0)
     n = model.coordinates
     state[:, 13 : 13 + n] *= 0.3
@@ -182,8 +184,8 @@ def test_accelerations_balance_momentum_and_power_to_round_off(links):
     """
     rng = np.random.default_rng(links)
     model = small_model(odd_aircraft(rng), airless(example_flight(), gravity=0.0), links)
-    batch = replace(random_batch(rng, model, 1, wing_sets=4))
-    batch = replace(batch, damping=0.0 * batch.damping)
+    batch = random_batch(rng, model, 1)
+    batch = batch.changed(damping_nms_rad=0.0 * batch["damping_nms_rad"])
     hinges, state = random_hinges(rng, model), random_state(rng, model, 1)
     n = model.coordinates
     rates = state_rates(model, instant(model, hinges), 0, lane_constants(model, batch, STEP_S), state)[0]
@@ -203,7 +205,7 @@ def forced_flights(links, duration_s, mujoco_step_s):
     all the time.
     """
     model = small_model(example_aircraft(), replace(example_flight(), wind_N=WIND_N), links)
-    batch = replace(physical_guess(model), lift_factor=np.zeros(1), profile_drag=np.ones(1))
+    batch = physical_guess(model).changed(lift_factor=np.zeros(1), profile_drag=np.ones((1, 1)))
     state = initial_state(
         quaternion=quaternion_from_euler(0.1, 0.05, -0.2)[None],
         omega_B=np.array([[0.1, -0.05, 0.2]]),

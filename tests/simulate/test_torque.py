@@ -38,7 +38,7 @@ def test_torque_of_a_state_is_the_textbooks(links):
     rng = np.random.default_rng(links)
     flight = replace(example_flight(), wind_N=WIND_N)
     model = small_model(odd_aircraft(rng), flight, links)
-    batch = replace(random_batch(rng, model, 1, wing_sets=4), lift_factor=np.zeros(1))
+    batch = random_batch(rng, model, 1).changed(lift_factor=np.zeros(1))
     hinges, state = random_hinges(rng, model), random_state(rng, model, 1, speed=30.0)
     force_B, moment_B = 1e3 * rng.normal(size=(2, 1, 3))
     constants = lane_constants(model, batch, 0.005)
@@ -63,7 +63,7 @@ def test_motors_do_the_work_that_the_aircraft_gains(links):
     model = example_model(links)
     model = small_model(model.aircraft, airless(model.flight), links)
     guess = physical_guess(model)
-    batch = replace(guess, damping=0.0 * guess.damping)
+    batch = guess.changed(damping_nms_rad=0.0 * guess["damping_nms_rad"])
     schedules = [Spline(np.array([0.0, 0.3, 0.6]), np.array([0.0, 0.2, angle])) for angle in (0.5, 0.3)]
     plan = flight_plan(model, schedules, time_grid(np.linspace(0.0, 0.6, 61), 0.001))
     states = fly_free(model, plan, batch, resting(model)).states[:, 0]

@@ -48,7 +48,7 @@ def test_nothing_accelerates(links):
     """
     rng = np.random.default_rng(links)
     model = example_model(links)
-    batch = random_batch(rng, model, 4, wing_sets=2)
+    batch = random_batch(rng, model, 4, separate_wings=True)
     found = trim(model, batch, instant(model, SWEPT)).require()
     rates = start_rates(model, batch, SWEPT, found)
     n = model.coordinates
@@ -135,7 +135,7 @@ def test_one_hopeless_particle_does_not_spoil_the_others():
     rng = np.random.default_rng(0)
     model = small_model(example_aircraft(), example_flight(), 2)
     batch = random_batch(rng, model, SLAB + 3)
-    batch.lift_factor[5] = 1e-9  # nothing carries it
+    batch["lift_factor"][5] = 1e-9  # nothing carries it
     found = trim(model, batch, instant(model, SWEPT))
     assert not found.converged[5]
     good = np.arange(SLAB + 3) != 5
@@ -151,7 +151,7 @@ def test_a_trim_does_not_depend_on_who_shares_its_slab():
     """
     model = example_model(3)
     batch = random_batch(np.random.default_rng(11), model, 96)
-    batch.lift_factor[40] = 1e-12
+    batch["lift_factor"][40] = 1e-12
     plan = instant(model, SWEPT)
     together = trim(model, batch, plan)
     for low in range(0, 96, TOGETHER):

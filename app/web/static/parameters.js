@@ -15,19 +15,31 @@ const GROUPS = {
   aero: "Aerodynamic corrections",
 };
 
+/* Who has parameters of its own: [[prefix of their names, the same for people, the parameters], ...]. */
+function parameterSets(model) {
+  const named = Object.entries(model.surfaces ?? {}).filter(([, own]) => !own.mirror_of);
+  if (named.length) return named.map(([name, own]) => [`${name}.`, `${name}, `, own]);
+  if (!Array.isArray(model.division?.[0])) return [["", "", model]];
+  const own = (wing) => ({ division: model.division[wing], stiffness_nm_rad: model.stiffness_nm_rad?.[wing], damping_nms_rad: model.damping_nms_rad?.[wing] });
+  return model.division.map((_, wing) => [`wing_${wing + 1}.`, `wing ${wing + 1}, `, own(wing)]);
+}
+
 /* All parameters in groups: [[group, [{name, title, value}, ...]], ...]; names as in result.uncertainty. */
 function parameterGroups(model) {
-  const own = Array.isArray(model.division?.[0]); // each wing has parameters of its own
-  const perWing = (values) => (own ? values : [values]);
-  const mark = (wing) => (own ? [`wing_${wing + 1}.`, `wing ${wing + 1}, `] : ["", ""]);
-  const shares = perWing(model.division).flatMap((parts, wing) => parts.map((value, i) => ({
-    name: `${mark(wing)[0]}division.${i + 1}`, title: `${mark(wing)[1]}link ${i + 1}`, value,
+  const sets = parameterSets(model);
+  const shares = sets.flatMap(([prefix, of, own]) => own.division.map((value, i) => ({
+    name: `${prefix}division.${i + 1}`, title: `${of}link ${i + 1}`, value,
   })));
-  const joints = (field) => perWing(model[field] ?? []).flatMap((rows, wing) => (rows ?? []).flatMap((row, joint) => [row].flat().map((value, i) => {
+  const joints = (field) => sets.flatMap(([prefix, of, own]) => (own[field] ?? []).flatMap((row, joint) => [row].flat().map((value, i) => {
     const axis = AXES[i] === "edgewise" ? "lag" : AXES[i]; // its name in documents
-    return { name: `${mark(wing)[0]}${field}.joint_${joint + 1}.${axis}`, title: `${mark(wing)[1]}joint ${joint + 1}, ${AXES[i]}`, value };
+    return { name: `${prefix}${field}.joint_${joint + 1}.${axis}`, title: `${of}joint ${joint + 1}, ${AXES[i]}`, value };
   })));
-  const aero = Object.entries(model.aero ?? {}).map(([name, value]) => ({ name, title: AERO[name] ?? name.replaceAll("_", " "), value }));
+  const aero = Object.entries(model.aero ?? {}).flatMap(([name, value]) => {
+    const title = AERO[name] ?? name.replaceAll("_", " ");
+    const each = sets.filter(([, , own]) => own[name] !== undefined); // corrections that each surface has
+    if (!each.length) return [{ name, title, value }];
+    return each.map(([prefix, of, own]) => ({ name: `${prefix}${name}`, title: `${of}${title.toLowerCase()}`, value: own[name] }));
+  });
   const groups = { division: shares, stiffness_nm_rad: joints("stiffness_nm_rad"), damping_nms_rad: joints("damping_nms_rad"), aero };
   return Object.entries(groups).filter(([, rows]) => rows.length).map(([group, rows]) => [GROUPS[group], rows]);
 }
@@ -48,7 +60,8 @@ function undeterminedNames(uncertainty) {
 /* Why a parameter has no interval or a doubtful one; null where there is nothing to say. */
 function remark(name, result, undetermined) {
   const searched = result.search?.aero_coefficients;
-  if (AERO[name] && searched && !searched.includes(name)) return "kept fixed, not searched";
+  const kind = name.split(".").at(-1);
+  if (AERO[kind] && searched && !searched.includes(kind)) return "kept fixed, not searched";
   const said = [
     undetermined.has(name) ? "not determined: the samples fit about as well with another value" : null,
     result.uncertainty?.at_bound?.includes(name) ? "at its bound: the best value may lie outside" : null,

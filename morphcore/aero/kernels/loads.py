@@ -23,7 +23,12 @@ from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 
 OUTPUTS = 5
-AERO_ROWS = 2  # lift factor, centre shift (m, forward)
+# rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
+# fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
+# forward)
+L_DRAG, L_DRAG_Y = 8, 9
+L_SLOW_DECAY, L_SLOW_WEIGHT, L_FAST_DECAY, L_FAST_WEIGHT = 10, 11, 12, 13
+L_LIFT, L_CENTRE = 14, 15
 # Wagner's function by R. T. Jones (1940): 1 - A1 exp(-b1 s) - A2 exp(-b2 s), s in semichords travelled
 JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
@@ -33,7 +38,7 @@ LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
 
 
 @kernel
-def lagged_motion(lanes, link, twist, slow, fast, previous, aero, effective):
+def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
     """Fill in what the circulation answers to: a link's (v_z, omega_x, omega_y) after lag, times lift factor.
 
     ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at
@@ -47,7 +52,7 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, aero, effective):
         or not_in_lanes(fast, lanes)
     ):
         return
-    if not_in_lanes(previous, lanes) or not_in_lanes(aero, lanes) or not_in_lanes(effective, lanes):
+    if not_in_lanes(previous, lanes) or not_in_lanes(effective, lanes):
         return
     now = 1.0 - JONES_A1 - JONES_A2
     for i in range(3):
@@ -55,10 +60,10 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, aero, effective):
         for l in range(len(lanes)):
             motion = source[l]
             change = motion - previous[i, l]
-            effective[i, l] = aero[0, l] * (
+            effective[i, l] = link[L_LIFT, l] * (
                 now * motion
-                + JONES_A1 * (slow[i, l] + link[11, l] * change)
-                + JONES_A2 * (fast[i, l] + link[13, l] * change)
+                + JONES_A1 * (slow[i, l] + link[L_SLOW_WEIGHT, l] * change)
+                + JONES_A2 * (fast[i, l] + link[L_FAST_WEIGHT, l] * change)
             )
 
 
@@ -120,9 +125,7 @@ def lane_product(lanes, matrix, inputs, outputs):
 
 
 @kernel
-def link_wrench(
-    lanes, surface, k, ranges, strips, overlap, outputs, link, twist, aero, density, sums, wrench
-):
+def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, sums, wrench):
     """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, and profile drag.
 
     ``strips`` (n, 3): trailing edge x and circulation centre x of each strip from the link axis, m, and the
@@ -136,7 +139,7 @@ def link_wrench(
         or not_in_lanes(twist, lanes)
     ):
         return
-    if not_in_lanes(aero, lanes) or not_in_lanes(sums, lanes) or not_in_lanes(wrench, lanes):
+    if not_in_lanes(sums, lanes) or not_in_lanes(wrench, lanes):
         return
     for i in range(13):
         row = sums[i]
@@ -185,11 +188,11 @@ def link_wrench(
             sums[5, l] * ux - sums[6, l] * wz + ux * sums[3, l] - wz * sums[4, l] - vy_slope * sums[3, l]
         )
         mz = -density * (uz * g1 + wx * g2 - wy * sums[9, l] - sums[11, l])
-        my -= aero[1, l] * fz
-        mz += aero[1, l] * fy
-        y = link[9, l]
+        my -= link[L_CENTRE, l] * fz
+        mz += link[L_CENTRE, l] * fy
+        y = link[L_DRAG_Y, l]
         vx, vy, vz = ux - wz * y, uy, uz + wx * y
-        drag = -0.5 * density * link[8, l] * math.sqrt(vx * vx + vy * vy + vz * vz)
+        drag = -0.5 * density * link[L_DRAG, l] * math.sqrt(vx * vx + vy * vy + vz * vz)
         dx, dy, dz = drag * vx, drag * vy, drag * vz
         wrench[0, l] = mx + y * dz
         wrench[1, l] = my

@@ -18,7 +18,6 @@ from morphcore.aero.kernels.loads import (
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
-    AERO_C,
     DENSITY,
     FUSELAGE,
     GRAVITY,
@@ -145,7 +144,6 @@ def accelerations(
     s_q, s_v, s_slow, s_fast, s_previous, _ = state_rows(links, coordinates)
     _, _, c_overlap = constant_rows(links, coordinates)
     overlap = constants[c_overlap:]
-    aero = constants[AERO_C : AERO_C + 2]
     density = shared[DENSITY]
 
     body_axes(lanes, state, wind, shared[GRAVITY], scratch)
@@ -185,7 +183,6 @@ def accelerations(
                 state[s_slow + 3 * link : s_slow + 3 * link + 3],
                 state[s_fast + 3 * link : s_fast + 3 * link + 3],
                 state[s_previous + 3 * link : s_previous + 3 * link + 3],
-                aero,
                 scratch[w_effective + 3 * link : w_effective + 3 * link + 3],
             )
 
@@ -201,7 +198,7 @@ def accelerations(
                 lanes, surfaces[s], k, ranges, strips, overlap, outputs,
                 constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                 scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
-                aero, density,
+                density,
                 scratch[S_SUMS : S_SUMS + 13],
                 scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
             )  # fmt: skip

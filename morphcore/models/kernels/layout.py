@@ -10,8 +10,8 @@ from morphcore.multibody.kernels.gimbal import JOINT_ROWS
 # and for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones
 # first)
 OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
-# rows of a lane's constants: force and moment in B, then aero (2), links, stiffness, damping, overlap
-FORCE_C, MOMENT_C, AERO_C, LINKS_C = 0, 3, 6, 8
+# rows of a lane's constants: force and moment in B, then links, stiffness, damping, overlap
+FORCE_C, MOMENT_C, LINKS_C = 0, 3, 6
 # rows of the scratch block before the per-link and per-joint ones
 S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
 S_INERTIA, S_CARRIED, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 79, 82, 85

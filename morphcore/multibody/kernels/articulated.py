@@ -17,9 +17,10 @@ from __future__ import annotations
 from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
-# mass, m x, m y, Ixx, Iyy, Izz, Ixy, joint offset along y, drag area, y of drag area; of the slow and the
-# fast lag the decay over half a step and the weight of a step
-LINK_ROWS = 14
+# rows of a link's constants: its mass properties (mass, m x, m y, Ixx, Iyy, Izz, Ixy) and the offset of its
+# joint along y; then those of the air, which aero/kernels/loads.py names
+L_MASS, L_OFFSET = 0, 7
+LINK_ROWS = 16
 
 
 @inlined

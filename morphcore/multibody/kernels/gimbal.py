@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes, sine_cosine
-from morphcore.multibody.kernels.articulated import carry_lane, inverse_symmetric
+from morphcore.multibody.kernels.articulated import L_OFFSET, carry_lane, inverse_symmetric
 
 JOINT_ROWS = 44
 
@@ -44,7 +44,7 @@ def gimbal_twist(lanes, twist_parent, link, q, v, joint, twist):
         joint[9, l], joint[10, l] = s3, c3
         # parent's twist at the joint, in parent axes
         ax, ay, az = twist_parent[0, l], twist_parent[1, l], twist_parent[2, l]
-        offset = link[7, l]
+        offset = link[L_OFFSET, l]
         bx = twist_parent[3, l] - az * offset
         by = twist_parent[4, l]
         bz = twist_parent[5, l] + ax * offset
@@ -196,7 +196,9 @@ def carry_through_gimbal(lanes, link, joint, inertia, force):
         r00, r01, r02 = joint[0, l], joint[1, l], joint[2, l]
         r10, r11, r12 = joint[3, l], joint[4, l], joint[5, l]
         r20, r21, r22 = joint[6, l], joint[7, l], joint[8, l]
-        carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, 0.0, link[7, l], 0.0, inertia, force, l)
+        carry_lane(
+            r00, r01, r02, r10, r11, r12, r20, r21, r22, 0.0, link[L_OFFSET, l], 0.0, inertia, force, l
+        )
 
 
 @kernel
@@ -211,7 +213,7 @@ def gimbal_acceleration(lanes, parent, link, joint, acceleration, joint_accelera
         r10, r11, r12 = joint[3, l], joint[4, l], joint[5, l]
         r20, r21, r22 = joint[6, l], joint[7, l], joint[8, l]
         ax, ay, az = parent[0, l], parent[1, l], parent[2, l]
-        offset = link[7, l]
+        offset = link[L_OFFSET, l]
         bx, by, bz = parent[3, l] - az * offset, parent[4, l], parent[5, l] + ax * offset
         wx = r00 * ax + r10 * ay + r20 * az
         wy = r01 * ax + r11 * ay + r21 * az

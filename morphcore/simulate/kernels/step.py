@@ -34,6 +34,7 @@ from __future__ import annotations
 
 import math
 
+from morphcore.aero.kernels.loads import L_FAST_DECAY, L_FAST_WEIGHT, L_SLOW_DECAY, L_SLOW_WEIGHT
 from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.chain import accelerations, base_rates, clear
@@ -159,7 +160,7 @@ def lag_to_stage(lanes, link, slow, fast, previous, stage_slow, stage_fast, stag
     if not_in_lanes(stage_previous, lanes):
         return
     for l in range(len(lanes)):
-        slow_decay, fast_decay = link[10, l], link[12, l]
+        slow_decay, fast_decay = link[L_SLOW_DECAY, l], link[L_FAST_DECAY, l]
         z, x, y = previous[0, l], previous[1, l], previous[2, l]
         stage_previous[0, l], stage_previous[1, l], stage_previous[2, l] = z, x, y
         stage_slow[0, l] = carried(slow[0, l], z, slow_decay)
@@ -183,7 +184,8 @@ def lag_from_stage(lanes, link, twist, stage_slow, stage_fast, slow, fast, previ
     if not_in_lanes(slow, lanes) or not_in_lanes(fast, lanes) or not_in_lanes(previous, lanes):
         return
     for l in range(len(lanes)):
-        slow_decay, slow_weight, fast_decay, fast_weight = link[10, l], link[11, l], link[12, l], link[13, l]
+        slow_decay, slow_weight = link[L_SLOW_DECAY, l], link[L_SLOW_WEIGHT, l]
+        fast_decay, fast_weight = link[L_FAST_DECAY, l], link[L_FAST_WEIGHT, l]
         z, x, y = twist[5, l], twist[0, l], twist[1, l]
         dz, dx, dy = z - previous[0, l], x - previous[1, l], y - previous[2, l]
         slow[0, l] = carried(stage_slow[0, l] + slow_weight * dz, z, slow_decay)

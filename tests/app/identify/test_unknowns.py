@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from morphcore.identify import identification_from_request
 from morphdata.identify import IdentifyRequest
 from tests.app.request_documents import identify_document
 from tests.app.running_service import RunningService
+from tests.models.test_every_surface_its_own import surface
 
 
 @pytest.mark.parametrize("roles", [("train", "train"), ("train", "held_out")])
 @pytest.mark.parametrize("listed", [None, [], ["profile_drag", "lag_s"]])
 @pytest.mark.parametrize("separate", [False, True])
+@pytest.mark.parametrize("tail", [[], [surface("right tail"), surface("left tail")], [surface("left tail")]])
 def test_the_unknowns_are_those_of_the_search(
     service: RunningService,
     roles: tuple[str, str],
     listed: list[str] | None,
+    tail: list[dict[str, Any]],
     separate: bool,  # noqa: FBT001
 ) -> None:
     """Of symmetric and asymmetric samples, with corrections listed or left to the library."""
@@ -28,5 +33,6 @@ def test_the_unknowns_are_those_of_the_search(
     document["model"] = {"links_per_wing": 2, "separate_wings": separate}
     if listed is not None:
         document["model"]["aero_coefficients"] = listed
+    document["aircraft"]["surfaces"] += tail
     told = service.client.post("/validate/identify", json=document).json()["cost"]
     assert told["parameters"] == identification_from_request(IdentifyRequest.parse(document)).space.dimension

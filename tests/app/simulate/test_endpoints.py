@@ -254,10 +254,41 @@ def test_separate_wings_are_accepted(service: RunningService) -> None:
         "damping_nms_rad": [[[1.0, 2.0, 3.0]], [[1.0, 2.0, 4.0]]],
     }
     assert stored(service, equivalent(parameters=separate))["model"]["parameters"] == separate
+    third = {**separate, **{name: [*separate[name], separate[name][0]] for name in OWN}}
+    at = "/model/parameters/division"
+    assert_named(service, "/simulate", equivalent(parameters=third), at, "other_number_of_wings", "")
     single = {**RESULT["model"], "links_per_wing": 1, "division": [1.0]}
     for none in ([], [[]]):
         joints = {"stiffness_nm_rad": none, "damping_nms_rad": none}
         stored(service, equivalent(parameters={**single, **joints}))
+
+
+OWN = {name: RESULT["model"][name] for name in ("division", "stiffness_nm_rad", "damping_nms_rad")}
+SURFACES: dict[str, Any] = {
+    "right wing": {**OWN, "profile_drag": 0.01},
+    "left wing": {"mirror_of": "right wing"},
+}
+
+
+def test_surfaces_may_have_parameters_of_their_own(service: RunningService) -> None:
+    """By name, or as the mirror image of another; what does not fit is named."""
+    model = {**RESULT["model"], "separate_wings": False, "surfaces": SURFACES}
+    assert stored(service, equivalent(parameters=model))["model"]["parameters"] == model
+    right = SURFACES["right wing"]
+    for name, change, pointer, code in (
+        ("right wing", {**right, "division": [0.5, 0.6]}, "/division", "division_not_whole"),
+        ("right wing", {**right, "stiffness_nm_rad": []}, "/stiffness_nm_rad", "wrong_shape"),
+        ("right wing", OWN, "/profile_drag", "missing"),
+        ("left wing", {"mirror_of": "tail"}, "/mirror_of", "mirrors_nothing"),
+        ("left wing", {"mirror_of": "left wing"}, "/mirror_of", "mirrors_nothing"),
+        ("left wing", {"mirror_of": "right wing", "division": [1.0]}, "/division", "unknown_field"),
+    ):
+        wrong = {**model, "surfaces": {**SURFACES, name: change}}
+        at = f"/model/parameters/surfaces/{name}{pointer}"
+        assert_named(service, "/simulate", equivalent(parameters=wrong), at, code, "")
+    alone = {**model, "surfaces": {"right wing": right}}
+    at = "/model/parameters/surfaces"
+    assert_named(service, "/simulate", equivalent(parameters=alone), at, "surface_without_parameters", "")
 
 
 def test_work_is_bounded(service: RunningService) -> None:

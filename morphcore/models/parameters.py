@@ -1,0 +1,413 @@
+"""The identifiable parameters of an equivalent model, as a list.
+
+Search space, names, bounds, documents, uncertainty and warnings iterate over ``CHAIN_PARAMETERS``. To add a
+parameter is to add one entry to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.aero.kernels.loads import (
+    JONES_B1,
+    JONES_B2,
+    JONES_MEAN_LAG,
+    L_CENTRE,
+    L_DRAG,
+    L_DRAG_Y,
+    L_FAST_WEIGHT,
+    L_LIFT,
+    L_SLOW_DECAY,
+)
+from morphcore.geometry.aircraft import Flight
+from morphcore.geometry.lattice import SurfaceLattice
+from morphcore.geometry.surface import Surface
+from morphcore.models.links import (
+    MASS_ROWS,
+    drag_areas,
+    joint_stiffness,
+    link_edges,
+    link_masses,
+    strip_overlap,
+)
+from morphcore.models.transforms import RATIO_RANGE, Linear, Log, Shares, Transform
+from morphcore.multibody.kernels.articulated import L_MASS, L_OFFSET
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Scope = Literal["surface", "pair", "aircraft"]
+
+AXIS_NAMES = ("flap", "torsion", "lag")
+STIFFNESS_FACTOR = 10.0  # either way from beam theory: a chain of few links is off by less than three
+DAMPING_FACTOR = 30.0
+LEAST_DAMPING_S = 1e-6  # of the stiffness: where the search for the damping of undamped wings begins
+LAG_FACTOR = 10.0
+LIFT_RANGE = (0.6, 1.5)
+LIFT_UNIT = 0.2
+CENTRE_RANGE_CHORDS = 0.15
+CENTRE_UNIT_CHORDS = 0.05
+DRAG_RANGE = (0.0, 0.08)
+DRAG_UNIT = 0.01
+NEUTRAL_LIFT_FACTOR = 1.0
+SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
+LARGEST_STIFFNESS = 1e15  # N m/rad, and N m s/rad of a damping, that a document may hold
+
+
+@dataclass(frozen=True)
+class CutSurface:
+    """A surface in its flight condition, cut into links.
+
+    Attributes
+    ----------
+    surface : Surface
+    flight : Flight
+    division : ndarray, shape (p, n)
+        Shares of the span of the links of p models, which sum to one.
+    """
+
+    surface: Surface
+    flight: Flight
+    division: Array
+
+    @property
+    def edges(self) -> Array:
+        """Ends of the links (p, n + 1), distances from the root in m."""
+        return link_edges(self.division, self.surface.span_m)
+
+
+@dataclass
+class SurfaceRows:
+    """The constants of one surface's links for the kernels, while parameters are written into them.
+
+    Attributes
+    ----------
+    surface : Surface
+    part : SurfaceLattice
+    step_s : float
+        Time step, s.
+    links : ndarray, shape (p, n, LINK_ROWS)
+        The rows that articulated.py and loads.py name (``L_...``).
+    stiffness, damping : ndarray, shape (p, 3 (n - 1))
+        Of flap, torsion and lag of each gimbal, N m/rad and N m s/rad.
+    overlap : ndarray, shape (p, 2 strips n)
+        For each strip and link the share of the strip, and the middle of that share in link axes, m.
+    touched : ndarray of int, shape (p, n, 2)
+        First strip of each link, and the one after its last.
+    """
+
+    surface: Surface
+    part: SurfaceLattice
+    step_s: float
+    links: Array
+    stiffness: Array
+    damping: Array
+    overlap: Array
+    touched: IntArray
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One kind of identifiable parameter.
+
+    Attributes
+    ----------
+    name : str
+        In bounds, documents and reports.
+    unit : str
+        Of its values, "1" if they have none.
+    transform : callable, Surface -> Transform
+        How it is searched on a surface.
+    bounds : callable, CutSurface -> (lower, upper)
+        Bounds (d,) of its search coordinates on a surface, where no others are asked for.
+    guess : callable, CutSurface -> ndarray, shape (p, ...)
+        Its physical values on a surface.
+    apply : callable, (SurfaceRows, ndarray) -> None
+        Writes values (p, ...) into the constants of a surface's links.
+    scope : {"surface", "pair", "aircraft"}
+        Who has values of its own: each surface (mirror images share them unless wings are separate), each
+        mirror pair, or the aircraft.
+    size : callable, Surface -> float
+        What measures an aircraft's parameter on a surface, such as a chord: surfaces have it in proportion.
+    labels : callable, int -> tuple of str, optional
+        Names of its values by number of links; None: there is one value.
+    coordinates : callable, int -> tuple of str, optional
+        Names of its search coordinates by number of links, where they are not those of the values.
+    correction : bool
+        Whether a request may leave it out of the search. Documents have it in ``aero``.
+    asymmetric : bool
+        Flights tell it only where both sides differ.
+    minimum, maximum, above : float
+        Limits of a value in a document, the last one excluded.
+    positive : bool
+        Bounds must be greater than zero.
+    default : float, optional
+        Of a value that a document leaves out; None: it must not.
+    at_bound : mapping of str to str
+        Hints for who ends at the "lower" or the "upper" bound, where widening it is none.
+    """
+
+    name: str
+    unit: str
+    transform: Callable[[Surface], Transform]
+    bounds: Callable[[CutSurface], tuple[Array, Array]]
+    guess: Callable[[CutSurface], Array]
+    apply: Callable[[SurfaceRows, Array], None]
+    scope: Scope = "aircraft"
+    size: Callable[[Surface], float] = lambda _: 1.0
+    labels: Callable[[int], tuple[str, ...]] | None = None
+    coordinates: Callable[[int], tuple[str, ...]] | None = None
+    correction: bool = True
+    asymmetric: bool = False
+    minimum: float = -np.inf
+    maximum: float = np.inf
+    above: float = -np.inf
+    positive: bool = False
+    default: float | None = None
+    at_bound: Mapping[str, str] = field(default_factory=dict)
+
+    def names(self, links: int) -> tuple[str, ...]:
+        """Names of its values."""
+        if self.labels is None:
+            return (self.name,)
+        return tuple(f"{self.name}.{label}" for label in self.labels(links))
+
+    def coordinate_names(self, links: int) -> tuple[str, ...]:
+        """Names of its search coordinates."""
+        return self.names(links) if self.coordinates is None else self.coordinates(links)
+
+    def in_proportion(self, surface: Surface, reference: Surface) -> float:
+        """Value on a surface over the value on the reference surface."""
+        return self.size(surface) / self.size(reference)
+
+
+def lag_weights(lag_s: Array, step_s: float) -> Array:
+    """Weights of one step of both of Jones' exponentials.
+
+    Parameters
+    ----------
+    lag_s : ndarray, shape (...)
+        Mean lag times, s.
+    step_s : float
+        Length h of the step, s.
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        For each of slow and fast: the decay e = exp(-h / T), and 1 - (1 - e) T / h.
+    """
+    weights = []
+    for semichords in (1.0 / JONES_B1, 1.0 / JONES_B2):
+        z = step_s / np.maximum(lag_s * semichords / JONES_MEAN_LAG, SHORTEST_LAG_S)
+        weights += [np.exp(-z), 1.0 + np.expm1(-z) / z]
+    return np.stack(weights, axis=-1)
+
+
+def _joint_labels(links: int) -> tuple[str, ...]:
+    return tuple(f"joint_{j + 1}.{axis}" for j in range(links - 1) for axis in AXIS_NAMES)
+
+
+def _factor(centre: Array, factor: float) -> tuple[Array, Array]:
+    """Logarithms of a range of one factor both ways."""
+    middle = np.log(centre.ravel())
+    return middle - np.log(factor), middle + np.log(factor)
+
+
+# shares of the span
+
+
+def _cut(rows: SurfaceRows, division: Array) -> None:
+    """Masses, joint offsets, drag areas and strips of links of these shares of the span."""
+    surface, edges = rows.surface, link_edges(division, rows.surface.span_m)
+    particles = division.shape[0]
+    rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
+    rows.links[:, 1:, L_OFFSET] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
+    rows.links[:, :, L_DRAG], rows.links[:, :, L_DRAG_Y] = drag_areas(surface, edges)
+    weight, middle = strip_overlap(surface, rows.part, edges)
+    rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
+    is_touched = weight > 0.0
+    rows.touched[:, :, 0] = np.argmax(is_touched, axis=1)
+    rows.touched[:, :, 1] = rows.part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)
+
+
+DIVISION = Parameter(
+    name="division",
+    unit="1",
+    transform=lambda _: Shares(),
+    bounds=lambda cut: (
+        np.full(cut.division.shape[1] - 1, -RATIO_RANGE),
+        np.full(cut.division.shape[1] - 1, RATIO_RANGE),
+    ),
+    guess=lambda cut: cut.division,
+    apply=_cut,
+    scope="surface",
+    labels=lambda links: tuple(str(k + 1) for k in range(links)),
+    coordinates=lambda links: tuple(f"log_ratio.{k + 1}" for k in range(links - 1)),
+    correction=False,
+    minimum=0.0,
+    maximum=1.0,
+    at_bound=dict.fromkeys(("lower", "upper"), "the best value may lie beyond: try another number of links"),
+)
+
+# stiffness and damping of the gimbals
+
+
+def _beam_stiffness(cut: CutSurface) -> Array:
+    return joint_stiffness(cut.surface, cut.edges)
+
+
+def _beam_damping(cut: CutSurface) -> Array:
+    """Proportional damping c = beta k."""
+    return _beam_stiffness(cut) * cut.surface.material.stiffness_damping_s
+
+
+def _stiffen(rows: SurfaceRows, stiffness: Array) -> None:
+    rows.stiffness[:] = stiffness.reshape(rows.stiffness.shape)
+
+
+def _damp(rows: SurfaceRows, damping: Array) -> None:
+    rows.damping[:] = damping.reshape(rows.damping.shape)
+
+
+STIFFNESS = Parameter(
+    name="stiffness_nm_rad",
+    unit="N m/rad",
+    transform=lambda _: Log(),
+    bounds=lambda cut: _factor(_beam_stiffness(cut), STIFFNESS_FACTOR),
+    guess=_beam_stiffness,
+    apply=_stiffen,
+    scope="surface",
+    labels=_joint_labels,
+    correction=False,
+    minimum=0.0,
+    maximum=LARGEST_STIFFNESS,
+    positive=True,
+)
+
+DAMPING = Parameter(
+    name="damping_nms_rad",
+    unit="N m s/rad",
+    transform=lambda _: Log(),
+    bounds=lambda cut: _factor(
+        np.maximum(_beam_damping(cut), LEAST_DAMPING_S * _beam_stiffness(cut)), DAMPING_FACTOR
+    ),
+    guess=_beam_damping,
+    apply=_damp,
+    scope="surface",
+    labels=_joint_labels,
+    correction=False,
+    minimum=0.0,
+    maximum=LARGEST_STIFFNESS,
+    positive=True,
+)
+
+# aerodynamic corrections
+
+
+def _chord(surface: Surface) -> float:
+    return surface.mean_chord_m
+
+
+def _neutral(value: float) -> Callable[[CutSurface], Array]:
+    return lambda cut: np.full(cut.division.shape[0], value)
+
+
+def _scale_lift(rows: SurfaceRows, factor: Array) -> None:
+    rows.links[:, :, L_LIFT] = factor[:, None]
+
+
+def _move_centre(rows: SurfaceRows, offset_m: Array) -> None:
+    rows.links[:, :, L_CENTRE] = offset_m[:, None]
+
+
+def _drag(rows: SurfaceRows, coefficient: Array) -> None:
+    rows.links[:, :, L_DRAG] *= coefficient[:, None]
+
+
+def _lag(rows: SurfaceRows, lag_s: Array) -> None:
+    weights = lag_weights(lag_s[:, None], rows.step_s)
+    weights[..., ::2] **= 0.5  # the step carries the lag states by halves
+    rows.links[:, :, L_SLOW_DECAY : L_FAST_WEIGHT + 1] = weights
+
+
+def _jones_lag_s(cut: CutSurface) -> float:
+    """Mean lag of Jones' indicial function on the surface's mean chord, s."""
+    return JONES_MEAN_LAG * _chord(cut.surface) / (2 * cut.flight.airspeed_m_s)
+
+
+def _lag_bounds(cut: CutSurface) -> tuple[Array, Array]:
+    natural = np.full(1, _jones_lag_s(cut))
+    return np.log(natural / LAG_FACTOR), np.log(natural * LAG_FACTOR)
+
+
+LIFT_FACTOR = Parameter(
+    name="lift_factor",
+    unit="1",
+    transform=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR),
+    bounds=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR).box(*LIFT_RANGE, 1),
+    guess=_neutral(NEUTRAL_LIFT_FACTOR),
+    apply=_scale_lift,
+    above=0.0,
+    maximum=100.0,
+    positive=True,
+    default=NEUTRAL_LIFT_FACTOR,
+)
+
+CENTRE_SHIFT = Parameter(
+    name="centre_shift_m",
+    unit="m",
+    transform=lambda surface: Linear(CENTRE_UNIT_CHORDS * _chord(surface)),
+    bounds=lambda cut: Linear(CENTRE_UNIT_CHORDS * _chord(cut.surface)).box(
+        -CENTRE_RANGE_CHORDS * _chord(cut.surface), CENTRE_RANGE_CHORDS * _chord(cut.surface), 1
+    ),
+    guess=_neutral(0.0),
+    apply=_move_centre,
+    size=_chord,
+    minimum=-100.0,
+    maximum=100.0,
+    default=0.0,
+)
+
+PROFILE_DRAG = Parameter(
+    name="profile_drag",
+    unit="1",
+    transform=lambda _: Linear(DRAG_UNIT),
+    bounds=lambda _: Linear(DRAG_UNIT).box(*DRAG_RANGE, 1),
+    guess=lambda cut: np.full(cut.division.shape[0], cut.surface.profile_drag),
+    apply=_drag,
+    scope="pair",
+    # the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and
+    # a fit would put it where it mends other errors of pitch
+    asymmetric=True,
+    minimum=0.0,
+    maximum=10.0,
+    at_bound={"lower": "no drag is less than none: the samples may show something that the model lacks"},
+)
+
+LAG = Parameter(
+    name="lag_s",
+    unit="s",
+    transform=lambda _: Log(),
+    bounds=_lag_bounds,
+    guess=lambda cut: np.full(cut.division.shape[0], _jones_lag_s(cut)),
+    apply=_lag,
+    size=_chord,
+    minimum=0.0,
+    maximum=100.0,
+    positive=True,
+)
+
+# in the order of search coordinates and reports; `division` lays the links out that the others write to
+CHAIN_PARAMETERS: list[Parameter] = [
+    DIVISION,
+    STIFFNESS,
+    DAMPING,
+    LIFT_FACTOR,
+    CENTRE_SHIFT,
+    PROFILE_DRAG,
+    LAG,
+]

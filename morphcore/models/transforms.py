@@ -1,0 +1,169 @@
+"""Search coordinates of a parameter: of order one, so that one difference step and one spread fit all.
+
+A transform leads from the values of a parameter, in SI units, to its search coordinates and back. It also
+says what an interval around a value looks like: of a shape that fits the parameter, in its own unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+RATIO_RANGE = 1.5  # of the log-ratios: a link may be 4.5 times shorter or longer than the last
+
+
+class Transform(Protocol):
+    """The way from m values, the last axis of an array, to d search coordinates and back."""
+
+    def forward(self, values: Array) -> Array:
+        """Search coordinates (..., d) of values (..., m)."""
+        ...
+
+    def inverse(self, x: Array) -> Array:
+        """Values (..., m) at search coordinates (..., d)."""
+        ...
+
+    def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
+        """Bounds (d,) of the coordinates that keep all ``count`` values between ``low`` and ``high``.
+
+        Raises
+        ------
+        InvalidInput
+            There is no room for them.
+        """
+        ...
+
+    def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Smallest and largest of each value, (m,), in a box of coordinates (d,)."""
+        ...
+
+    def derivative(self, values: Array) -> Array:
+        """Derivative (m,) of the coordinate in which a value's interval is even, per unit of the value."""
+        ...
+
+    def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
+        """Ends (m,) of intervals of half widths (m,) in the coordinate of ``derivative``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Log:
+    """A positive value, searched as its logarithm: intervals are even in factors."""
+
+    def forward(self, values: Array) -> Array:
+        """Logarithms."""
+        with np.errstate(divide="ignore"):  # nothing at all is the lower bound of any box
+            return np.log(values)
+
+    def inverse(self, x: Array) -> Array:
+        """Exponentials."""
+        return np.exp(x)
+
+    def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
+        """Logarithms of the bounds."""
+        return np.full(count, np.log(low)), np.full(count, np.log(high))
+
+    def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Values at the corners."""
+        return self.inverse(lower), self.inverse(upper)
+
+    def derivative(self, values: Array) -> Array:
+        """Of the logarithm."""
+        return 1.0 / values
+
+    def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
+        """One factor both ways."""
+        with np.errstate(over="ignore"):
+            return values * np.exp(-half), values * np.exp(half)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A value counted in ``unit`` from ``zero``, both in the value's own SI unit."""
+
+    unit: float
+    zero: float = 0.0
+
+    def forward(self, values: Array) -> Array:
+        """Units from zero."""
+        return np.asarray((values - self.zero) / self.unit)
+
+    def inverse(self, x: Array) -> Array:
+        """Values."""
+        return self.zero + self.unit * x
+
+    def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
+        """Bounds in units from zero."""
+        return self.forward(np.full(count, low)), self.forward(np.full(count, high))
+
+    def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Values at the corners."""
+        return self.inverse(lower), self.inverse(upper)
+
+    def derivative(self, values: Array) -> Array:
+        """One over the unit."""
+        return np.full(values.shape, 1.0 / self.unit)
+
+    def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
+        """The same difference both ways."""
+        width = half / self.derivative(values)
+        return values - width, values + width
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Positive shares that sum to one, searched as log-ratios to the last one: d = m - 1.
+
+    The additive log-ratio (Aitchison 1982): a box of the coordinates lies inside the simplex. Intervals are
+    even in the odds of a share.
+    """
+
+    def forward(self, values: Array) -> Array:
+        """Log-ratios to the last share."""
+        return np.log(values[..., :-1] / values[..., -1:])
+
+    def inverse(self, x: Array) -> Array:
+        """Shares."""
+        ratios = np.concatenate([x, np.zeros((*x.shape[:-1], 1))], axis=-1)
+        shares = np.exp(ratios - ratios.max(axis=-1, keepdims=True))
+        return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
+
+    def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
+        """Log-ratios of at most RATIO_RANGE either way for which every share stays inside the bounds."""
+        half = RATIO_RANGE
+        if count > 1:
+            if not low * count < 1.0 < high * count:
+                raise InvalidInput(
+                    f"division bounds {low:g}..{high:g} leave no room for {count} links",
+                    pointer="/model/bounds/division",
+                    hint=f"they must hold 1/{count}",
+                )
+            # the smallest share of a box of log-ratios +-r is 1 / (1 + e^r + (n - 2) e^r), the largest its
+            # mirror image
+            smallest = np.log((1.0 / low - 1.0) / (count - 1)) if low > 0 else RATIO_RANGE
+            largest = np.log((count - 1) / (1.0 / high - 1.0)) if high < 1 else RATIO_RANGE
+            half = float(min(RATIO_RANGE, smallest / 2, largest / 2))
+        return np.full(count - 1, -half), np.full(count - 1, half)
+
+    def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Of each share with all others at their other ends; the last one's ratio to itself is one."""
+        low, high = np.exp(np.append(lower, 0.0)), np.exp(np.append(upper, 0.0))
+        return low / (low + high.sum() - high), high / (high + low.sum() - low)
+
+    def derivative(self, values: Array) -> Array:
+        """Of the log-odds."""
+        return np.asarray(1.0 / (values * (1.0 - values)))
+
+    def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
+        """One factor of the odds both ways."""
+        odds = values / (1.0 - values)
+        with np.errstate(over="ignore"):
+            low, high = (1.0 / (1.0 + np.exp(-sign * half) / odds) for sign in (-1.0, 1.0))
+        return low, high
