@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document
 from morphdata.execution import Request, SpreadExecution
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
+from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
@@ -26,7 +27,10 @@ MAX_TOTAL_ROWS = 200_000
 MAX_DECADES = 12.0  # of bounds: more is no knowledge at all, and spoils a logarithmic search
 MIN_EVOLUTION = 4  # models of a generation of CMA-ES: of fewer the best half is no sample
 
-Correction = Literal["lift_factor", "centre_shift_m", "profile_drag", "lag_s"]
+if TYPE_CHECKING:
+    Correction = str
+else:
+    Correction = Literal[corrections()]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
@@ -34,35 +38,8 @@ Range = Annotated[
 ]
 
 
-class BoundLimit(NamedTuple):
-    """What the bounds of a parameter may be: its physical range, SI units."""
-
-    low: float
-    high: float
-    positive: bool = False  # searched on a logarithmic scale: zero is no bound
-
-
-BOUND_LIMITS = {
-    "stiffness_nm_rad": BoundLimit(0.0, 1e12, positive=True),
-    "damping_nms_rad": BoundLimit(0.0, 1e10, positive=True),
-    "division": BoundLimit(0.0, 1.0),
-    "lift_factor": BoundLimit(0.0, 10.0, positive=True),
-    "centre_shift_m": BoundLimit(-50.0, 50.0),
-    "profile_drag": BoundLimit(0.0, 2.0),
-    "lag_s": BoundLimit(0.0, 10.0, positive=True),
-}
-
-
-class Bounds(Document):
-    """Where the search may look; what is left out gets bounds from beam theory around the physical guess."""
-
-    stiffness_nm_rad: Range | None = None
-    damping_nms_rad: Range | None = None
-    division: Range | None = Field(default=None, description="[low, high] of a link's share of the span.")
-    lift_factor: Range | None = None
-    centre_shift_m: Range | None = None
-    profile_drag: Range | None = None
-    lag_s: Range | None = None
+class _Bounds(Document):
+    """What the bounds of all parameters have in common."""
 
     def given(self) -> dict[str, tuple[float, float]]:
         """Collect the bounds that are given, SI units."""
@@ -70,11 +47,27 @@ class Bounds(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that each pair rises, is physical and can be searched."""
+        limits = {each.name: each for each in IDENTIFIABLE}
         for name, pair in self.given().items():
-            yield from _bound_faults(name, *pair, BOUND_LIMITS[name])
+            yield from _bound_faults(name, *pair, limits[name])
 
 
-def _bound_faults(name: str, low: float, high: float, limit: BoundLimit) -> Iterator[Fault]:
+if TYPE_CHECKING:
+    Bounds = _Bounds
+else:  # type checkers see no fields that come from a list
+    Bounds = create_model(
+        "Bounds",
+        __base__=_Bounds,
+        __doc__="Where the search may look; what is left out gets bounds from beam theory around the "
+        "physical guess.",
+        **{
+            each.name: (Range | None, Field(default=None, description=each.bounds_description))
+            for each in IDENTIFIABLE
+        },
+    )
+
+
+def _bound_faults(name: str, low: float, high: float, limit: Identifiable) -> Iterator[Fault]:
     if low >= high:
         yield Fault(
             "range_upside_down",
@@ -113,7 +106,7 @@ class SoughtModel(Document):
     )
     aero_coefficients: list[Correction] | None = Field(
         default=None,
-        max_length=4,
+        max_length=len(corrections()),
         description="Aerodynamic corrections that are sought; the others keep their neutral values. "
         "Left out: those that the training samples can tell, which are all, but `profile_drag` only if one "
         "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad).",
@@ -140,7 +133,7 @@ class SoughtModel(Document):
         yield from repeated_faults(
             self.aero_coefficients or (), "/aero_coefficients", "Name each correction once."
         )
-        division = None if self.bounds is None else self.bounds.division
+        division = None if self.bounds is None else self.bounds.given().get("division")
         if division is not None:
             yield from _division_faults(self.numbers_of_links(), *division)
 

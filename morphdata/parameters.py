@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_serializer
+from pydantic import ConfigDict, Discriminator, Field, Tag, create_model, model_serializer
 
 from morphdata.base import Document, Identifier
 from morphdata.faults import Fault
+from morphdata.identifiable import IDENTIFIABLE
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 from morphdata.options import MODEL, Option
 from morphdata.refusals import escaped
@@ -36,15 +37,24 @@ Joint = Annotated[list[Stiffness], Field(min_length=AXES, max_length=AXES)]
 Joints = Annotated[list[Joint], Field(max_length=MAX_LINKS - 1)]
 
 
-class Corrections(Document):
-    """Aerodynamic corrections of an equivalent model."""
-
-    lift_factor: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    centre_shift_m: Annotated[float, Field(ge=-100.0, le=100.0)] = Field(
-        default=0.0, description="Forward positive."
+if TYPE_CHECKING:
+    Corrections = Document
+else:  # type checkers see no fields that come from a list
+    Corrections = create_model(
+        "Corrections",
+        __base__=Document,
+        __doc__="Aerodynamic corrections of an equivalent model.",
+        **{
+            each.name: (
+                each.value,
+                Field(
+                    default=... if each.default is None else each.default, description=each.value_description
+                ),
+            )
+            for each in IDENTIFIABLE
+            if each.value is not None
+        },
     )
-    profile_drag: Annotated[float, Field(ge=0.0, le=10.0)]
-    lag_s: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
 class SurfaceParameters(Document):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from morphdata.aircraft import Surface
+from morphdata.identifiable import corrections
 from morphdata.identify import (
     CostEstimate,
     IdentifyRequest,
@@ -25,7 +26,6 @@ DESCENT_ITERATIONS = 20
 DESCENT_TRIALS = 24
 REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
 REFERENCE_LINKS = 3
-CORRECTIONS = 4  # that may be searched; of symmetric samples all but the profile drag
 ASYMMETRIC_RAD = 0.01  # a sample is asymmetric whose sweeps differ, or that rolls or yaws, by more
 REPORT_TIME_S = 120.0  # uncertainty, plots, writing
 
@@ -65,12 +65,12 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
     groups = _mirror_groups(surfaces)
     if model.aero_coefficients is None:
         drag = any(_asymmetric(sample) for sample in training)
-        corrections = CORRECTIONS - 1 + drag
+        searched = len(corrections()) - 1 + drag
     else:
         drag = "profile_drag" in model.aero_coefficients
-        corrections = len(model.aero_coefficients)
+        searched = len(model.aero_coefficients)
     sets = sum(surface.flexible for surface in surfaces) if model.separate_wings else groups
-    return 7 * (links - 1) * sets + corrections + drag * (groups - 1)
+    return 7 * (links - 1) * sets + searched + drag * (groups - 1)
 
 
 def _mirror_groups(surfaces: Sequence[Surface]) -> int:

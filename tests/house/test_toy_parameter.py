@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from morphcore.identify import Identification, IdentifyResult, ModelSettings, SearchSettings
-from morphcore.identify.settings import model_settings, search_settings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter, SurfaceRows
-from morphcore.models.parameters_document import parameters_from_document
 from morphcore.models.transforms import Linear
 from morphcore.multibody.kernels.articulated import L_MASS
 from morphcore.simulate.trajectory import Trajectory
 from morphid.model_table import named_parameters
 from tests.identify.flights import reference_aircraft, reference_flight, shortened, synthetic
 
+ROOT = Path(__file__).resolve().parents[2]
 KILOGRAMS = Linear(unit=10.0)
 TRUTH_KG = 14.0
 
@@ -36,10 +39,62 @@ BALLAST = Parameter(
     bounds=lambda _: KILOGRAMS.box(-30.0, 30.0, 1),
     guess=lambda cut: np.zeros(cut.division.shape[0]),
     apply=put_on,
-    minimum=-1000.0,
-    maximum=1000.0,
     default=0.0,
 )
+
+# in a process of its own, for documents read their list when they are imported
+HOUSE_WITH_A_TOY = """
+import json
+from typing import Annotated
+from pydantic import Field
+from morphdata.identifiable import IDENTIFIABLE, Identifiable
+
+value = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+IDENTIFIABLE.append(Identifiable("ballast_kg", -100.0, 100.0, value=value, default=0.0))
+
+from app.openapi import document_text
+from morphcore.errors import InvalidInput
+from morphcore.identify import identification_from_request
+from morphcore.models.parameters import CHAIN_PARAMETERS
+from morphcore.models.parameters_document import parameters_from_document
+from morphdata.identify import IdentifyRequest
+from morphdata.operations.identify import cost
+from tests.house.test_toy_parameter import BALLAST, loaded
+from tests.identify.flights import EXAMPLES
+
+CHAIN_PARAMETERS.append(BALLAST)
+flown = loaded()
+columns = {"time_s": flown.time_s, "sweep_left_rad": flown.sweep_left, "sweep_right_rad": flown.sweep_right,
+           "phi_rad": flown.phi, "theta_rad": flown.theta, "psi_rad": flown.psi}
+sample = {"name": "loaded", **{name: column.tolist() for name, column in columns.items()}}
+model = {"links_per_wing": 1, "aero_coefficients": ["lift_factor", "ballast_kg"], "step_s": 0.01}
+
+def request(bounds, **search):
+    documents = {name: json.loads((EXAMPLES / f"{name}.json").read_text()) for name in ("aircraft", "flight")}
+    search = {"method": "least_squares", "generations": 6, **search}
+    return IdentifyRequest.parse(
+        {**documents, "samples": [sample], "model": {**model, "bounds": bounds}, "search": search})
+
+def identified(asked):
+    run = identification_from_request(asked)
+    *_, last = run.steps()
+    return run.result(last.checkpoint).to_document()
+
+bounded = request({"ballast_kg": [-5.0, 5.0]})
+free = identified(request({}))
+warm = identification_from_request(request({}, warm_start={"parameters": free}))
+known = warm.space.decode(warm.known[0])["ballast_kg"][0]
+old = json.loads(json.dumps(free))
+del old["model"]["aero"]["ballast_kg"]
+try:
+    request({"ballast_kg": [5.0, -5.0]})
+except InvalidInput as error:
+    refused = error.pointer
+print("FOUND" + json.dumps({
+    "schemas": json.loads(document_text())["components"]["schemas"], "free": free,
+    "bounded": identified(bounded), "unknowns": cost(bounded).parameters, "known": known,
+    "old": parameters_from_document(old)["ballast_kg"][0], "refused": refused}))
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -94,9 +149,8 @@ def test_it_is_identified_and_reported() -> None:
 
 
 def test_it_is_bounded() -> None:
-    """By bounds of a request, in its unit; at one of them the result says so and points at it."""
-    settings = model_settings({"bounds": {"ballast_kg": [-5.0, 5.0]}})
-    found = identified(**settings.bounds)
+    """By bounds in its unit; at one of them the result says so and points at it."""
+    found = identified(ballast_kg=(-5.0, 5.0))
     assert found.parameters["ballast_kg"][0] == pytest.approx(5.0)
     assert "ballast_kg" in found.at_bound
     assert found.to_document()["uncertainty"]["interval_95"]["ballast_kg"][1] is None
@@ -104,18 +158,21 @@ def test_it_is_bounded() -> None:
     assert (warning.code, warning.pointer) == ("at_bound", "/model/bounds/ballast_kg")
 
 
-def test_it_is_warm_started() -> None:
-    """A search begins from its value in an earlier result; a document from before it was known is none."""
-    document = identified().to_document()
-    search = search_settings(
-        {"method": "least_squares", "generations": 1, "warm_start": {"parameters": document}}
+def test_documents_know_it() -> None:
+    """One more entry, in the list of the documents: OpenAPI, request, cost, result and warm start have it."""
+    ended = subprocess.run(
+        [sys.executable, "-c", HOUSE_WITH_A_TOY], cwd=ROOT, capture_output=True, text=True, check=False
     )
-    model = ModelSettings(links_per_wing=1, step_s=0.01)
-    run = Identification(reference_aircraft(), reference_flight(), [loaded()], model, search)
-    assert run.space.decode(run.known[0])["ballast_kg"][0] == pytest.approx(
-        document["model"]["aero"].pop("ballast_kg")
-    )
-    assert parameters_from_document(document)["ballast_kg"][0] == 0.0
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads(ended.stdout.partition("FOUND")[2])
+    for schema in ("Bounds", "Corrections"):
+        assert "ballast_kg" in found["schemas"][schema]["properties"]
+    assert found["unknowns"] == 2
+    assert found["free"]["model"]["aero"]["ballast_kg"] == pytest.approx(TRUTH_KG, rel=1e-3)
+    assert found["bounded"]["uncertainty"]["at_bound"] == ["ballast_kg"]
+    assert found["known"] == pytest.approx(found["free"]["model"]["aero"]["ballast_kg"])
+    assert found["old"] == 0.0  # a model from before it was known
+    assert found["refused"] == "/model/bounds/ballast_kg/0"
 
 
 def test_it_flies() -> None:

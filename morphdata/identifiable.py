@@ -1,0 +1,68 @@
+"""The identifiable parameters as documents know them: their names, and what their bounds and values may be.
+
+What a parameter means to a model stands under the same name in ``morphcore/models/parameters.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import Field
+
+
+@dataclass(frozen=True)
+class Identifiable:
+    """What documents hold of one parameter.
+
+    Attributes
+    ----------
+    name : str
+        In bounds, corrections and reports.
+    low, high : float
+        Physical range of its bounds, SI units.
+    positive : bool
+        It is searched on a logarithmic scale: zero is no bound.
+    bounds_description : str, optional
+        Of its bounds.
+    value : type, optional
+        Of an aerodynamic correction, what a model's ``aero`` object may hold; None: it is no correction.
+    default : float, optional
+        Of a correction that a document leaves out; None: it must not.
+    value_description : str, optional
+        Of a correction's value.
+    """
+
+    name: str
+    low: float
+    high: float
+    positive: bool = False
+    bounds_description: str | None = None
+    value: Any = None
+    default: float | None = None
+    value_description: str | None = None
+
+
+IDENTIFIABLE: list[Identifiable] = [
+    Identifiable("stiffness_nm_rad", 0.0, 1e12, positive=True),
+    Identifiable("damping_nms_rad", 0.0, 1e10, positive=True),
+    Identifiable("division", 0.0, 1.0, bounds_description="[low, high] of a link's share of the span."),
+    Identifiable(
+        "lift_factor", 0.0, 10.0, positive=True, value=Annotated[float, Field(gt=0.0, le=100.0)], default=1.0
+    ),
+    Identifiable(
+        "centre_shift_m",
+        -50.0,
+        50.0,
+        value=Annotated[float, Field(ge=-100.0, le=100.0)],
+        default=0.0,
+        value_description="Forward positive.",
+    ),
+    Identifiable("profile_drag", 0.0, 2.0, value=Annotated[float, Field(ge=0.0, le=10.0)]),
+    Identifiable("lag_s", 0.0, 10.0, positive=True, value=Annotated[float, Field(ge=0.0, le=100.0)]),
+]
+
+
+def corrections() -> tuple[str, ...]:
+    """Return the names of the aerodynamic corrections."""
+    return tuple(each.name for each in IDENTIFIABLE if each.value is not None)
