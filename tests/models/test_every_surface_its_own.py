@@ -183,7 +183,7 @@ def test_a_mirrored_aircraft_flies_the_mirrored_flight() -> None:
     for choice, (left, right) in ((batch, (0.2, 0.3)), (other, (0.3, 0.2))):
         sides = {"left": ConstantRate(0.0, left, 0.5), "right": ConstantRate(0.0, right, 0.5)}
         angles.append(
-            simulate(
+            fly(
                 aircraft(), flight(), sides, model=choice, duration_s=0.4, step_s=0.01, lattice=LATTICE
             ).trajectory.euler
         )
@@ -208,7 +208,8 @@ def sample(names: tuple[str, ...], batch: ParameterBatch) -> Trajectory:
 def identified(names: tuple[str, ...], flown_as: Trajectory, **options: Any) -> IdentifyResult:
     """A short descent."""
     run = Identification(
-        aircraft(names), flight(), [flown_as], EquivalentModel(links_per_wing=2, lattice=LATTICE, step_s=0.01, **options),
+        aircraft(names), flight(), [flown_as],
+        EquivalentModel(links_per_wing=2, lattice=LATTICE, step_s=0.01, **options),
         SearchSettings(method="least_squares", iterations=3),
     )  # fmt: skip
     checkpoint = b""
