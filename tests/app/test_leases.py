@@ -123,7 +123,7 @@ def test_subscribers_are_part_of_the_change(database: Database, table: LeasedTab
     with database.write() as session:
         held = claim(session, table)
         assert held is not None
-        table.settle(session, held)  # no news
+        table.settle(session, held, attempt=1)  # without a note it is no news
         table.settle(session, held, note=Note("progress"))
     with pytest.raises(Undone), database.write() as session:
         table.settle(session, held, note=Note("finished"), status=DONE)
