@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from morphcore.threads import usable_cores
+
 ROOT = Path(__file__).resolve().parents[2]
 COMPILE = """
 import json
@@ -30,7 +32,7 @@ print(json.dumps([before, compiled()]))
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="nothing is compiled")
-@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core compiles one kernel after the other")
+@pytest.mark.skipif(usable_cores() < 2, reason="one core compiles one kernel after the other")
 def test_a_second_process_compiles_the_kernels_of_one_flight(tmp_path: Path) -> None:
     """From an empty cache this process compiles each kernel once, for batches, and loads the other width."""
     ended = subprocess.run(
