@@ -12,8 +12,7 @@ import pytest
 
 from morphcore.aero.kernels.loads import L_DRAG
 from morphcore.errors import InvalidInput
-from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document
-from morphcore.geometry.lattice import LatticeSettings
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify import Identification, IdentifyResult, ModelSettings, SearchSettings
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
@@ -29,12 +28,15 @@ from morphcore.models.kernels.layout import LINKS_C
 from morphcore.models.links import joint_stiffness, link_edges
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
 from morphcore.multibody.kernels.articulated import LINK_ROWS
-from morphcore.simulate.flight import Simulation, simulate
+from morphcore.simulate.flight import Simulation
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
+from morphdata import aircraft as documents
+from morphdata.lattice import Lattice
 from tests.models.chains import example_flight
+from tests.simulate.flights import fly
 
-LATTICE = LatticeSettings(chordwise=1, spanwise=4)  # the laws hold on any
+LATTICE = Lattice(chordwise=1, spanwise=4)  # the laws hold on any
 # the lattice's equations in another order: 1e-13 of the loads, and an aircraft that leaves its trim by itself
 ROUND_OFF_RAD = 1e-10
 # a descent amplifies round-off by what the samples do not see
@@ -65,12 +67,11 @@ ORDERS = [NAMES, NAMES[::-1], ("left tail", "right wing", "right tail", "left wi
 
 def aircraft(names: tuple[str, ...] = NAMES, **change: dict[str, Any]) -> Aircraft:
     """Wings and a flexible tail of another stiffness, drag and chord."""
-    return aircraft_from_document(
-        {
-            "fuselage": {"length_m": 5.0, "width_m": 0.5, "height_m": 0.5, "density_kg_m3": 60.0},
-            "surfaces": [surface(name, **change.get(name, {})) for name in names],
-        }
-    )
+    document = {
+        "fuselage": {"length_m": 5.0, "width_m": 0.5, "height_m": 0.5, "density_kg_m3": 60.0},
+        "surfaces": [surface(name, **change.get(name, {})) for name in names],
+    }
+    return Aircraft.of(documents.Aircraft.parse(document))
 
 
 def flight() -> Flight:
@@ -86,7 +87,7 @@ def chain(names: tuple[str, ...] = NAMES, links: int = 2, **change: dict[str, An
 def flown(names: tuple[str, ...], model: Any) -> Simulation:
     """A short asymmetric morph; the fixed tail looks at no schedule."""
     sides = {"left": ConstantRate(0.0, 0.2, 0.5), "right": ConstantRate(0.0, 0.3, 0.5)}
-    return simulate(
+    return fly(
         aircraft(names), flight(), sides, model=model, duration_s=0.4, step_s=0.01, lattice=LATTICE,
         elements=4,
     )  # fmt: skip
@@ -181,7 +182,7 @@ def test_a_mirrored_aircraft_flies_the_mirrored_flight() -> None:
     for choice, (left, right) in ((batch, (0.2, 0.3)), (other, (0.3, 0.2))):
         sides = {"left": ConstantRate(0.0, left, 0.5), "right": ConstantRate(0.0, right, 0.5)}
         angles.append(
-            simulate(
+            fly(
                 aircraft(), flight(), sides, model=choice, duration_s=0.4, step_s=0.01, lattice=LATTICE
             ).trajectory.euler
         )
