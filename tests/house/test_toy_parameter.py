@@ -112,14 +112,12 @@ def loaded(ballast_kg: float = TRUTH_KG) -> Trajectory:
     return shortened(synthetic(batch, right_rad=0.4, noise_rad=1e-6), 90)
 
 
-def identified(search: SearchSettings | None = None, **bounds: tuple[float, float]) -> IdentifyResult:
+def identified() -> IdentifyResult:
     """Ballast and lift factor of rigid wings from that flight."""
-    model = ModelSettings(
-        links_per_wing=1, aero_coefficients=("lift_factor", "ballast_kg"), bounds=bounds, step_s=0.01
-    )
+    model = ModelSettings(links_per_wing=1, aero_coefficients=("lift_factor", "ballast_kg"), step_s=0.01)
     run = Identification(
         reference_aircraft(), reference_flight(), [loaded()], model,
-        search or SearchSettings(method="least_squares", iterations=6),
+        SearchSettings(method="least_squares", iterations=6),
     )  # fmt: skip
     checkpoint = b""
     for step in run.steps():
@@ -148,16 +146,6 @@ def test_it_is_identified_and_reported() -> None:
     assert run.space.names[-1] == "ballast_kg"
 
 
-def test_it_is_bounded() -> None:
-    """By bounds in its unit; at one of them the result says so and points at it."""
-    found = identified(ballast_kg=(-5.0, 5.0))
-    assert found.parameters["ballast_kg"][0] == pytest.approx(5.0)
-    assert "ballast_kg" in found.at_bound
-    assert found.to_document()["uncertainty"]["interval_95"]["ballast_kg"][1] is None
-    (warning,) = (each for each in found.warnings if "ballast_kg" in each.message)
-    assert (warning.code, warning.pointer) == ("at_bound", "/model/bounds/ballast_kg")
-
-
 def test_documents_know_it() -> None:
     """One more entry, in the list of the documents: OpenAPI, request, cost, result and warm start have it."""
     ended = subprocess.run(
@@ -170,6 +158,10 @@ def test_documents_know_it() -> None:
     assert found["unknowns"] == 2
     assert found["free"]["model"]["aero"]["ballast_kg"] == pytest.approx(TRUTH_KG, rel=1e-3)
     assert found["bounded"]["uncertainty"]["at_bound"] == ["ballast_kg"]
+    assert found["bounded"]["uncertainty"]["interval_95"]["ballast_kg"][1] is None
+    assert found["bounded"]["model"]["aero"]["ballast_kg"] == pytest.approx(5.0)
+    (warning,) = (each for each in found["bounded"]["warnings"] if "ballast_kg" in each["message"])
+    assert (warning["code"], warning["pointer"]) == ("at_bound", "/model/bounds/ballast_kg")
     assert found["known"] == pytest.approx(found["free"]["model"]["aero"]["ballast_kg"])
     assert found["old"] == 0.0  # a model from before it was known
     assert found["refused"] == "/model/bounds/ballast_kg/0"
