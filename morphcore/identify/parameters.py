@@ -13,11 +13,11 @@ from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, physical_guess
 from morphcore.models.parameters import CutSurface, Parameter
 from morphcore.models.transforms import Transform
+from morphdata.identify import Bounds
 
 Array = NDArray[np.float64]
 Interval = tuple[float | None, float | None]
 
-LARGEST_DECADES = 12.0
 BOUND_TOLERANCE = 1e-3  # of the box's width; half a per cent of a stiffness
 WARM_START = "/search/warm_start"  # where a request says what to begin from
 
@@ -281,9 +281,7 @@ def search_space(
     InvalidInput
         A bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
     """
-    known = {parameter.name: parameter for parameter in model.parameters}
-    for name, pair in (bounds or {}).items():
-        _check_bound(known, name, pair)
+    Bounds.parse({name: list(pair) for name, pair in (bounds or {}).items()}, "/model/bounds")
     corrections = [parameter.name for parameter in model.parameters if parameter.correction]
     for index, name in enumerate(aero_coefficients or ()):
         if name not in corrections:
@@ -347,26 +345,3 @@ def _unknown(
     guess = np.where(np.isfinite(guess), guess, 0.5 * (lower + upper))
     guess = np.clip(guess, lower, upper)
     return Unknown(parameter, model.links_per_wing, prefix, sets, surfaces, transform, lower, upper, guess)
-
-
-def _check_bound(known: Mapping[str, Parameter], name: str, pair: Sequence[float]) -> None:
-    pointer = f"/model/bounds/{name}"
-    if name not in known:
-        raise InvalidInput(f"{name} has no bounds", pointer=pointer, hint=f"use {', '.join(known)}")
-    low, high = pair
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InvalidInput(f"{name} is bounded by {low:g}..{high:g}", pointer=pointer, hint="give low < high")
-    if known[name].positive and low <= 0:
-        raise InvalidInput(
-            f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must be greater than 0"
-        )
-    if known[name].minimum == 0.0 and low < 0:
-        raise InvalidInput(
-            f"the lower bound of {name} is {low:g}", pointer=pointer, hint="it must not be negative"
-        )
-    if low > 0 and np.log10(high / low) > LARGEST_DECADES:
-        raise InvalidInput(
-            f"the bounds of {name} span more than {LARGEST_DECADES:g} decades",
-            pointer=pointer,
-            hint="narrow them",
-        )

@@ -340,7 +340,7 @@ def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
             known, own = batch.values.get(parameter.name), guess[parameter.name]
             if known is None or parameter.scope == "aircraft":
                 continue
-            if parameter.scope == "surface" and parameter.positive:
+            if parameter.factor:
                 with np.errstate(invalid="ignore", divide="ignore"):
                     factor = np.where(own[:, 0] > 0.0, known[:, 0] / own[:, 0], 1.0)
                 own = own * factor[:, None]

@@ -55,7 +55,6 @@ DRAG_RANGE = (0.0, 0.08)
 DRAG_UNIT = 0.01
 NEUTRAL_LIFT_FACTOR = 1.0
 SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
-LARGEST_STIFFNESS = 1e15  # N m/rad, and N m s/rad of a damping, that a document may hold
 
 
 @dataclass(frozen=True)
@@ -141,10 +140,8 @@ class Parameter:
         Whether a request may leave it out of the search. Documents have it in ``aero``.
     asymmetric : bool
         Flights tell it only where both sides differ.
-    minimum, maximum, above : float
-        Limits of a value in a document, the last one excluded.
-    positive : bool
-        Bounds must be greater than zero.
+    factor : bool
+        Unlike surfaces share one set of it as factors on their own guesses.
     default : float, optional
         Of a value that a document leaves out; None: it must not.
     at_bound : mapping of str to str
@@ -163,10 +160,7 @@ class Parameter:
     coordinates: Callable[[int], tuple[str, ...]] | None = None
     correction: bool = True
     asymmetric: bool = False
-    minimum: float = -np.inf
-    maximum: float = np.inf
-    above: float = -np.inf
-    positive: bool = False
+    factor: bool = False
     default: float | None = None
     at_bound: Mapping[str, str] = field(default_factory=dict)
 
@@ -248,8 +242,6 @@ DIVISION = Parameter(
     labels=lambda links: tuple(str(k + 1) for k in range(links)),
     coordinates=lambda links: tuple(f"log_ratio.{k + 1}" for k in range(links - 1)),
     correction=False,
-    minimum=0.0,
-    maximum=1.0,
     at_bound=dict.fromkeys(("lower", "upper"), "the best value may lie beyond: try another number of links"),
 )
 
@@ -283,9 +275,7 @@ STIFFNESS = Parameter(
     scope="surface",
     labels=_joint_labels,
     correction=False,
-    minimum=0.0,
-    maximum=LARGEST_STIFFNESS,
-    positive=True,
+    factor=True,
 )
 
 DAMPING = Parameter(
@@ -300,9 +290,7 @@ DAMPING = Parameter(
     scope="surface",
     labels=_joint_labels,
     correction=False,
-    minimum=0.0,
-    maximum=LARGEST_STIFFNESS,
-    positive=True,
+    factor=True,
 )
 
 # aerodynamic corrections
@@ -351,9 +339,6 @@ LIFT_FACTOR = Parameter(
     bounds=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR).box(*LIFT_RANGE, 1),
     guess=_neutral(NEUTRAL_LIFT_FACTOR),
     apply=_scale_lift,
-    above=0.0,
-    maximum=100.0,
-    positive=True,
     default=NEUTRAL_LIFT_FACTOR,
 )
 
@@ -367,8 +352,6 @@ CENTRE_SHIFT = Parameter(
     guess=_neutral(0.0),
     apply=_move_centre,
     size=_chord,
-    minimum=-100.0,
-    maximum=100.0,
     default=0.0,
 )
 
@@ -383,8 +366,6 @@ PROFILE_DRAG = Parameter(
     # the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and
     # a fit would put it where it mends other errors of pitch
     asymmetric=True,
-    minimum=0.0,
-    maximum=10.0,
     at_bound={"lower": "no drag is less than none: the samples may show something that the model lacks"},
 )
 
@@ -396,9 +377,6 @@ LAG = Parameter(
     guess=lambda cut: np.full(cut.division.shape[0], _jones_lag_s(cut)),
     apply=_lag,
     size=_chord,
-    minimum=0.0,
-    maximum=100.0,
-    positive=True,
 )
 
 # in the order of search coordinates and reports; `division` lays the links out that the others write to

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.identify import Identification, IdentifyResult, SearchSettings
+from morphcore.identify import Identification, IdentifyResult, ModelSettings, SearchSettings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter, SurfaceRows
 from morphcore.models.transforms import Linear
 from morphcore.multibody.kernels.articulated import L_MASS
 from morphcore.simulate.trajectory import Trajectory
-from morphdata.identify import EquivalentModel
 from morphid.model_table import named_parameters
 from tests.identify.flights import reference_aircraft, reference_flight, shortened, synthetic
 
@@ -115,10 +114,7 @@ def loaded(ballast_kg: float = TRUTH_KG) -> Trajectory:
 
 def identified() -> IdentifyResult:
     """Ballast and lift factor of rigid wings from that flight."""
-    # not validated: the documents of this process have read their list before the parameter was in it
-    model = EquivalentModel(links_per_wing=1, step_s=0.01).model_copy(
-        update={"aero_coefficients": ["lift_factor", "ballast_kg"]}
-    )
+    model = ModelSettings(links_per_wing=1, aero_coefficients=("lift_factor", "ballast_kg"), step_s=0.01)
     run = Identification(
         reference_aircraft(), reference_flight(), [loaded()], model,
         SearchSettings(method="least_squares", iterations=6),
@@ -145,7 +141,7 @@ def test_it_is_identified_and_reported() -> None:
     assert document["uncertainty"]["standard_error"]["ballast_kg"] > 0.0
     assert dict(named_parameters(document["model"]))["ballast_kg"] == found.parameters["ballast_kg"][0]
     run = Identification(
-        reference_aircraft(), reference_flight(), [loaded()], EquivalentModel(links_per_wing=2)
+        reference_aircraft(), reference_flight(), [loaded()], ModelSettings(links_per_wing=2)
     )
     assert run.space.names[-1] == "ballast_kg"
 
@@ -161,9 +157,9 @@ def test_documents_know_it() -> None:
         assert "ballast_kg" in found["schemas"][schema]["properties"]
     assert found["unknowns"] == 2
     assert found["free"]["model"]["aero"]["ballast_kg"] == pytest.approx(TRUTH_KG, rel=1e-3)
-    assert found["bounded"]["model"]["aero"]["ballast_kg"] == pytest.approx(5.0)
     assert found["bounded"]["uncertainty"]["at_bound"] == ["ballast_kg"]
     assert found["bounded"]["uncertainty"]["interval_95"]["ballast_kg"][1] is None
+    assert found["bounded"]["model"]["aero"]["ballast_kg"] == pytest.approx(5.0)
     (warning,) = (each for each in found["bounded"]["warnings"] if "ballast_kg" in each["message"])
     assert (warning["code"], warning["pointer"]) == ("at_bound", "/model/bounds/ballast_kg")
     assert found["known"] == pytest.approx(found["free"]["model"]["aero"]["ballast_kg"])

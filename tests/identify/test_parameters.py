@@ -92,5 +92,5 @@ def test_absurd_bounds_are_refused_by_name(bounds: dict[str, list[float]], field
     """Bounds that are empty, of the wrong sign, too wide or unknown give an error that points at them."""
     with pytest.raises(InvalidInput) as caught:
         space(3, bounds=bounds)
-    assert caught.value.pointer == f"/model/bounds/{field}"
+    assert caught.value.pointer.startswith(f"/model/bounds/{field}")
     assert caught.value.hint
