@@ -6,11 +6,11 @@ import importlib
 
 import numpy as np
 
-from morphcore import evolution, swarm
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.search import evolution, swarm
 from morphcore.simulate.flight import simulate
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold

@@ -45,8 +45,8 @@ def test_importing_adds_little_to_what_the_library_computes_with() -> None:
 @pytest.mark.parametrize(
     "statement",
     [
-        "from morphcore.swarm import operators; operators()",
-        "from morphcore.evolution import strategies; strategies()",
+        "from morphcore.search.swarm import operators; operators()",
+        "from morphcore.search.evolution import strategies; strategies()",
     ],
 )
 def test_late_packages_leave_logging_and_files_alone(statement: str, tmp_path: Path) -> None:

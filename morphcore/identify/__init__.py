@@ -8,17 +8,15 @@ from typing import Any
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, aircraft_from_document, flight_from_document
 from morphcore.geometry.fields import Fields
-from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import ModelSettings, SearchSettings, model_settings, search_settings
+from morphcore.search.step import Step
 from morphcore.simulate.trajectory import Trajectory, trajectory_from_document
-from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 
 __all__ = [
-    "GenerationTask",
     "Identification",
     "IdentifyResult",
     "Interrupted",

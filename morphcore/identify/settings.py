@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from morphcore.errors import InvalidInput
-from morphcore.evolution import FEWEST, EvolutionSettings
 from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings, lattice_settings
 from morphcore.identify.parameters import BOUND_NAMES
 from morphcore.models.equivalent import MOST_LINKS, ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
+from morphcore.search.evolution import FEWEST, EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trim import StartMode
-from morphcore.swarm import SwarmSettings
 
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
 

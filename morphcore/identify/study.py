@@ -17,15 +17,16 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import Fields, whole_number
 from morphcore.identify import identification_from_document
-from morphcore.identify.identification import Clock, Identification
+from morphcore.identify.identification import Identification
 from morphcore.identify.settings import ModelSettings, SearchSettings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
 from morphcore.identify.study_timing import ROUNDS, FlightTiming, Flyable, flight_timing, medians
 from morphcore.models.equivalent import MOST_LINKS, physical_guess
+from morphcore.search.run import Clock
+from morphcore.search.step import Step
 from morphcore.simulate.trajectory import Trajectory
-from morphcore.steps import Step
 from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread
 

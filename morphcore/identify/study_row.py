@@ -11,6 +11,7 @@ from morphcore.errors import NotFlyable
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
+from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ Document = dict[str, Any]
 Role = Literal["train", "held_out"]
 
 
+@stored
 @dataclass(frozen=True, repr=False)
 class StudyRow(Shown):
     """One row of a study; its fields have the names of the document.

@@ -25,8 +25,8 @@ from morphcore.optimise.settings import (
     schedule_search,
     weights_settings,
 )
+from morphcore.search.step import Step
 from morphcore.simulate.request import flown_model
-from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 

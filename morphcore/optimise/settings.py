@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.geometry.fields import Fields, WholeNumbers
 from morphcore.geometry.lattice import LatticeSettings, lattice_settings
-from morphcore.swarm import SwarmSettings
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,7 @@ class ScheduleSearch(WholeNumbers):
     seed: int = 1
     max_seconds: float | None = None
     swarm: SwarmSettings = field(default_factory=lambda: SwarmSettings(particles=PAPER_PARTICLES))
+    evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
     screen: int = DEFAULT_SCREEN
     starts: int = DEFAULT_STARTS
     iterations: int = DEFAULT_ITERATIONS

@@ -8,8 +8,8 @@ from pathlib import Path
 from morphcore.geometry.lattice import CoreLaw, LatticeSettings, VortexCore
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.flexible import DEFAULT_ELEMENTS
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
-from morphcore.swarm import SwarmSettings
 
 
 @dataclass(frozen=True)

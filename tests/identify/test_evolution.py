@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.evolution import Evolution, EvolutionSettings, EvolutionState, first_evolution
+from morphcore.search.evolution import Evolution, EvolutionSettings, EvolutionState, first_evolution
 from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.settings import search_settings
 from morphcore.identify.state import decode

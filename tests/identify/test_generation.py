@@ -10,7 +10,7 @@ from morphcore.identify import Identification, ModelSettings, SearchSettings
 from morphcore.identify.generation import GenerationTask
 from morphcore.identify.state import SearchState, decode
 from morphcore.lanes import TOGETHER
-from morphcore.swarm import SwarmSettings
+from morphcore.search.swarm import SwarmSettings
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.checkpoint import UnreadableCheckpoint
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
-from morphcore.evolution import EvolutionSettings
+from morphcore.search.evolution import EvolutionSettings
 from morphcore.identify import (
     Identification,
     Interrupted,
@@ -26,10 +26,10 @@ from morphcore.identify import (
 )
 from morphcore.identify.cost import costs, evaluate, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
-from morphcore.identify.state import decode
+
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.plan import STEP_S
-from morphcore.swarm import SwarmSettings
+from morphcore.search.swarm import SwarmSettings
 from morphcore.threads import thread_count
 from tests.identification_request import identification
 from tests.identify.flights import (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from morphcore import simulate
-from morphcore.checkpoint import UnreadableCheckpoint
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, ModelSettings, SearchSettings, Step
 from morphcore.identify.study import Study, study, study_from_document

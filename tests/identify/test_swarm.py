@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.state import SearchState, decode, encode
-from morphcore.swarm import SwarmSettings, SwarmState, first_swarm, next_swarm
+from morphcore.search.swarm import SwarmSettings, SwarmState, first_swarm, next_swarm
 
 Array = NDArray[np.float64]
 SETTINGS = SwarmSettings(particles=30, generations=40)
@@ -69,7 +69,7 @@ def test_stays_in_the_unit_cube_and_starts_at_the_guess() -> None:
 def test_is_silent(tmp_path: Path) -> None:
     """Importing and moving the swarm touches no logger and writes no file (pyswarms alone does)."""
     code = (
-        "import logging, numpy as np; from morphcore.swarm import *; s = SwarmSettings(4, 2);"
+        "import logging, numpy as np; from morphcore.search.swarm import *; s = SwarmSettings(4, 2);"
         "state = first_swarm(s, np.full(3, 0.5), 1); next_swarm(state, s, np.ones(4));"
         "print(logging.getLogger().handlers, logging.getLogger().level)"
     )

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.checkpoint import UnreadableCheckpoint
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.errors import FlightDiverged, InvalidInput
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.optimise import (
@@ -33,7 +33,7 @@ from morphcore.optimise.state import decode
 from morphcore.simulate.flight import FlightStep, simulate
 from morphcore.simulate.schedule import Spline
 from morphcore.simulate.step_choice import choose_step
-from morphcore.swarm import SwarmSettings
+from morphcore.search.swarm import SwarmSettings
 from tests.identify.flights import EXAMPLES, reference_aircraft, reference_flight
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
 

@@ -30,8 +30,8 @@ class IdentificationWork(SearchWork[IdentifyResult]):
         self._identification = run
 
     def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
-        """Give the next generation's search points in parts; None where no swarm's generation is next."""
-        task = self._identification.generation_task(checkpoint)
+        """Give the next step's search points in parts; None where it needs more than their costs."""
+        task = self._identification.task(checkpoint)
         return None if task is None else [_packed(part) for part in task.parts(most)]
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
@@ -40,7 +40,7 @@ class IdentificationWork(SearchWork[IdentifyResult]):
             return _packed(self._identification.task_costs(_unpacked(task), stop))
 
     def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Move the swarm by the costs of all parts."""
+        """Go on with the search by the costs of all parts."""
         with library_errors():
             costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
             return shown(self._identification.told(checkpoint, costs, wall_s=elapsed_s))
