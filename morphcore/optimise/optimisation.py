@@ -199,7 +199,7 @@ class ScheduleOptimisation(MorphCase):
             {
                 "generation": state.generation + 1,
                 "phase": row["phase"],
-                "particles": row["particles"],
+                "particles": search.flights - before,
                 "model": task.model,
                 "duration_s": task.duration_s,
                 "flights": flights,

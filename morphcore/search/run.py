@@ -134,12 +134,12 @@ class Search(Generic[Result]):
             best_cost=best_cost,
             generation=0 if first else state.generation + 1,
             flights=state.flights + evaluations * self.problem.flights_each,
-            over=best.size == 0 or solver.done(inner),
+            over=self.problem.box.lower.size == 0 or solver.done(inner),
         )
         row = {
             "generation": moved.generation,
             "phase": FIRST if first else solver.phase(state.solver),
-            "particles": evaluations,
+            "particles": 0 if first else evaluations,
             "flights": moved.flights,
             "best_cost": moved.best_cost,
             **({} if first else solver.remarks(outcome)),

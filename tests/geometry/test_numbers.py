@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput, MorphError
-from morphcore.search.evolution import EvolutionSettings
 from morphcore.geometry.fields import Fields, whole_number
 from morphcore.geometry.lattice import LatticeSettings
 from morphcore.identify import Identification, ModelSettings, SearchSettings
@@ -20,8 +19,9 @@ from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import flexible_model
 from morphcore.optimise import FlexibleSettings, Morph, ScheduleSearch, optimisation_from_document
-from morphcore.simulate.request import FlownModel, simulation_from_document
+from morphcore.search.evolution import EvolutionSettings
 from morphcore.search.swarm import SwarmSettings
+from morphcore.simulate.request import FlownModel, simulation_from_document
 from tests.app.request_documents import optimize_document, simulate_document
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from morphcore import simulate
-from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, ModelSettings, SearchSettings, Step
 from morphcore.identify.study import Study, study, study_from_document
 from morphcore.identify.study_timing import ROUNDS, timed_flight
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from tests.identification_request import identification
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
