@@ -121,6 +121,8 @@ class ScheduleDescent(Solver[DescentState, Trials]):
 
     def tell(self, state: DescentState, outcome: Trials) -> DescentState:
         """Take trial steps in linear models, or accept the best of them."""
+        if _probes(state).starts.size == 0:
+            return replace(state, probes=None)
         trials = _held(state)
         if state.tried is None:
             tried = self._trial_steps(state, outcome)
@@ -152,7 +154,10 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return min(state.iteration / min(USUAL_ITERATIONS, self._iterations), 1.0)
 
     def _aimed(self, state: DescentState) -> DescentState:
-        """Return the state with the probes of the iteration that comes, if one does."""
+        """Return the state with the probes of the iteration that comes, if one does.
+
+        There are none where no start in the field moves any more: that iteration is the last.
+        """
         share = next((share for end, share in NARROWING if state.iteration < end), 0.0)
         order = np.argsort(state.cost, kind="stable")[: max(1, round(share * state.cost.size))]
         starts = order[state.active[order]]
@@ -160,13 +165,12 @@ class ScheduleDescent(Solver[DescentState, Trials]):
             return replace(state, probes=None)
         near = [probes_of(self._space, point) for point in state.point[starts]]
         found = [item for item in near if item is not None]
-        if not found:
-            return replace(state, probes=None)
+        d = self._space.dimension
         probes = Probes(
             starts,
             np.array([item is not None for item in near]),
-            np.stack([points for points, _ in found]),
-            np.stack([steps for _, steps in found]),
+            np.array([points for points, _ in found]).reshape(-1, 1 + d, d),
+            np.array([steps for _, steps in found]).reshape(-1, d),
         )
         return replace(state, probes=probes)
 

@@ -64,6 +64,9 @@ class MorphProblem:
         return self._fly(batch.points, stop)
 
     def _fly(self, points: Array, stop: Stop | None) -> Trials:
+        if points.shape[0] == 0:  # no start moves, or the limits leave no room for probes
+            nothing = np.zeros((0, 0))
+            return Trials(points, np.zeros(0), nothing, 0, nothing)
         schedules = [self.space.schedule(point) for point in points]
         limited = self.limit.most_nm is not None
         flown = self.flights.fly(schedules, torque=limited, stop=stop)
