@@ -81,14 +81,14 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
             )
-        sought = self.settings.aero_coefficients
-        if sought is None:
-            sought = corrections_told([sample for sample in samples if sample.role == "train"])
+        free = self.settings.aero_coefficients
+        if free is None:
+            free = corrections_told([sample for sample in samples if sample.role == "train"])
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
-            aero_coefficients=sought,
+            aero_coefficients=free,
             bounds=self.settings.bounds,
         )
         warm_start = self.search.warm_start
@@ -195,7 +195,7 @@ class Identification:
         with one_blas_thread():
             return self.evaluate(Batch(points), stop).cost
 
-    def told(self, checkpoint: bytes, cost: Array, *, wall_s: float = 0.0) -> Step:
+    def tell(self, checkpoint: bytes, cost: Array, *, wall_s: float = 0.0) -> Step:
         """Return the step after a checkpoint, given the costs of its task: the step that ``steps`` gives.
 
         Parameters
@@ -212,7 +212,7 @@ class Identification:
         task = self._search.task(state)
         if task is None or cost.shape != task.points.shape[:1]:
             raise ValueError(f"costs {cost.shape} do not answer the task after generation {state.generation}")
-        return self._step(self._search.told(state, Outcome(task.points, cost, None, cost.size), wall_s))
+        return self._step(self._search.tell(state, Outcome(task.points, cost, None, cost.size), wall_s))
 
     # the problem
 

@@ -143,7 +143,7 @@ class Study:
             share=0.0,
             budget_s=None,
         )
-        return moved, self._told("result", state, f"{_links(row.links_per_wing)}: {_found(row)}")
+        return moved, self._reported("result", state, f"{_links(row.links_per_wing)}: {_found(row)}")
 
     def _time(self, state: StudyState, stop: Stop | None) -> tuple[StudyState, Step]:
         """One round of single flights of all models."""
@@ -156,7 +156,7 @@ class Study:
             rounds=rounds,
             plan_s=timing.plan_s if state.plan_s is None else state.plan_s,
         )
-        return moved, self._told("timing", moved, f"timing: round {len(rounds)} of {ROUNDS}")
+        return moved, self._reported("timing", moved, f"timing: round {len(rounds)} of {ROUNDS}")
 
     # pieces
 
@@ -214,7 +214,7 @@ class Study:
         timed = len(state.rounds) / ROUNDS
         return (1.0 - TIMING_FRACTION) * done / sum(self._weights) + TIMING_FRACTION * timed
 
-    def _told(self, phase: str, state: StudyState, message: str) -> Step:
+    def _reported(self, phase: str, state: StudyState, message: str) -> Step:
         return Step(phase, state.generation, 0.0, state.best_cost, state.flights, message, b"")
 
     def _result(self, state: StudyState, *, judged: bool) -> StudyResult:

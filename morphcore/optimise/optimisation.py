@@ -15,8 +15,9 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import DEFAULT_LATTICE, LatticeSettings
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.optimise.case import MorphCase
+from morphcore.optimise.compared import compared_schedules
 from morphcore.optimise.feasible import require_schedules, rounded_up
-from morphcore.optimise.goals import Found, Task, chosen, durations, next_task, require_goal, warm_starts
+from morphcore.optimise.goals import Found, Task, durations, next_task, require_goal, warm_starts
 from morphcore.optimise.problem import MorphProblem
 from morphcore.optimise.result import ScheduleResult, schedule_result
 from morphcore.optimise.search import found_by, schedule_search
@@ -28,7 +29,6 @@ from morphcore.search.checkpoint import pack, unpack
 from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.step import Step
 from morphcore.simulate.plan import STEP_S
-from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
@@ -90,24 +90,6 @@ class ScheduleOptimisation(MorphCase):
         self.effort = effort(morph, self.durations.size, self.search, flexible=verify == "flexible")
         self._searches: dict[Task, Search[Trials]] = {}
 
-    def compared(self, state: OptimisationState) -> dict[str, Schedule | None]:
-        """The schedules that are compared, in their order; None for what has not been found."""
-        best = self.best(state)
-        space = self.space(best.duration_s)
-        rigid = next((item for item in state.found if item.model == "rigid"), None)
-        return {
-            "constant": self.constant(best.duration_s),
-            "rigid_optimum": None if rigid is None or not rigid.feasible else space.schedule(rigid.point),
-            "optimum": space.schedule(best.point),
-        }
-
-    def best(self, state: OptimisationState) -> Found:
-        """The search whose schedule is the result, or its best so far."""
-        found = state.found
-        if state.task is not None and state.task.model == "equivalent" and state.search is not None:
-            found = (*found, found_by(state.task, self.space(state.task.duration_s), state.search))
-        return chosen(self.morph, found)
-
     # the iterator
 
     def steps(self, checkpoint: bytes | None = None, stop: Stop | None = None) -> Iterator[Step]:
@@ -139,7 +121,7 @@ class ScheduleOptimisation(MorphCase):
         """
         say("judging what was found")
         with one_blas_thread():
-            found = schedule_result(self, self.state(checkpoint))
+            found = schedule_result(self, self.search, self.weights, self.state(checkpoint))
         if found.lost:
             raise self.not_flyable()
         return found
@@ -150,7 +132,7 @@ class ScheduleOptimisation(MorphCase):
         Where the best does not fly it holds no schedule, and a warning says so.
         """
         with one_blas_thread():
-            return schedule_result(self, self.state(checkpoint), judged=False)
+            return schedule_result(self, self.search, self.weights, self.state(checkpoint), judged=False)
 
     def state(self, checkpoint: bytes) -> OptimisationState:
         """Return the state in a checkpoint, whose flights are flown in the steps that it was begun with.
@@ -239,7 +221,8 @@ class ScheduleOptimisation(MorphCase):
         self, state: OptimisationState, stop: Stop | None
     ) -> Iterator[tuple[OptimisationState, Step]]:
         """The next schedule's flight in the flexible model, with its progress."""
-        waiting = {name: schedule for name, schedule in self.compared(state).items() if schedule is not None}
+        compared = compared_schedules(self, state)
+        waiting = {name: schedule for name, schedule in compared.items() if schedule is not None}
         name = list(waiting)[len(state.verified)]
         message = f"flexible model: {name.replace('_', ' ')}"
         for reached in verification(self, self.flexible, name, waiting[name], self._clock, stop):

@@ -99,7 +99,7 @@ class Search(Generic[Result]):
         batch = self.solver.ask(state.solver)
         return None if batch.residuals else batch
 
-    def told(self, state: SearchState, outcome: Result, wall_s: float) -> SearchState:
+    def tell(self, state: SearchState, outcome: Result, wall_s: float) -> SearchState:
         """Return the state after the step of a `task` that was evaluated elsewhere, in ``wall_s`` seconds."""
         with one_blas_thread():
             return self._timed(self._step(state, None, outcome), wall_s)

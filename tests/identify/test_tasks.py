@@ -62,7 +62,7 @@ def test_asked_and_told_is_the_search_itself(settings: SearchSettings) -> None:
         task = search(settings).task(step.checkpoint)
         assert task is not None
         costs = [others[i % 2].task_costs(part) for i, part in enumerate(task.parts(4))]
-        step = run.told(step.checkpoint, np.concatenate(costs), wall_s=1.0)
+        step = run.tell(step.checkpoint, np.concatenate(costs), wall_s=1.0)
         assert content(run.state(step.checkpoint)) == content(run.state(expected.checkpoint))
         assert replace(step, checkpoint=b"") == replace(expected, checkpoint=b"")
     assert run.task(step.checkpoint) is None, "the search is over"
@@ -78,11 +78,11 @@ def test_descents_are_not_flown_in_parts() -> None:
     assert run.task(steps[-1].checkpoint) is None
     step = steps[0]
     with pytest.raises(ValueError, match="do not answer"):
-        run.told(step.checkpoint, np.ones(16))
+        run.tell(step.checkpoint, np.ones(16))
     swarm = search()
     first = next(iter(swarm.steps()))
     with pytest.raises(ValueError, match="do not answer"):
-        swarm.told(first.checkpoint, np.ones(74))
+        swarm.tell(first.checkpoint, np.ones(74))
 
 
 def test_the_time_of_the_flights_counts() -> None:
@@ -90,5 +90,5 @@ def test_the_time_of_the_flights_counts() -> None:
     settings = SearchSettings(method="pso", seed=5, max_seconds=100.0, swarm=SWARM.swarm)
     run = search(settings)
     first = next(iter(run.steps()))
-    assert run.told(first.checkpoint, np.ones(75), wall_s=1.0).fraction < 1.0
-    assert run.told(first.checkpoint, np.ones(75), wall_s=100.0).fraction == 1.0
+    assert run.tell(first.checkpoint, np.ones(75), wall_s=1.0).fraction < 1.0
+    assert run.tell(first.checkpoint, np.ones(75), wall_s=100.0).fraction == 1.0

@@ -103,7 +103,7 @@ def test_tasks_evaluated_elsewhere_are_the_search_itself(make: Make) -> None:
             continue
         asked += 1
         cost = np.concatenate([problem.evaluate(replace(task, points=p), None).cost for p in task.parts(2)])
-        told = search.told(through_bytes(before), Outcome(task.points, cost, None, cost.size), 1.0)
+        told = search.tell(through_bytes(before), Outcome(task.points, cost, None, cost.size), 1.0)
         assert content(told) == content(after)
         assert told.wall_s == before.wall_s + 1.0
     assert Search(problem, make(problem)).task(states[-1]) is None
@@ -141,7 +141,7 @@ def test_an_unknown_method_is_refused() -> None:
     with pytest.raises(InvalidInput) as caught:
         method("magic", unit_cube(bowl, GUESS), None, {"own": METHODS["pso"]})
     assert caught.value.pointer == "/search/method"
-    assert caught.value.hint == "choose one of cma, own, pso"
+    assert set(caught.value.hint.removeprefix("choose one of ").split(", ")) >= {"cma", "own", "pso"}
 
 
 def test_a_state_before_the_first_evaluation_can_be_stored() -> None:

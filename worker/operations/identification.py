@@ -48,7 +48,7 @@ class IdentificationWork(SearchWork[IdentifyResult]):
         costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
         with library_errors():
             try:
-                return shown(self._identification.told(checkpoint, costs, wall_s=elapsed_s))
+                return shown(self._identification.tell(checkpoint, costs, wall_s=elapsed_s))
             except UnreadableCheckpoint:
                 return next(self.steps(checkpoint, self._stop))
 
