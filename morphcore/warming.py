@@ -6,10 +6,10 @@ import importlib
 
 import numpy as np
 
-from morphcore import evolution, swarm
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.search import evolution, swarm
 from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.schedule import Hold

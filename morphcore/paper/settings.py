@@ -7,8 +7,8 @@ from pathlib import Path
 
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.flexible import DEFAULT_ELEMENTS
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
-from morphcore.swarm import SwarmSettings
 from morphdata.lattice import CoreLaw, Lattice, VortexCore
 
 
