@@ -8,8 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TypeVar
 
 Stop = Callable[[], bool]
+Value = TypeVar("Value")
 
 
 class Interrupted(Exception):
@@ -41,6 +43,20 @@ class Deadline:
             return True
         self.passed = self.passed or self._clock() >= self._end_s
         return self.passed
+
+    def before_it(self, work: Callable[[Stop], Value], otherwise: Value) -> Value:
+        """Return what work gives if it ends in time, else another value.
+
+        Raises
+        ------
+        Interrupted : somebody else stopped the work.
+        """
+        try:
+            return work(self)
+        except Interrupted:
+            if not self.passed:
+                raise
+            return otherwise
 
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)

@@ -6,9 +6,9 @@ import importlib
 
 import numpy as np
 
-from morphcore import evolution, swarm
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.search import evolution, swarm
 from morphcore.simulate.compilation import SMALL, compile_flights, tiny_aircraft
 from morphcore.simulate.flight import flight_steps
 from morphcore.simulate.plan import flight_plan, time_grid

@@ -31,6 +31,12 @@ def test_importing_loads_no_package_that_one_call_needs() -> None:
     assert modules_after("import morphcore").isdisjoint(LATE)
 
 
+def test_importing_the_searches_loads_none_of_their_packages() -> None:
+    """Whoever registers a method of his own, or reads a state, needs neither swarms nor strategies."""
+    modules = modules_after("import morphcore.search.methods, morphcore.search.run, morphcore.search.hybrid")
+    assert modules.isdisjoint(LATE)
+
+
 def test_importing_adds_little_to_what_the_library_computes_with() -> None:
     """Modules instead of seconds, which a busy machine would spoil: a fifth more than the packages' own."""
     packages = modules_after("import numpy, scipy.optimize, numba")
@@ -45,8 +51,8 @@ def test_importing_adds_little_to_what_the_library_computes_with() -> None:
 @pytest.mark.parametrize(
     "statement",
     [
-        "from morphcore.swarm import operators; operators()",
-        "from morphcore.evolution import strategies; strategies()",
+        "from morphcore.search.swarm import operators; operators()",
+        "from morphcore.search.evolution import strategies; strategies()",
     ],
 )
 def test_late_packages_leave_logging_and_files_alone(statement: str, tmp_path: Path) -> None:

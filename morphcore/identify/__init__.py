@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.generation import GenerationTask
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import SearchSettings, search_settings
+from morphcore.search.step import Step
 from morphcore.simulate.trajectory import Trajectory
-from morphcore.steps import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
@@ -19,7 +18,6 @@ from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 
 __all__ = [
-    "GenerationTask",
     "Identification",
     "IdentifyResult",
     "Interrupted",

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
-from morphcore.identify.polish import differences
 from morphcore.identify.sample_fit import ANGLES, SampleFit
-from morphcore.identify.state import SearchState
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
+from morphcore.search.least_squares import differences
+from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
@@ -144,7 +144,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "generations": state.generation,
             "wall_s": state.wall_s,
             "best_cost": state.best_cost,
-            "finished": state.phase == "done",
+            "finished": state.over,
             "history": list(state.history),
         },
         cost={

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from morphcore.errors import InvalidInput
-from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import WholeNumbers
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameter_batch
-from morphcore.swarm import SwarmSettings
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 from morphdata.identify import IdentifySearch, Method, Search
 from morphdata.parameters import parameters_in
 

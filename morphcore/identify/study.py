@@ -14,15 +14,16 @@ from functools import cached_property
 
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify import flown_inputs
-from morphcore.identify.identification import Clock, Identification
+from morphcore.identify.identification import Identification
 from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.identify.study_result import StudyResult, study_result
 from morphcore.identify.study_row import StudyRow, study_row
 from morphcore.identify.study_state import StudyState, decode, encode
 from morphcore.identify.study_timing import ROUNDS, FlightTiming, Flyable, flight_timing, medians
 from morphcore.models.equivalent import physical_guess
+from morphcore.search.run import Clock
+from morphcore.search.step import Step
 from morphcore.simulate.trajectory import Trajectory
-from morphcore.steps import Step
 from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread, use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
@@ -141,7 +142,7 @@ class Study:
             share=0.0,
             budget_s=None,
         )
-        return moved, self._told("result", state, f"{_links(row.links_per_wing)}: {_found(row)}")
+        return moved, self._reported("result", state, f"{_links(row.links_per_wing)}: {_found(row)}")
 
     def _time(self, state: StudyState, stop: Stop | None) -> tuple[StudyState, Step]:
         """One round of single flights of all models."""
@@ -154,7 +155,7 @@ class Study:
             rounds=rounds,
             plan_s=timing.plan_s if state.plan_s is None else state.plan_s,
         )
-        return moved, self._told("timing", moved, f"timing: round {len(rounds)} of {ROUNDS}")
+        return moved, self._reported("timing", moved, f"timing: round {len(rounds)} of {ROUNDS}")
 
     # pieces
 
@@ -212,7 +213,7 @@ class Study:
         timed = len(state.rounds) / ROUNDS
         return (1.0 - TIMING_FRACTION) * done / sum(self._weights) + TIMING_FRACTION * timed
 
-    def _told(self, phase: str, state: StudyState, message: str) -> Step:
+    def _reported(self, phase: str, state: StudyState, message: str) -> Step:
         return Step(phase, state.generation, 0.0, state.best_cost, state.flights, message, b"")
 
     def _result(self, state: StudyState, *, judged: bool) -> StudyResult:

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from morphcore.errors import NotFlyable
+from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.sample_fit import ANGLES
+from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
+from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
-
-if TYPE_CHECKING:
-    from morphcore.identify.identification import Identification
-    from morphcore.models.equivalent import ParameterBatch
 
 Document = dict[str, Any]
 Role = Literal["train", "held_out"]
 
 
+@stored
 @dataclass(frozen=True, repr=False)
 class StudyRow(Shown):
     """One row of a study; its fields have the names of the document.

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
-
-from morphcore.checkpoint import UnreadableCheckpoint, pack, unpack
 from morphcore.identify.study_row import StudyRow
+from morphcore.search.checkpoint import UnreadableCheckpoint, pack, stored, unpack
 
 Phase = Literal["search", "result", "timing", "done"]
 
-VERSION = "study 1"  # of the checkpoint; a worker refuses one that it does not know
+VERSION = "study 2"  # of the checkpoint; another one is not read
 
 
+@stored
 @dataclass(frozen=True)
 class StudyState:
     """A study between two steps.
@@ -41,36 +40,21 @@ class StudyState:
 
 
 def encode(state: StudyState) -> bytes:
-    """The state as bytes."""
-    search = None if state.search is None else np.frombuffer(state.search, dtype=np.uint8)
-    return pack({**vars(state), "search": search}, VERSION)
+    """Return the state as bytes."""
+    return pack(state, VERSION)
 
 
 def decode(checkpoint: bytes, links: tuple[int, ...]) -> StudyState:
-    """The state that ``encode`` wrote for a study of these numbers of links.
+    """Return the state that `encode` wrote for a study of these numbers of links.
 
     Raises
     ------
     UnreadableCheckpoint : the bytes are damaged, of another version, or of another study.
     """
-    state = unpack(checkpoint, VERSION, _state)
+    state = unpack(checkpoint, VERSION, StudyState)
     if state.links != links:
         raise UnreadableCheckpoint(
             f"the checkpoint is of a study of {list(state.links)} links, not {list(links)}",
             hint="give the request that the study was begun with",
         )
     return state
-
-
-def _state(tree: dict[str, Any]) -> StudyState:
-    """The state out of its tree, in which tuples have become lists and rows dicts."""
-    search = tree.pop("search")
-    return StudyState(
-        **{
-            **tree,
-            "links": tuple(tree["links"]),
-            "rows": tuple(StudyRow(**row) for row in tree["rows"]),
-            "search": None if search is None else search.tobytes(),
-            "rounds": tuple(tuple(times) for times in tree["rounds"]),
-        }
-    )

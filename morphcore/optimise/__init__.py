@@ -9,7 +9,7 @@ from morphcore.models.parameters_document import parameter_batch
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.result import ScheduleResult
 from morphcore.optimise.settings import schedule_settings
-from morphcore.steps import Step
+from morphcore.search.step import Step
 from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument

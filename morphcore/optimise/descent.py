@@ -1,7 +1,7 @@
 """Gauss-Newton descent under limits, from several starts at once.
 
 The departures of a flight are residuals, so that the finite differences of one flight for each unknown give
-a quadratic model of the cost. Its minimum is sought under the *exact* limits, which cost no flight
+a quadratic model of the cost. Its minimum is found under the *exact* limits, which cost no flight
 (sequential quadratic programming), and under the hinge torque's history, linear like the departures.
 Marquardt's damping (1963) keeps the step where the model holds; several dampings are flown side by side.
 Every schedule that is flown, probes included, keeps the limits of rate, acceleration and sign.
@@ -9,17 +9,17 @@ Every schedule that is flown, probes included, keeps the limits of rate, acceler
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.optimise.limits import MorphSpace
-from morphcore.optimise.torque_limit import TorqueLimit, Trials
+from morphcore.optimise.torque_limit import Anchored, TorqueLimit, Trials
+from morphcore.search.checkpoint import stored
+from morphcore.search.solver import Batch, Solver
 
 Array = NDArray[np.float64]
-Fly = Callable[[Array], Trials]
 
 # probe of the differences and the slack that its base needs: knots that stand closely take the smaller ones
 PROBES = ((1e-6, 1e-3), (1e-7, 1e-3), (1e-7, 1e-4), (1e-8, 1e-5))
@@ -28,33 +28,55 @@ MARGIN = (
 )
 DAMPING_TRIALS = (0.03, 0.3, 3.0)  # times each start's present damping
 FIRST_DAMPING = 3e-2
-LEAST_DAMPING, MOST_DAMPING = 1e-8, 1e6
+MIN_DAMPING, MAX_DAMPING = 1e-8, 1e6
 STALLED = 1e-4  # relative decrease of the cost that counts as none
 PATIENCE = 2  # iterations without decrease before a start has converged
 LEAST_COST = 1e-12  # rad^2: below, nothing is left to be gained
 STILL = 1e-9  # a step shorter than this is none; unknowns are shares of duration and change
+# the field of starts narrows as the descent goes on: iteration -> starts kept (as a share of the first field)
+NARROWING = ((5, 1.0), (10, 0.5))
+USUAL_ITERATIONS = 8  # of a descent: for the progress that is shown
 
 
+@stored
+@dataclass(frozen=True)
+class Probes:
+    """What an iteration flies for its differences.
+
+    Attributes
+    ----------
+    starts : (c,) which starts move. found : (c,) whether there are probes near a start.
+    points : (q, 1 + d, d) of the q found ones, a base near the start and its probes; steps : (q, d).
+    """
+
+    starts: NDArray[np.int64]
+    found: NDArray[np.bool_]
+    points: Array
+    steps: Array
+
+
+@stored
 @dataclass(frozen=True)
 class DescentState:
-    """Starts s of a descent: points (s, d) that keep all limits; costs, dampings, stalls (s,)."""
+    """Starts s of a descent: points (s, d) that keep all limits; costs, torques, dampings, stalls (s,).
+
+    probes : of the iteration that comes; None where none comes. tried : (t, c, d) its trial steps, which
+    come next once the probes were flown.
+    """
 
     point: Array
     cost: Array
     torque: Array
     damping: Array
     stalled: NDArray[np.int64]
-    iteration: int
+    iteration: int = 0
+    probes: Probes | None = field(default=None, repr=False)
+    tried: Array | None = field(default=None, repr=False)
 
     @property
     def active(self) -> NDArray[np.bool_]:
         """(s,) starts that still move."""
         return self.stalled < PATIENCE
-
-    @property
-    def best(self) -> int:
-        """The start with the least cost."""
-        return int(np.argmin(self.cost))
 
 
 @dataclass(frozen=True)
@@ -68,52 +90,128 @@ class _Linear:
     torque_gradient: Array
 
 
-def first_descent(points: Array, trials: Trials) -> DescentState:
-    """Starts at points (s, d) that were flown already."""
-    count = points.shape[0]
-    return DescentState(
-        points,
-        trials.cost,
-        trials.peak,
-        np.full(count, FIRST_DAMPING),
-        np.zeros(count, dtype=np.int64),
-        0,
-    )
+class ScheduleDescent(Solver[DescentState, Trials]):
+    """Descents from all schedules that are known.
 
+    Parameters
+    ----------
+    space, limit : what the schedules keep.
+    iterations : int
+        at most.
+    """
 
-def next_descent(
-    state: DescentState, space: MorphSpace, limit: TorqueLimit, fly: Fly, keep: int
-) -> DescentState:
-    """One iteration of the ``keep`` best starts that still move; the others rest."""
-    order = np.argsort(state.cost, kind="stable")[:keep]
-    chosen = order[state.active[order]]
-    if chosen.size == 0:
-        return state
-    models = _linearised(space, state.point[chosen], fly)
-    tried = np.stack([state.point[chosen]] * len(DAMPING_TRIALS))  # (trials, starts, d)
-    for i, (start, model) in enumerate(zip(chosen, models, strict=True)):
-        if model is not None:
+    name = "polish"  # as the history of a result calls it
+
+    def __init__(self, space: MorphSpace, limit: TorqueLimit, iterations: int) -> None:
+        self._space, self._limit, self._iterations = space, limit, iterations
+
+    def init(self, known: Trials) -> DescentState:
+        """Start at every schedule."""
+        count = known.cost.size
+        damping, stalled = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
+        return self._aimed(DescentState(known.points, known.cost, known.peak, damping, stalled))
+
+    def ask(self, state: DescentState) -> Batch:
+        """Return the probes, then the trial steps that move, anchored to their starts."""
+        probes = _probes(state)
+        if state.tried is None:
+            return Batch(probes.points.reshape(-1, self._space.dimension), residuals=True)
+        held, moved = _held(state), self._moved(state, state.tried)
+        return Anchored(state.tried.reshape(held.points.shape)[moved], anchors=held.select(moved))
+
+    def tell(self, state: DescentState, outcome: Trials) -> DescentState:
+        """Take trial steps in linear models, or accept the best of them."""
+        if _probes(state).starts.size == 0:
+            return replace(state, probes=None)
+        trials = _held(state)
+        if state.tried is None:
+            tried = self._trial_steps(state, outcome)
+            if self._moved(state, tried).any():
+                return replace(state, tried=tried)
+        else:
+            moved = self._moved(state, state.tried)
+            points = state.tried.reshape(trials.points.shape).copy()
+            points[moved], trials.cost[moved], trials.peak[moved] = outcome.points, outcome.cost, outcome.peak
+            trials = replace(trials, points=points)
+        return self._aimed(_accepted(state, trials))
+
+    def done(self, state: DescentState) -> bool:
+        """Return whether no start in the field can move any more, or the iterations are used up."""
+        return state.probes is None
+
+    def best(self, state: DescentState, outcome: Trials) -> tuple[Array, float]:
+        """Return the best start."""
+        del outcome
+        leader = int(np.argmin(state.cost))
+        return state.point[leader], float(state.cost[leader])
+
+    def between_steps(self, state: DescentState) -> bool:
+        """Return whether an iteration has ended."""
+        return state.tried is None
+
+    def share(self, state: DescentState) -> float:
+        """Return the share of the iterations that a descent usually takes."""
+        return min(state.iteration / min(USUAL_ITERATIONS, self._iterations), 1.0)
+
+    def _aimed(self, state: DescentState) -> DescentState:
+        """Return the state with the probes of the iteration that comes, if one does.
+
+        There are none where no start in the field moves any more: that iteration is the last.
+        """
+        share = next((share for end, share in NARROWING if state.iteration < end), 0.0)
+        order = np.argsort(state.cost, kind="stable")[: max(1, round(share * state.cost.size))]
+        starts = order[state.active[order]]
+        if state.iteration >= self._iterations:
+            return replace(state, probes=None)
+        near = [probes_of(self._space, point) for point in state.point[starts]]
+        found = [item for item in near if item is not None]
+        d = self._space.dimension
+        probes = Probes(
+            starts,
+            np.array([item is not None for item in near]),
+            np.array([points for points, _ in found]).reshape(-1, 1 + d, d),
+            np.array([steps for _, steps in found]).reshape(-1, d),
+        )
+        return replace(state, probes=probes)
+
+    def _trial_steps(self, state: DescentState, outcome: Trials) -> Array:
+        """Return steps (t, c, d) of all dampings in linear models near the starts."""
+        probes = _probes(state)
+        points = state.point[probes.starts]
+        tried = np.stack([points] * len(DAMPING_TRIALS))
+        each = probes.points.shape[1]
+        for q, i in enumerate(np.flatnonzero(probes.found)):
+            start = probes.starts[i]
+            model = linear_model(outcome, slice(q * each, (q + 1) * each), probes.steps[q])
             for k, factor in enumerate(DAMPING_TRIALS):
                 damping = factor * state.damping[start]
-                tried[k, i] = _step(space, limit, state.point[start], state.cost[start], model, damping)
-    shape = tried.shape[:2]
-    anchors = np.tile(state.point[chosen], (len(DAMPING_TRIALS), 1))
-    held = Trials.known(
-        np.tile(state.cost[chosen], len(DAMPING_TRIALS)), np.tile(state.torque[chosen], len(DAMPING_TRIALS))
-    )
-    flat = tried.reshape(-1, space.dimension)
-    moved = np.abs(flat - anchors).max(axis=1) > STILL
-    points, cost, peak = flat.copy(), held.cost.copy(), held.peak.copy()
-    if moved.any():
-        points[moved], trials = limit.kept(space, flat[moved], anchors[moved], held.select(moved), fly)
-        cost[moved], peak[moved] = trials.cost, trials.peak
-    return _accepted(state, chosen, points.reshape(*shape, -1), cost.reshape(shape), peak.reshape(shape))
+                tried[k, i] = _step(self._space, self._limit, points[i], state.cost[start], model, damping)
+        return tried
+
+    def _moved(self, state: DescentState, tried: Array) -> NDArray[np.bool_]:
+        """Return which of the trial steps (t c,) lead anywhere."""
+        away = np.abs(tried - state.point[_probes(state).starts])
+        return np.asarray(away.max(axis=2).ravel() > STILL)
 
 
-def _accepted(
-    state: DescentState, chosen: NDArray[np.int64], points: Array, tried: Array, peak: Array
-) -> DescentState:
-    """The state after trials (trials, starts): the best of each start where it is better."""
+def _probes(state: DescentState) -> Probes:
+    if state.probes is None:
+        raise ValueError("the descent is over")
+    return state.probes
+
+
+def _held(state: DescentState) -> Trials:
+    """Return the starts that move, once for each damping."""
+    starts = np.tile(_probes(state).starts, len(DAMPING_TRIALS))
+    return Trials.known(state.point[starts], state.cost[starts], state.torque[starts])
+
+
+def _accepted(state: DescentState, trials: Trials) -> DescentState:
+    """Return the state after trials of all dampings: each start at its best trial where that is better."""
+    chosen = _probes(state).starts
+    shape = (len(DAMPING_TRIALS), chosen.size)
+    points, tried = trials.points.reshape(*shape, -1), trials.cost.reshape(shape)
+    peak = trials.peak.reshape(shape)
     rows = np.arange(chosen.size)
     winner = np.argmin(tried, axis=0)
     before, after = state.cost[chosen], tried[winner, rows]
@@ -125,7 +223,7 @@ def _accepted(
     torque[chosen] = np.where(improved, peak[winner, rows], state.torque[chosen])
     lowered = state.damping[chosen] * np.array(DAMPING_TRIALS)[winner]
     raised = state.damping[chosen] * max(DAMPING_TRIALS) ** 2
-    damping[chosen] = np.clip(np.where(improved, lowered, raised), LEAST_DAMPING, MOST_DAMPING)
+    damping[chosen] = np.clip(np.where(improved, lowered, raised), MIN_DAMPING, MAX_DAMPING)
     still = before - after <= STALLED * before
     stalled[chosen] = np.where(still, stalled[chosen] + 1, 0)
     return DescentState(point, cost, torque, damping, stalled, state.iteration + 1)
@@ -148,34 +246,18 @@ def probes_of(space: MorphSpace, point: Array) -> tuple[Array, Array] | None:
     return None
 
 
-def linear_model(trials: Trials, points: Array, steps: Array) -> _Linear:
-    """Differences of flights at a base and its probes."""
+def linear_model(trials: Trials, rows: slice, steps: Array) -> _Linear:
+    """Return the linear model near a base from its flight and those of its probes, some rows of trials."""
+    if trials.residuals is None or trials.torque is None:
+        raise TypeError("the batch asked for residuals")
+    errors, torque = trials.residuals[rows], trials.torque[rows]
     return _Linear(
-        points[0],
-        trials.errors[0],
-        ((trials.errors[1:] - trials.errors[0]) / steps[:, None]).T,
-        trials.torque[0],
-        ((trials.torque[1:] - trials.torque[0]) / steps[:, None]).T,
+        trials.points[rows][0],
+        errors[0],
+        ((errors[1:] - errors[0]) / steps[:, None]).T,
+        torque[0],
+        ((torque[1:] - torque[0]) / steps[:, None]).T,
     )
-
-
-def _linearised(space: MorphSpace, points: Array, fly: Fly) -> list[_Linear | None]:
-    """A linear model near each point (s, d), all flights as one batch."""
-    probed = [probes_of(space, point) for point in points]
-    some = [item for item in probed if item is not None]
-    if not some:
-        return [None] * len(probed)
-    flown = fly(np.concatenate([batch for batch, _ in some]))
-    models: list[_Linear | None] = []
-    first = 0
-    for item in probed:
-        if item is None:
-            models.append(None)
-            continue
-        count = item[0].shape[0]
-        models.append(linear_model(flown.select(slice(first, first + count)), *item))
-        first += count
-    return models
 
 
 def _step(

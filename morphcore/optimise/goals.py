@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.optimise.flights import SAMPLE_S
+from morphcore.optimise.flights import SAMPLE_S, MorphFlights
 from morphcore.optimise.limits import MorphSpace
+from morphcore.search.checkpoint import stored
 from morphdata.optimize import Morph
 
 Array = NDArray[np.float64]
@@ -19,6 +20,7 @@ ModelName = Literal["equivalent", "rigid"]
 TICK_S = SAMPLE_S  # durations are compared in whole samples: between two the sums have the same rows
 
 
+@stored
 @dataclass(frozen=True)
 class Task:
     """A search to be done: with which model, for which duration in s."""
@@ -27,12 +29,13 @@ class Task:
     duration_s: float
 
 
+@stored
 @dataclass(frozen=True)
 class Found:
-    """What a search found: its best point (d,), J with weights, variation without (rad^2), peak torque (N m).
+    """What a search found: its best point (d,), J with weights, and variation without (rad^2).
 
-    Where no schedule keeps the torque limit, cost and variation are infinite and the torque is the least that
-    was seen; infinite they are too where the best flight ``diverged``.
+    Where no schedule keeps the torque limit, cost and variation are infinite and ``torque`` is the least peak
+    that was seen, N m; infinite they are too where the best flight ``diverged``.
     """
 
     model: ModelName
@@ -41,14 +44,21 @@ class Found:
     cost: float
     variation: float
     torque: float
-    flights: int
-    generations: int
     diverged: bool = False
 
     @property
     def feasible(self) -> bool:
         """Whether there is a schedule."""
         return bool(np.isfinite(self.cost))
+
+    def varied(self, space: MorphSpace, flights: MorphFlights) -> Found:
+        """The same with its variation, which takes a flight."""
+        if not self.feasible:
+            return self
+        flown = flights.fly([space.schedule(self.point)], torque=False)
+        if flown.diverged[0]:
+            return replace(self, cost=np.inf, variation=np.inf, diverged=True)
+        return replace(self, variation=float(flown.variation[0]))
 
 
 def durations(morph: Morph, shortest_s: float) -> Array:

@@ -38,7 +38,7 @@ RAMPS = (0.02, 0.1, 0.3, 0.5)  # of the duration: of the constant rates that are
 WAITS = (0.0, 0.2, 0.4, 0.6)  # of the duration: before them
 MOST_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
 TOLERANCE = 1e-11  # of their cost
-NARROW = 0.02  # room below which the centre is sought from the quickest morph too
+NARROW = 0.02  # room below which the search for the centre begins at the quickest morph too
 
 
 @dataclass(frozen=True)
@@ -150,10 +150,10 @@ class MorphSpace:
         """
         tried = np.concatenate([self.waiting((0.0,)), self._even])
         best = tried[int(np.argmax(self.least_slack(tried)))]
-        centre = self._roomier(best)
+        centre = self._with_more_room(best)
         if self.least_slack(centre[None, :])[0] < NARROW:
             quick = self.quickest[1]
-            pair = np.stack([centre, quick, self._roomier(quick)])
+            pair = np.stack([centre, quick, self._with_more_room(quick)])
             centre = pair[int(np.argmax(self.least_slack(pair)))]
         centre.setflags(write=False)
         return centre
@@ -215,7 +215,7 @@ class MorphSpace:
             needed = max(needed, float(np.sqrt(squared)))
         return needed * (1.0 + 2.0 * HELD)
 
-    def _roomier(self, start: Array) -> Array:
+    def _with_more_room(self, start: Array) -> Array:
         """The point of greatest least slack (d,) near another, or that other."""
 
         def rows(x: Array) -> Array:

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
-from morphcore.optimise.compared import ComparedFlight
+from morphcore.optimise.case import MorphCase
+from morphcore.optimise.compared import ComparedFlight, best_found, compared_schedules
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import Flown
 from morphcore.optimise.goals import Found
 from morphcore.optimise.schedule_warnings import schedule_warnings
+from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.optimize import Limits, Morph, Weights
-
-if TYPE_CHECKING:
-    from morphcore.optimise.optimisation import ScheduleOptimisation
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -168,13 +167,18 @@ class ScheduleResult(Shown):
 
 
 def schedule_result(
-    run: ScheduleOptimisation, state: OptimisationState, *, judged: bool = True
+    case: MorphCase,
+    settings: ScheduleSettings,
+    weights: Weights,
+    state: OptimisationState,
+    *,
+    judged: bool = True,
 ) -> ScheduleResult:
     """Fly the compared schedules; if ``judged``, with their torques and the front's constant rates too."""
-    best, schedules = run.best(state), run.compared(state)
+    best, schedules = best_found(case, state), compared_schedules(case, state)
     named = {name: schedule for name, schedule in schedules.items() if schedule is not None}
     flights: dict[str, dict[str, ComparedFlight | None]] = {}
-    benches = {model: run.flights(model) for model in ("rigid", "equivalent")}
+    benches = {model: case.flights(model) for model in ("rigid", "equivalent")}
     for model, bench in benches.items():
         flown = bench.fly(list(named.values()), torque=judged)
         flights[model] = {name: _compared(flown, i, judged=judged) for i, name in enumerate(named)}
@@ -182,20 +186,19 @@ def schedule_result(
     searched = tuple(
         sorted((f for f in state.found if f.model == "equivalent"), key=lambda item: item.duration_s)
     )
-    settings = run.search
     return ScheduleResult(
-        morph=run.morph,
-        limits=run.limits,
-        weights=run.weights,
+        morph=case.morph,
+        limits=case.limits,
+        weights=weights,
         best=best,
         schedules=schedules,
         times_s=benches["equivalent"].times_s,
         flights=flights,
-        front=_front(run, searched, judged=judged) if run.morph.goal != "variation" else (),
+        front=_front(case, searched, judged=judged) if case.morph.goal != "variation" else (),
         search={
             "method": settings.method,
             "seed": settings.seed,
-            "unknowns": run.space(best.duration_s).dimension,
+            "unknowns": case.space(best.duration_s).dimension,
             "flights": state.flights,
             "generations": state.generation,
             "wall_s": state.wall_s,
@@ -211,11 +214,11 @@ def schedule_result(
             if item.failure
         ),
         partial=state.phase != "done",
-        warnings=schedule_warnings(run, state, schedules, flights),
+        warnings=schedule_warnings(case, state, schedules, flights),
     )
 
 
-def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
+def _front(case: MorphCase, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
     """All durations with a schedule; those that none beats are those that vary less than all shorter ones."""
     front: list[FrontPoint] = []
     least = np.inf
@@ -224,9 +227,9 @@ def _front(run: ScheduleOptimisation, searched: tuple[Found, ...], *, judged: bo
             continue
         constant = None
         if judged:
-            flown = run.flights("equivalent").fly([run.constant(item.duration_s)], torque=False)
+            flown = case.flights("equivalent").fly([case.constant(item.duration_s)], torque=False)
             constant = None if flown.diverged[0] else float(flown.variation[0])
-        schedule = run.space(item.duration_s).schedule(item.point)
+        schedule = case.space(item.duration_s).schedule(item.point)
         beaten = item.variation >= least
         front.append(FrontPoint(item.duration_s, schedule, item.variation, constant, beaten))
         least = min(least, item.variation)

@@ -3,37 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from morphcore.optimise.case import MorphCase
 from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.state import OptimisationState
 from morphcore.simulate.schedule import Schedule
 from morphcore.validity import ResultWarning, air_warnings, documents, overlap_warnings
-
-if TYPE_CHECKING:
-    from morphcore.optimise.optimisation import ScheduleOptimisation
 
 SHAPES = 9  # between the path's ends, of which overlaps are looked for
 Flights = Mapping[str, Mapping[str, ComparedFlight | None]]
 
 
 def schedule_warnings(
-    run: ScheduleOptimisation,
+    case: MorphCase,
     state: OptimisationState,
     schedules: Mapping[str, Schedule | None],
     flights: Flights,
 ) -> tuple[dict[str, Any], ...]:
     """Warnings of the compared schedules as documents; those of the flexible model's flights are kept so."""
-    found = _lost(run, flights)
+    found = _lost(case, flights)
     optimum = schedules["optimum"]
     flown = flights["equivalent"]["optimum"]
     if optimum is not None and flown is not None and flown.variation is not None:
-        motion = run.flights("equivalent").motion(optimum)
-        found += air_warnings(run.flight, [("the optimum in the equivalent model", "/morph", motion)])
-    angles = np.linspace(run.path.low_rad, run.path.high_rad, SHAPES)[:, None]
-    found += overlap_warnings(run.aircraft, np.tile(angles, len(run.aircraft.surfaces)))
+        motion = case.flights("equivalent").motion(optimum)
+        found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
+    angles = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)[:, None]
+    found += overlap_warnings(case.aircraft, np.tile(angles, len(case.aircraft.surfaces)))
     verified: list[dict[str, Any]] = []
     for item in state.verified:
         name = item.schedule.replace("_", " ")
@@ -55,7 +53,7 @@ def schedule_warnings(
     return (*documents(found), *verified)
 
 
-def _lost(run: ScheduleOptimisation, flights: Flights) -> list[ResultWarning]:
+def _lost(case: MorphCase, flights: Flights) -> list[ResultWarning]:
     """Flights that left their model's domain; where it is the optimum's, there is no answer."""
     found = []
     for model, compared in flights.items():
@@ -63,7 +61,7 @@ def _lost(run: ScheduleOptimisation, flights: Flights) -> list[ResultWarning]:
             if flight is None or flight.variation is not None:
                 continue
             if (model, name) == ("equivalent", "optimum"):
-                error = run.not_flyable()
+                error = case.not_flyable()
                 found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
             else:
                 found.append(

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from morphcore.geometry.fields import WholeNumbers
-from morphcore.swarm import SwarmSettings
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 from morphdata.optimize import ScheduleSearch
 
 PAPER_PARTICLES = 50  # of the paper's swarm
@@ -28,6 +29,7 @@ class ScheduleSettings(WholeNumbers):
     seed: int = UNCHOSEN.seed
     max_seconds: float | None = None
     swarm: SwarmSettings = field(default_factory=lambda: SwarmSettings(particles=PAPER_PARTICLES))
+    evolution: EvolutionSettings = field(default_factory=EvolutionSettings)
     screen: int = DEFAULT_SCREEN
     starts: int = DEFAULT_STARTS
     iterations: int = DEFAULT_ITERATIONS

@@ -8,12 +8,14 @@ that is searched with; between the steps the torque is smooth and moves by a squ
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.optimise.limits import Map, MorphSpace
+from morphcore.search.checkpoint import stored
+from morphcore.search.solver import Batch, Outcome
 
 Array = NDArray[np.float64]
 
@@ -25,24 +27,38 @@ WATCHED = 0.5  # of the limit: torques above are watched in linear models
 MOST_WATCHED = 200
 
 
+@stored
 @dataclass(frozen=True)
-class Trials:
-    """Flown schedules: errors (p, m) with weights, costs (p,), torques (p, n) and their peaks (p,), N m."""
+class Trials(Outcome):
+    """Flown schedules: residuals are the departures times the roots of their weights.
 
-    errors: Array
-    cost: Array
-    torque: Array
-    peak: Array
+    Attributes
+    ----------
+    torque : (p, n) of all hinges at all steps, N m; only with residuals.
+    peak : (p,) the largest of them; NaN of a diverged flight.
+    """
+
+    torque: Array | None = None
+    peak: Array = field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
-    def known(cost: Array, peak: Array) -> Trials:
-        """Schedules flown before, of which only cost and peak torque were kept."""
-        none = np.zeros((cost.size, 0))
-        return Trials(none, cost, none, peak)
+    def known(points: Array, cost: Array, peak: Array, evaluations: int = 0) -> Trials:
+        """Return schedules flown before, of which only cost and peak torque were kept."""
+        return Trials(points, cost, None, evaluations, None, peak)
 
     def select(self, index: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Trials:
-        """Some of them."""
-        return Trials(self.errors[index], self.cost[index], self.torque[index], self.peak[index])
+        """Return some of them, without residuals and torques."""
+        return Trials.known(self.points[index], self.cost[index], self.peak[index])
+
+
+@dataclass(frozen=True)
+class Anchored(Batch):
+    """Schedules that are drawn back to anchors, one for each, until their torque keeps its limit.
+
+    ``anchors`` : (p, d) points that keep all limits, with their costs and peaks.
+    """
+
+    anchors: Trials = field(default_factory=lambda: Trials(np.zeros((0, 0)), np.zeros(0)))
 
 
 @dataclass(frozen=True)
@@ -57,36 +73,32 @@ class TorqueLimit:
             return np.ones(peak.shape, dtype=np.bool_)
         return peak <= self.most_nm  # false for the NaN of a diverged flight
 
-    def kept(
-        self,
-        space: MorphSpace,
-        points: Array,
-        anchors: Array,
-        held: Trials,
-        fly: Callable[[Array], Trials],
-    ) -> tuple[Array, Trials]:
+    def kept(self, space: MorphSpace, batch: Anchored, fly: Callable[[Array], Trials]) -> Trials:
         """Fly points (p, d), each drawn back to its anchor until it keeps the limit.
 
-        anchors : (p, d) that keep all limits, as flown (``held``: costs and peaks). Points keep the limits of
-        the space, and so do all that are flown here. What cannot be brought back in a few rounds of false
-        position ends at its anchor.
+        Points keep the limits of the space, and so do all that are flown here. What cannot be brought back in
+        a few rounds of false position ends at its anchor.
         """
-        flown = fly(points)
-        points, cost, peak = points.copy(), flown.cost.copy(), flown.peak.copy()
+        flown, anchors = fly(batch.points), batch.anchors
+        count = flown.evaluations
+        points, cost, peak = batch.points.copy(), flown.cost.copy(), flown.peak.copy()
         open_ = np.flatnonzero(~self.keeps(peak))
         if self.most_nm is None or open_.size == 0:
-            return points, Trials.known(cost, peak)
+            return Trials.known(points, cost, peak, count)
         targets = points.copy()
-        points[open_], cost[open_], peak[open_] = anchors[open_], held.cost[open_], held.peak[open_]
-        low, low_peak = np.zeros(points.shape[0]), held.peak.copy()
+        points[open_], cost[open_] = anchors.points[open_], anchors.cost[open_]
+        peak[open_] = anchors.peak[open_]
+        low, low_peak = np.zeros(points.shape[0]), anchors.peak.copy()
         high, high_peak = np.ones(points.shape[0]), np.where(np.isfinite(flown.peak), flown.peak, np.inf)
         for _ in range(ROUNDS):
             rise = np.maximum(high_peak[open_] - low_peak[open_], 1e-12)
             share = np.clip((AIM * self.most_nm - low_peak[open_]) / rise, 0.1, 0.9)
             middle = low[open_] + share * (high[open_] - low[open_])
-            between = anchors[open_] + middle[:, None] * (targets[open_] - anchors[open_])
-            tried = np.stack([space.put_back(*pair) for pair in zip(between, anchors[open_], strict=True)])
+            held = anchors.points[open_]
+            between = held + middle[:, None] * (targets[open_] - held)
+            tried = np.stack([space.put_back(*pair) for pair in zip(between, held, strict=True)])
             again = fly(tried)
+            count += again.evaluations
             good = self.keeps(again.peak)
             inside, outside = open_[good], open_[~good]
             points[inside], cost[inside], peak[inside] = tried[good], again.cost[good], again.peak[good]
@@ -95,7 +107,7 @@ class TorqueLimit:
             open_ = open_[~(good & (again.peak > NEAR * self.most_nm))]
             if open_.size == 0:
                 break
-        return points, Trials.known(cost, peak)
+        return Trials.known(points, cost, peak, count)
 
     def linear(self, base: Array, torque: Array, gradient: Array) -> tuple[Map, Map] | None:
         """Slacks of the limit and their gradients, from torques (n,) and gradients (n, d) at a base (d,)."""

@@ -38,8 +38,8 @@ from morphcore.paper.scenario import (
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work, part
 from morphcore.paper.truth import Resolution, flown_flexible
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.schedule import Spline
-from morphcore.swarm import SwarmSettings
 from morphdata.optimize import Limits, Morph, VerifyingModel
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from morphcore.identify.settings import SearchSettings
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
-from morphcore.swarm import SwarmSettings
 from morphdata.lattice import CoreLaw, Lattice, VortexCore
 from morphdata.simulate import DEFAULT_ELEMENTS
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from morphcore.errors import InvalidInput, MorphError
-from morphcore.evolution import EvolutionSettings
 from morphcore.geometry.fields import whole_number
 from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import flexible_model
 from morphcore.optimise.settings import ScheduleSettings
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.request import simulation_from_document
-from morphcore.swarm import SwarmSettings
 from morphdata.identify import EquivalentModel
 from morphdata.lattice import Lattice
 from morphdata.optimize import OptimizeRequest

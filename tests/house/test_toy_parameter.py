@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.identify import Identification, IdentifyResult, ModelSettings, SearchSettings
+from morphcore.identify import Identification, IdentifyResult, SearchSettings
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter, SurfaceRows
 from morphcore.models.transforms import Linear
 from morphcore.multibody.kernels.articulated import L_MASS
 from morphcore.simulate.trajectory import Trajectory
+from morphdata.identify import EquivalentModel
 from morphid.model_table import named_parameters
 from tests.identify.flights import reference_aircraft, reference_flight, shortened, synthetic
 
@@ -114,7 +115,10 @@ def loaded(ballast_kg: float = TRUTH_KG) -> Trajectory:
 
 def identified() -> IdentifyResult:
     """Ballast and lift factor of rigid wings from that flight."""
-    model = ModelSettings(links_per_wing=1, aero_coefficients=("lift_factor", "ballast_kg"), step_s=0.01)
+    # not validated: the documents of this process have read their list before the parameter was in it
+    model = EquivalentModel(links_per_wing=1, step_s=0.01).model_copy(
+        update={"aero_coefficients": ["lift_factor", "ballast_kg"]}
+    )
     run = Identification(
         reference_aircraft(), reference_flight(), [loaded()], model,
         SearchSettings(method="least_squares", iterations=6),
@@ -141,7 +145,7 @@ def test_it_is_identified_and_reported() -> None:
     assert document["uncertainty"]["standard_error"]["ballast_kg"] > 0.0
     assert dict(named_parameters(document["model"]))["ballast_kg"] == found.parameters["ballast_kg"][0]
     run = Identification(
-        reference_aircraft(), reference_flight(), [loaded()], ModelSettings(links_per_wing=2)
+        reference_aircraft(), reference_flight(), [loaded()], EquivalentModel(links_per_wing=2)
     )
     assert run.space.names[-1] == "ballast_kg"
 

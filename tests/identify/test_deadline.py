@@ -12,9 +12,9 @@ import pytest
 from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.optimise import ScheduleOptimisation
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.plan import STEP_S
 from morphcore.stopping import Deadline, Interrupted, listening, say
-from morphcore.swarm import SwarmSettings
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 from tests.identify.test_step import softened

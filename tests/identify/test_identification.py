@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
-from morphcore.evolution import EvolutionSettings
 from morphcore.identify import (
     Identification,
     Interrupted,
@@ -25,10 +23,11 @@ from morphcore.identify import (
 )
 from morphcore.identify.cost import costs, evaluate, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
-from morphcore.identify.state import decode
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.search.checkpoint import UnreadableCheckpoint
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.plan import STEP_S
-from morphcore.swarm import SwarmSettings
 from morphcore.threads import thread_count
 from morphdata.identify import EquivalentModel, IdentifyRequest
 from tests.identification_request import identification
@@ -111,7 +110,7 @@ def test_looks_elsewhere_only_where_the_guess_leads_to_a_poor_fit() -> None:
     One link cannot fit a flexible wing: "hybrid" looks for another valley, "least_squares" does not, and what
     was found before is kept.
     """
-    phases = [[row["phase"] for row in decode(last(quick()).checkpoint).history]]
+    phases = [[row["phase"] for row in quick().state(last(quick()).checkpoint).history]]
     ends = {}
     for method in ("least_squares", "hybrid"):
         run = Identification(
@@ -122,14 +121,14 @@ def test_looks_elsewhere_only_where_the_guess_leads_to_a_poor_fit() -> None:
             replace(QUICK, method=method),  # type: ignore[arg-type]
         )
         step = last(run)
-        phases.append([row["phase"] for row in decode(step.checkpoint).history])
+        phases.append([row["phase"] for row in run.state(step.checkpoint).history])
         ends[method] = step.best_cost
     assert ["screen" in listed for listed in phases] == [False, False, True]
     assert ends["hybrid"] <= ends["least_squares"]
 
 
 def test_every_step_has_a_result() -> None:
-    """From the first step on there is a best so far; it never gets dearer, and the fraction rises to one."""
+    """From the first step on there is a best so far; it only gets better, and the fraction rises to one."""
     run = quick()
     steps = list(run.steps())
     best = [step.best_cost for step in steps]
@@ -311,7 +310,7 @@ def test_a_damaged_checkpoint_is_refused() -> None:
     good = next(iter(quick().steps())).checkpoint
     for bad in (b"", b"nonsense", good[: len(good) // 2]):
         with pytest.raises(UnreadableCheckpoint):
-            decode(bad)
+            quick().best_so_far(bad)
 
 
 def test_examples_are_what_the_tests_read() -> None:

@@ -13,7 +13,7 @@ from morphcore.errors import InvalidInput, NotFlyable
 from morphcore.identify import Identification, SearchSettings, identify
 from morphcore.identify.study import Study
 from morphcore.models.parameters_document import parameters_document, parameters_from_document
-from morphcore.swarm import SwarmSettings
+from morphcore.search.swarm import SwarmSettings
 from morphdata.identify import Bounds, EquivalentModel, IdentifySearch
 from tests.geometry.test_obstacle import with_modulus
 from tests.identify.flights import (

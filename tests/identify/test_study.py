@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import InvalidInput
 from morphcore.identify import Identification, Interrupted, SearchSettings, Step
 from morphcore.identify.study import Study, study, study_from_request
 from morphcore.identify.study_timing import ROUNDS, timed_flight
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphdata.identify import EquivalentModel
 from morphdata.study import StudyRequest
 from tests.identification_request import identification

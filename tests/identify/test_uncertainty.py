@@ -9,10 +9,11 @@ import pytest
 
 from morphcore.identify.cost import residuals, sample_cases
 from morphcore.identify.parameters import SearchSpace, search_space
-from morphcore.identify.polish import differences, first_polish, next_polish
 from morphcore.identify.uncertainty import uncertainty
 from morphcore.models.equivalent import chain_model
+from morphcore.search.least_squares import LeastSquares, differences
 from tests.identify.flights import reference_aircraft, reference_flight, synthetic
+from tests.search.problems import Formula, searched
 
 NOISE_RAD = 2e-4
 
@@ -63,15 +64,13 @@ def test_standard_errors_cover_the_truth() -> None:
             x[:, chosen] = points
             return residuals(model, space.decode(x), cases, "trim")  # type: ignore[arg-type]
 
-        lower, upper = space.lower[chosen], space.upper[chosen]
-        start = space.guess[chosen][None, :]
-        state = first_polish(start, np.sum(errors(start) ** 2, axis=1))
-        for _ in range(4):
-            state = next_polish(state, lower, upper, errors, 1)
-        residual, jacobian = differences(state.point, upper, errors)
+        upper = space.upper[chosen]
+        problem = Formula(errors, space.lower[chosen], upper, space.guess[chosen])
+        best = searched(problem, LeastSquares(problem, 4))[-1].best
+        residual, jacobian = differences(best[None, :], upper, errors)
         variance = residual[0] @ residual[0] / (residual.size - 2)
         covariance = variance * np.linalg.inv(jacobian[0].T @ jacobian[0])
-        deviations.append((state.point[0] - truth[chosen]) / np.sqrt(np.diag(covariance)))
+        deviations.append((best - truth[chosen]) / np.sqrt(np.diag(covariance)))
     assert 0.4 < np.mean(np.square(deviations)) < 2.0
 
 

@@ -121,7 +121,7 @@ def test_first_particles_of_a_swarm() -> None:
     cold, warm = run(swarm), run(replace(swarm, warm_start=parameters_from_document(MODEL)))
     tasks = []
     for sought in (cold, warm):
-        task = sought.generation_task(next(iter(sought.steps())).checkpoint)
+        task = sought.task(next(iter(sought.steps())).checkpoint)
         assert task is not None
         tasks.append(task.points)
     # the box is mapped onto the unit cube and back

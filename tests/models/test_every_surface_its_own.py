@@ -13,7 +13,7 @@ import pytest
 from morphcore.aero.kernels.loads import L_DRAG
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify import Identification, IdentifyResult, ModelSettings, SearchSettings
+from morphcore.identify import Identification, IdentifyResult, SearchSettings
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
 from morphcore.models.equivalent import (
@@ -32,6 +32,7 @@ from morphcore.simulate.flight import Simulation
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import aircraft as documents
+from morphdata.identify import EquivalentModel
 from morphdata.lattice import Lattice
 from tests.models.chains import example_flight
 from tests.simulate.flights import fly
@@ -207,7 +208,8 @@ def sample(names: tuple[str, ...], batch: ParameterBatch) -> Trajectory:
 def identified(names: tuple[str, ...], flown_as: Trajectory, **options: Any) -> IdentifyResult:
     """A short descent."""
     run = Identification(
-        aircraft(names), flight(), [flown_as], ModelSettings(2, lattice=LATTICE, step_s=0.01, **options),
+        aircraft(names), flight(), [flown_as],
+        EquivalentModel(links_per_wing=2, lattice=LATTICE, step_s=0.01, **options),
         SearchSettings(method="least_squares", iterations=3),
     )  # fmt: skip
     checkpoint = b""

@@ -61,6 +61,46 @@ def test_the_choices_reach_the_service(examples: Path, tmp_path: Path, play: Pla
     assert (plots / "convergence.svg").read_bytes() == b"<svg/>"
 
 
+def test_bounds_are_options_too(examples: Path, play: Play) -> None:
+    """What a hint calls ``model.bounds.lag_s`` is ``--bounds lag_s=...``, several at once or repeated."""
+    played = play(PlayedService("identify", RESULT))
+    bounds = ("--bounds", "lag_s=0.001:0.01", "lift_factor=0.8:1.2", "--bounds", "centre_shift_m=-0.1:0.1")
+    ended = RUNNER.invoke(app, [*arguments(examples), *bounds, "--separate-wings"])
+    assert ended.exit_code == Exit.OK, ended.output
+    assert played.body["model"] == {
+        "separate_wings": True,
+        "bounds": {"lag_s": [0.001, 0.01], "lift_factor": [0.8, 1.2], "centre_shift_m": [-0.1, 0.1]},
+    }
+
+
+@pytest.mark.parametrize(
+    ("bounds", "code", "told"),
+    [
+        ("lag_s", Exit.USAGE, "NAME=LOW:HIGH"),
+        ("lag_s=a:b", Exit.USAGE, "NAME=LOW:HIGH"),
+        ("lag_s=0:0.1", Exit.INVALID_INPUT, "given by --bounds lag_s=0:0.1"),
+        ("division=0.4:0.5", Exit.INVALID_INPUT, "3 x 0.4 = 1.2"),
+        ("lift=0.8:1.2", Exit.INVALID_INPUT, "/model/bounds/lift"),
+    ],
+)
+def test_bounds_that_make_no_sense_are_named(examples: Path, bounds: str, code: Exit, told: str) -> None:
+    """A bound that cannot be read, cannot be searched, or leaves no room, before anything is loaded."""
+    words = [word for word in arguments(examples) if word not in ("--url", "http://there")]
+    ended = RUNNER.invoke(app, [*words, "--bounds", bounds])
+    assert ended.exit_code == code, ended.output
+    assert told in " ".join(ended.stderr.replace("│", " ").split())
+
+
+def test_the_verdict_is_printed(examples: Path, play: Play) -> None:
+    """After the tables a word says whether the model may be believed, and what to do next."""
+    fit = {**RESULT["fit"][0], "role": "held_out", "range_rad": {"phi": 0.1, "theta": 0.2, "psi": 0.1}}  # type: ignore[index]
+    play(PlayedService("identify", {**RESULT, "fit": [fit]}))
+    ended = RUNNER.invoke(app, arguments(examples))
+    assert ended.exit_code == Exit.OK, ended.output
+    assert "Verdict: good" in ended.stdout
+    assert "morphid simulate" in ended.stdout
+
+
 def test_json_on_standard_output_is_nothing_but_json(examples: Path, play: Play) -> None:
     """With ``--json -`` standard output can be piped into a program."""
     play(PlayedService("identify", RESULT))

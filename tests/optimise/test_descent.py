@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from morphcore.optimise.descent import first_descent, next_descent, probes_of
-from morphcore.optimise.ease import EaseState, next_ease
+from morphcore.optimise.descent import NARROWING, ScheduleDescent, probes_of
+from morphcore.optimise.easing import TorqueEasing
 from morphcore.optimise.limits import HELD, MorphSpace
-from morphcore.optimise.torque_limit import TorqueLimit, Trials
+from morphcore.optimise.torque_limit import Anchored, TorqueLimit, Trials
 from morphdata.optimize import Limits, Morph
 
 SPACE = MorphSpace(
@@ -27,15 +27,22 @@ class Bench:
     Every asked point is remembered.
     """
 
-    def __init__(self, wanted=LATE, most_nm=None):
-        self.wanted, self.limit, self.asked = wanted, TorqueLimit(most_nm), []
+    def __init__(self, wanted=LATE, most_nm=None, space=SPACE):
+        self.wanted, self.limit, self.space, self.asked = wanted, TorqueLimit(most_nm), space, []
 
     def __call__(self, points):  # noqa: D102 - see the class
         self.asked.append(points)
         x = points - self.wanted
         errors = np.concatenate([x + 0.3 * x**2, 0.5 * (x[:, 1:] - x[:, :-1])], axis=1)
         torque = np.stack([200.0 * points.sum(axis=1), -50.0 + 0.0 * points[:, 0]], axis=1)
-        return Trials(errors, np.einsum("pm,pm->p", errors, errors), torque, np.abs(torque).max(axis=1))
+        peak = np.abs(torque).max(axis=1)
+        return Trials(points, np.einsum("pm,pm->p", errors, errors), errors, len(points), torque, peak)
+
+    def evaluate(self, batch):
+        """Fly a batch as the problem of an optimisation does."""
+        if isinstance(batch, Anchored):
+            return self.limit.kept(self.space, batch, self)
+        return self(batch.points)
 
     @property
     def flown(self):
@@ -43,12 +50,20 @@ class Bench:
         return np.concatenate(self.asked)
 
 
+def iterated(solver, bench, state):
+    """The state after one iteration: probes, and trial steps if any."""
+    state = solver.tell(state, bench.evaluate(solver.ask(state)))
+    while not solver.between_steps(state):
+        state = solver.tell(state, bench.evaluate(solver.ask(state)))
+    return state
+
+
 def descended(bench, space=SPACE, iterations=12):
-    """The best of a descent from the centre."""
-    start = space.centre[None, :]
-    state = first_descent(start, bench(start))
-    for _ in range(iterations):
-        state = next_descent(state, space, bench.limit, bench, keep=1)
+    """The end of a descent from the centre."""
+    solver = ScheduleDescent(space, bench.limit, iterations)
+    state = solver.init(bench(space.centre[None, :]))
+    while not solver.done(state):
+        state = iterated(solver, bench, state)
     return state
 
 
@@ -85,19 +100,14 @@ def test_finds_a_minimum_inside():
 def test_nothing_to_gain_is_no_error():
     """Where no angle with a weight departs at all, the descent rests where it is."""
 
-    def silent(points):
-        return Trials(
-            np.zeros((len(points), 5)),
-            np.zeros(len(points)),
-            np.zeros((len(points), 0)),
-            np.zeros(len(points)),
-        )
+    class Silent(Bench):
+        def __call__(self, points):
+            count = len(points)
+            nothing = np.zeros((count, 0))
+            return Trials(points, np.zeros(count), np.zeros((count, 5)), count, nothing, np.zeros(count))
 
-    start = SPACE.centre[None, :]
-    state = first_descent(start, silent(start))
-    for _ in range(3):
-        state = next_descent(state, SPACE, NO_LIMIT, silent, keep=1)
-    np.testing.assert_array_equal(state.point, start)
+    state = descended(Silent())
+    np.testing.assert_array_equal(state.point, SPACE.centre[None, :])
     assert not state.active.any()
 
 
@@ -122,16 +132,21 @@ def test_a_torque_limit_is_met_and_kept():
 
 
 def test_starts_rest_when_they_stall_or_fall_behind():
-    """Only the best starts are flown on; a converged field is left as it is."""
-    starts = SPACE.drawn_back(np.random.default_rng(3).uniform(size=(3, 4)))
+    """Late in a descent only the best start is flown on; one that has converged is left as it is."""
     bench = Bench()
-    state = first_descent(starts, bench(starts))
-    moved = next_descent(state, SPACE, NO_LIMIT, bench, keep=1)
+    solver = ScheduleDescent(SPACE, NO_LIMIT, 99)
+    known = bench(SPACE.drawn_back(np.random.default_rng(3).uniform(size=(3, 4))))
+    # begun again that late
+    late = replace(solver.init(known), iteration=NARROWING[-1][0] - 1)
+    state = iterated(solver, bench, late)
+    moved = iterated(solver, bench, state)
     order = np.argsort(state.cost)
     np.testing.assert_array_equal(moved.point[order[1:]], state.point[order[1:]])
     assert moved.cost[order[0]] < state.cost[order[0]]
-    settled = replace(moved, stalled=np.full(3, 9))
-    assert next_descent(settled, SPACE, NO_LIMIT, bench, keep=3) is settled
+    calm = Bench(SPACE.centre)
+    rested = descended(calm, iterations=99)
+    assert solver.done(rested)
+    assert rested.iteration < 99
 
 
 @pytest.mark.parametrize("knots", [4, 6, 12, 20])
@@ -158,8 +173,8 @@ def test_trials_above_the_torque_limit_are_drawn_back_to_just_below():
     anchors = np.tile(anchor, (5, 1))
     points = SPACE.drawn_back(LATE + np.random.default_rng(0).normal(0.0, 0.02, (5, 4)))
     assert np.all(bench(points).peak > 440.0)
-    held = bench(anchors)
-    kept, trials = bench.limit.kept(SPACE, points, anchors, held, bench)
+    trials = bench.evaluate(Anchored(points, anchors=bench(anchors)))
+    kept = trials.points
     assert np.all(trials.peak <= 440.0)
     np.testing.assert_allclose(trials.peak, 200.0 * kept.sum(axis=1))
     np.testing.assert_allclose(trials.cost, bench(kept).cost)
@@ -173,12 +188,13 @@ def test_a_schedule_that_cannot_be_drawn_back_ends_at_its_anchor():
     def cliff(points):
         near = np.abs(points - SPACE.centre).max(axis=1) < 1e-12
         peak = np.where(near, 10.0, np.nan)  # as of a diverged flight
-        return Trials(np.zeros((len(points), 1)), np.zeros(len(points)), peak[:, None], peak)
+        return Trials.known(points, np.zeros(len(points)), peak, len(points))
 
     anchors = SPACE.centre[None, :]
-    held = Trials.known(np.array([7.0]), np.array([10.0]))
-    kept, trials = TorqueLimit(20.0).kept(SPACE, SPACE.drawn_back(LATE[None, :]), anchors, held, cliff)
-    np.testing.assert_array_equal(kept, anchors)
+    held = Trials.known(anchors, np.array([7.0]), np.array([10.0]))
+    trials = TorqueLimit(20.0).kept(SPACE, Anchored(SPACE.drawn_back(LATE[None, :]), anchors=held), cliff)
+    np.testing.assert_array_equal(trials.points, anchors)
+    assert trials.evaluations > 1
     assert (trials.cost[0], trials.peak[0]) == (7.0, 10.0)
 
 
@@ -190,11 +206,13 @@ def test_torque_is_lowered_to_its_least():
     """
     bench = Bench()
     start = SPACE.drawn_back(LATE[None, :])
-    state = EaseState(start[0], float(bench(start).peak[0]))
-    while not state.over:
+    solver = TorqueEasing(SPACE)
+    state = solver.init(bench(start))
+    while not solver.done(state):
         before = state.peak
-        state = next_ease(state, SPACE, bench)
+        state = iterated(solver, bench, state)
         assert state.peak <= before
+        assert state.peak == bench(state.point[None, :]).peak[0]
     assert SPACE.keeps(bench.flown).all()
     least = np.inf
     for first in (SPACE.centre, start[0]):

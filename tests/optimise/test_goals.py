@@ -22,7 +22,7 @@ SHORTEST_S = 1.193
 
 def found(model, duration_s, variation=np.inf):
     """What a search found, made up."""
-    return Found(model, duration_s, np.full(4, 0.5), variation, variation, 0.0, 1, 1)
+    return Found(model, duration_s, np.full(4, 0.5), variation, variation, 0.0)
 
 
 def searched(morph, law):

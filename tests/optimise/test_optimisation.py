@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphcore.checkpoint import UnreadableCheckpoint
 from morphcore.errors import FlightDiverged, InvalidInput
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.optimise import (
@@ -25,15 +24,15 @@ from morphcore.optimise import (
     Weights,
     optimise_schedule,
 )
-from morphcore.optimise import optimisation as module
+from morphcore.optimise import verification as module
 from morphcore.optimise.feasible import reached
 from morphcore.optimise.flights import MorphFlights
 from morphcore.optimise.settings import ScheduleSettings
-from morphcore.optimise.state import decode
+from morphcore.search.checkpoint import UnreadableCheckpoint
+from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.flight import FlightStep
 from morphcore.simulate.schedule import Spline
 from morphcore.simulate.step_choice import choose_step
-from morphcore.swarm import SwarmSettings
 from tests.identify.flights import EXAMPLES, reference_aircraft, reference_documents, reference_flight
 from tests.optimise.morphs import QUICK, SHORT, last, optimisation, sampled
 from tests.simulate.flights import fly
@@ -318,7 +317,7 @@ def test_flexible_flights_are_steps_of_their_own(flexible: FlexibleDouble) -> No
     assert whole["reduction_model"] == "flexible"
     for name in ("constant", "rigid_optimum", "optimum"):
         assert whole["variation"][name]["flexible"] is not None
-    after_first = next(step for step in verify if len(decode(step.checkpoint).verified) == 1)
+    after_first = next(step for step in verify if len(run.state(step.checkpoint).verified) == 1)
     assert run.best_so_far(after_first.checkpoint).to_document()["partial"]
     resumed = optimisation(verify="flexible")
     ended = last(resumed, after_first.checkpoint)
@@ -355,7 +354,7 @@ def test_a_damaged_checkpoint_is_refused() -> None:
     good = next(iter(optimisation().steps())).checkpoint
     for bad in (b"", b"nonsense", good[: len(good) // 2]):
         with pytest.raises(UnreadableCheckpoint):
-            decode(bad)
+            optimisation().best_so_far(bad)
 
 
 def test_one_parameter_set_is_needed() -> None:

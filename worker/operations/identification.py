@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
 from morphcore.identify import Identification, IdentifyResult, identification_from_request
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphdata.identify import IdentifyRequest
 from worker.operations import Document, Step, Stop
 from worker.operations.library_work import SearchWork, library_errors, shown
@@ -31,8 +32,11 @@ class IdentificationWork(SearchWork[IdentifyResult]):
         self._identification = run
 
     def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
-        """Give the next generation's search points in parts; None where no swarm's generation is next."""
-        task = self._identification.generation_task(checkpoint)
+        """Give the next step's search points in parts; None where it needs more than their costs."""
+        try:
+            task = self._identification.task(checkpoint)
+        except UnreadableCheckpoint:  # `steps` begins again
+            return None
         return None if task is None else [_packed(part) for part in task.parts(most)]
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
@@ -41,10 +45,13 @@ class IdentificationWork(SearchWork[IdentifyResult]):
             return _packed(self._identification.task_costs(_unpacked(task), stop))
 
     def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Move the swarm by the costs of all parts."""
+        """Go on with the search by the costs of all parts; begin it again where they answer no checkpoint."""
+        costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
         with library_errors():
-            costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
-            return shown(self._identification.told(checkpoint, costs, wall_s=elapsed_s))
+            try:
+                return shown(self._identification.tell(checkpoint, costs, wall_s=elapsed_s))
+            except UnreadableCheckpoint:
+                return next(self.steps(checkpoint, self._stop))
 
 
 def begin(request: Document, threads: int) -> IdentificationWork:

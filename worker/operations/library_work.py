@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar
 
 from morphcore.errors import MorphError
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.stopping import Interrupted, stoppable
 from worker.operations import Document, Outcome, Step, Stop, WorkInterrupted, WorkRefused
 
+log = logging.getLogger(__name__)
+
 RESULT_FILE = "result.json"
 PROGRESS = ("fraction", "generation", "best_cost", "flights", "phase", "message")
+BEGUN_AGAIN = ", begun again: what was saved is of another version"
 
 
 class LibraryResult(Protocol):
@@ -60,11 +65,16 @@ class SearchWork(Generic[Result]):
         self._stop: Stop = never
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
-        """Search, step by step."""
+        """Search, step by step; from the start, with a note, where the checkpoint cannot be read."""
         self._stop = stop
         with library_errors():
-            for step in self._run.steps(checkpoint=checkpoint, stop=stop):
-                yield shown(step)
+            try:
+                for step in self._run.steps(checkpoint=checkpoint, stop=stop):
+                    yield shown(step)
+            except UnreadableCheckpoint:
+                log.warning("a checkpoint cannot be read: the search begins again", exc_info=True)
+                for step in self._run.steps(stop=stop):
+                    yield shown(step, BEGUN_AGAIN)
 
     def outcome(self, checkpoint: bytes) -> Outcome:
         """Give the result with its plots and tables.
@@ -84,9 +94,10 @@ class SearchWork(Generic[Result]):
         return Outcome(document, result_file(document))
 
 
-def shown(step: Any) -> Step:
-    """Give a step of the library as the runner sees it."""
-    return Step(progress={name: getattr(step, name) for name in PROGRESS}, checkpoint=step.checkpoint)
+def shown(step: Any, note: str = "") -> Step:
+    """Give a step of the library as the runner sees it, with a note in its message."""
+    progress = {name: getattr(step, name) for name in PROGRESS}
+    return Step({**progress, "message": f"{step.message}{note}"}, step.checkpoint)
 
 
 def never() -> bool:

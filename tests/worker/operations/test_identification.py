@@ -6,10 +6,13 @@ from typing import Any
 
 import pytest
 
+from morphcore.identify.identification import VERSION
 from tests.identification_request import identification
 from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker
 from worker.attempt import Ending
 from worker.operations import find_operation
+from worker.operations.identification import IdentificationWork
+from worker.operations.library_work import BEGUN_AGAIN
 
 
 @pytest.mark.parametrize(
@@ -39,6 +42,22 @@ def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any]) -> None:
             assert found[part] == whole[part]
         for name in ("history", "flights", "aero_coefficients"):
             assert found["search"][name] == whole["search"][name]
+
+
+def test_parts_of_another_version_are_not_used() -> None:
+    """Costs that answer a checkpoint of another version are dropped: the job begins again."""
+    request = identification("train_rate_0.8", links=2, search={"method": "pso", "particles": 32, "seed": 3})
+    work = find_operation("identify")(request, 1)
+    assert isinstance(work, IdentificationWork)
+    step = next(work.steps(None, lambda: False))
+    parts = work.tasks(step.checkpoint, 4)
+    assert parts is not None
+    assert len(parts) == 2
+    old = step.checkpoint.replace(VERSION.encode(), b"identification 3")
+    assert work.tasks(old, 4) is None
+    told = work.told(old, [work.fly(part, lambda: False) for part in parts], 0.1)
+    assert told.progress["phase"] == "baseline"
+    assert told.progress["message"].endswith(BEGUN_AGAIN)
 
 
 def test_a_model_that_flies_nothing_is_a_failed_job(worker: RealWorker) -> None:

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import pytest
 
 from morphcore.errors import InvalidInput, MorphError
+from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.stopping import Interrupted, heed
 from worker.operations import Document, Stop, WorkInterrupted, WorkRefused
-from worker.operations.library_work import SearchWork, library_errors
+from worker.operations.library_work import BEGUN_AGAIN, SearchWork, library_errors
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Count:
 
     def steps(self, checkpoint: bytes | None = None, stop: Stop | None = None) -> Iterator[CountStep]:
         """Count on."""
+        if checkpoint == b"old":
+            raise UnreadableCheckpoint("of another version")
         for number in range(int(checkpoint or b"0") + 1, 6):
             if stop is not None and stop():
                 raise Interrupted
@@ -75,6 +78,13 @@ def test_a_search_goes_on_from_its_checkpoint() -> None:
         "message": "counting",
     }
     assert list(work().steps(b"3", lambda: False)) == whole[3:]
+
+
+def test_a_checkpoint_of_another_version_is_begun_again_with_a_note() -> None:
+    """A worker of a new version does not fail the jobs of the one before: it repeats them and says so."""
+    whole, again = (list(work().steps(checkpoint, lambda: False)) for checkpoint in (None, b"old"))
+    assert [step.checkpoint for step in again] == [step.checkpoint for step in whole]
+    assert {step.progress["message"] for step in again} == {f"counting{BEGUN_AGAIN}"}
 
 
 def test_the_result_comes_as_a_file_too() -> None:

@@ -21,14 +21,19 @@ from worker.runner import Runner
 
 SMALL = {"method": "pso", "particles": 4 * TOGETHER + 3, "generations": 3, "seed": 4}
 EVOLUTION = SMALL | {"method": "cma"}
+HYBRID = {"method": "hybrid", "particles": 3 * TOGETHER, "generations": 2, "seed": 4}
 LARGER = {"method": "pso", "particles": 40 * TOGETHER, "generations": 4, "seed": 4}
 CHUNK_LEASE_S = 2.0
 
 
-@pytest.mark.parametrize("search", [SMALL, EVOLUTION], ids=["pso", "cma"])
-def test_a_spread_swarm_is_the_swarm(tmp_path: Path, search: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("search", "links"), [(SMALL, 2), (EVOLUTION, 2), (HYBRID, 1)], ids=["pso", "cma", "hybrid"]
+)
+def test_a_spread_search_is_the_search(tmp_path: Path, search: dict[str, Any], links: int) -> None:
     """Two workers by turns (each with plans of its own) end with the document of the mode `single`.
 
+    One link fits poorly: the hybrid screens candidates, which are spread, between two descents, which are
+    not.
     Wall times are left out: no two runs share them. What the kind of database could change is under test with
     flocks.
     """
@@ -39,7 +44,7 @@ def test_a_spread_swarm_is_the_swarm(tmp_path: Path, search: dict[str, Any]) -> 
     kernels.wait(lambda: False, poll_s=0.01)
     runners = [Runner(database, kernels, name, lease_s=60.0, heartbeat_s=10.0) for name in ("w1", "w2")]
     store = Workers(database)
-    request = identification("train_rate_0.8", links=2, search=search)
+    request = identification("train_rate_0.8", links=links, search=search)
     single = store.add(request)
     assert runners[0].run_next()[0] is Ending.SUCCEEDED
     together = store.add(spread(request, chunks=3))

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from morphcore.identify import Identification, SearchSettings
-from morphcore.identify.generation import GenerationTask
-from morphcore.identify.state import SearchState, decode
 from morphcore.lanes import TOGETHER
-from morphcore.swarm import SwarmSettings
+from morphcore.search.evolution import EvolutionSettings
+from morphcore.search.solver import Batch
+from morphcore.search.swarm import SwarmSettings
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
+from tests.search.problems import content
 
-Array = NDArray[np.float64]
 SWARM = SearchSettings(method="pso", seed=5, swarm=SwarmSettings(particles=75, generations=3))
+EVOLUTION = SearchSettings(method="cma", seed=5, evolution=EvolutionSettings(particles=35, generations=3))
 
 
 def search(settings: SearchSettings = SWARM) -> Identification:
@@ -26,27 +29,12 @@ def search(settings: SearchSettings = SWARM) -> Identification:
     )
 
 
-def content(state: SearchState) -> tuple[object, ...]:
-    """A state without its wall time, which no two runs share."""
-    assert state.swarm is not None
-    arrays = (state.best, state.swarm.position, state.swarm.velocity, state.swarm.best_cost)
-    return (
-        *(array.tobytes() for array in arrays),
-        state.phase,
-        state.best_cost,
-        state.generation,
-        state.flights,
-        state.history,
-        str(state.swarm.random),
-    )
-
-
 @pytest.mark.parametrize("particles", [1, 15, 16, 17, 75, 160])
 @pytest.mark.parametrize("most", [1, 2, 7, 100])
 def test_parts_are_whole_blocks_and_make_up_the_task(particles: int, most: int) -> None:
     """Parts come in order, are whole blocks of lanes but for the end, and are never empty or too many."""
     points = np.arange(3.0 * particles).reshape(particles, 3)
-    parts = GenerationTask(0, points).parts(most)
+    parts = Batch(points).parts(most)
     np.testing.assert_array_equal(np.concatenate(parts), points)
     assert len(parts) == min(most, -(-particles // TOGETHER))
     assert all(part.shape[0] % TOGETHER == 0 for part in parts[:-1])
@@ -57,7 +45,7 @@ def test_a_cost_does_not_depend_on_its_part() -> None:
     """Flown in parts of any number, each model costs what it costs among all, to the bit."""
     run = search()
     first = next(iter(run.steps()))
-    task = run.generation_task(first.checkpoint)
+    task = run.task(first.checkpoint)
     assert task is not None
     whole = run.task_costs(task.points)
     for most in (2, 3, 5):
@@ -65,39 +53,37 @@ def test_a_cost_does_not_depend_on_its_part() -> None:
         np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
-def test_asked_and_told_is_the_search_itself() -> None:
-    """A swarm whose generations are flown in parts by other processes goes through the same states."""
-    steps = list(search().steps())
-    run, others = search(), [search(), search()]  # each stands for a process with its own plans
-    step = next(iter(run.steps()))
+@pytest.mark.parametrize("settings", [SWARM, EVOLUTION], ids=lambda settings: settings.method)
+def test_asked_and_told_is_the_search_itself(settings: SearchSettings) -> None:
+    """A search whose generations are flown in parts by other processes goes through the same states."""
+    steps = list(search(settings).steps())
+    run, others = search(settings), [search(settings) for _ in range(2)]  # processes with plans of their own
+    step = steps[0]
     for expected in steps[1:]:
-        task = run.generation_task(step.checkpoint)
+        task = search(settings).task(step.checkpoint)
         assert task is not None
-        assert task.generation == step.generation
         costs = [others[i % 2].task_costs(part) for i, part in enumerate(task.parts(4))]
-        step = run.told(step.checkpoint, np.concatenate(costs), wall_s=1.0)
-        assert content(decode(step.checkpoint)) == content(decode(expected.checkpoint))
-        assert (step.fraction, step.best_cost, step.flights, step.message) == (
-            expected.fraction,
-            expected.best_cost,
-            expected.flights,
-            expected.message,
-        )
-    assert run.generation_task(step.checkpoint) is None, "the search is over"
-    assert decode(step.checkpoint).wall_s >= SWARM.swarm.generations
+        step = run.tell(step.checkpoint, np.concatenate(costs), wall_s=1.0)
+        assert content(run.state(step.checkpoint)) == content(run.state(expected.checkpoint))
+        assert replace(step, checkpoint=b"") == replace(expected, checkpoint=b"")
+    assert run.task(step.checkpoint) is None, "the search is over"
+    assert run.state(step.checkpoint).wall_s >= len(steps) - 1
 
 
-def test_only_a_swarm_can_be_asked() -> None:
-    """Other searches have no task, and costs that answer no task are refused."""
+def test_descents_are_not_flown_in_parts() -> None:
+    """A descent needs more than costs, the screening does not; costs that answer no task are refused."""
     run = search(SearchSettings(screen=16, starts=2, iterations=2))
-    for step in run.steps():
-        assert run.generation_task(step.checkpoint) is None
+    steps = list(run.steps())
+    for step, after in itertools.pairwise(steps):
+        assert (run.task(step.checkpoint) is not None) == (after.phase == "screen")
+    assert run.task(steps[-1].checkpoint) is None
+    step = steps[0]
     with pytest.raises(ValueError, match="do not answer"):
-        run.told(step.checkpoint, np.ones(16))
+        run.tell(step.checkpoint, np.ones(16))
     swarm = search()
     first = next(iter(swarm.steps()))
     with pytest.raises(ValueError, match="do not answer"):
-        swarm.told(first.checkpoint, np.ones(74))
+        swarm.tell(first.checkpoint, np.ones(74))
 
 
 def test_the_time_of_the_flights_counts() -> None:
@@ -105,5 +91,5 @@ def test_the_time_of_the_flights_counts() -> None:
     settings = SearchSettings(method="pso", seed=5, max_seconds=100.0, swarm=SWARM.swarm)
     run = search(settings)
     first = next(iter(run.steps()))
-    assert run.told(first.checkpoint, np.ones(75), wall_s=1.0).fraction < 1.0
-    assert run.told(first.checkpoint, np.ones(75), wall_s=100.0).fraction == 1.0
+    assert run.tell(first.checkpoint, np.ones(75), wall_s=1.0).fraction < 1.0
+    assert run.tell(first.checkpoint, np.ones(75), wall_s=100.0).fraction == 1.0

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from morphcore.identify.polish import PROBE, differences, first_polish, next_polish
+from morphcore.search.least_squares import PROBE, LeastSquares, LeastSquaresState, differences
+from morphcore.search.run import SearchState
+from tests.search.problems import Formula, searched
 
 Array = NDArray[np.float64]
 
@@ -18,62 +22,56 @@ def decay(points: Array) -> Array:
     return a * np.exp(-b * t) + c - (2.0 * np.exp(-0.7 * t) + 0.3 + 0.01 * np.sin(9 * t))
 
 
-def polished(points: Array, lower: Array, upper: Array, keep: int = 10) -> Array:
-    """The best point after as many iterations as it takes."""
-    cost = np.sum(decay(points) ** 2, axis=1)
-    state = first_polish(points, cost)
-    for _ in range(60):
-        after = next_polish(state, lower, upper, decay, keep)
-        if after is state:
-            break
-        state = after
-    return np.asarray(state.point[state.best])
+def states_of(points: Array, lower: Array, upper: Array) -> list[SearchState]:
+    """All states of descents from points (s, d)."""
+    problem = Formula(decay, lower, upper, points)
+    return searched(problem, LeastSquares(problem, 60))
 
 
 def test_reaches_the_minimum_that_scipy_finds() -> None:
-    """From any of several starts the polish ends at the minimum of an independent solver.
+    """From any of several starts the descent ends at the minimum of an independent solver.
 
-    Tolerance: the polish stops when the cost falls by less than 5 per cent in three iterations; on this curve
-    the convergence is quadratic by then.
+    Tolerance: the descent stops when the cost hardly falls in three iterations; on this curve the convergence
+    is quadratic by then.
     """
     lower, upper = np.full(3, -10.0), np.full(3, 10.0)
     starts = np.random.default_rng(3).normal(0.5, 1.0, (5, 3))
     expected = least_squares(lambda x: decay(x[None, :])[0], [1.0, 1.0, 0.0]).x
-    np.testing.assert_allclose(polished(starts, lower, upper), expected, rtol=1e-4)
+    np.testing.assert_allclose(states_of(starts, lower, upper)[-1].best, expected, rtol=1e-4)
 
 
 def test_stays_in_the_box_and_finds_its_constrained_minimum() -> None:
-    """With the free minimum outside the box the polish ends on its face, where scipy's solver ends."""
+    """With the free minimum outside the box the descent ends on its face, where scipy's solver ends."""
     lower, upper = np.array([0.0, 0.0, -1.0]), np.array([1.5, 3.0, 1.0])
     expected = least_squares(
         lambda x: decay(x[None, :])[0], [1.0, 1.0, 0.0], bounds=(lower, upper), xtol=1e-14, ftol=1e-14
     ).x
-    found = polished(np.array([[1.0, 1.0, 0.0], [0.2, 2.5, 0.5]]), lower, upper)
+    found = states_of(np.array([[1.0, 1.0, 0.0], [0.2, 2.5, 0.5]]), lower, upper)[-1].best
     assert np.all((found >= lower) & (found <= upper))
     assert found[0] == upper[0]
     np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 
 def test_cost_never_rises() -> None:
-    """Every iteration leaves each start at most as dear as before."""
+    """Every iteration leaves each start at most as expensive as before."""
     lower, upper = np.full(3, -10.0), np.full(3, 10.0)
-    points = np.random.default_rng(5).normal(0.0, 2.0, (6, 3))
-    state = first_polish(points, np.sum(decay(points) ** 2, axis=1))
-    for _ in range(15):
-        after = next_polish(state, lower, upper, decay, 6)
-        assert np.all(after.cost <= state.cost)
-        state = after
+    states = states_of(np.random.default_rng(5).normal(0.0, 2.0, (6, 3)), lower, upper)
+    costs = [state.solver.cost for state in states]
+    for before, after in itertools.pairwise(costs):
+        assert np.all(after <= before)
 
 
-def test_resting_starts_do_not_move() -> None:
-    """Only the best ``keep`` starts are flown; the others keep their place."""
+def test_the_field_narrows_to_the_best_start() -> None:
+    """After three iterations half of the starts rest, after six all but the best."""
     lower, upper = np.full(3, -10.0), np.full(3, 10.0)
-    points = np.random.default_rng(7).normal(0.0, 1.0, (4, 3))
-    state = first_polish(points, np.sum(decay(points) ** 2, axis=1))
-    after = next_polish(state, lower, upper, decay, 1)
-    moved = np.any(after.point != state.point, axis=1)
-    assert moved.sum() == 1
-    assert moved[state.best]
+    states = states_of(np.random.default_rng(7).normal(0.0, 3.0, (8, 3)), lower, upper)
+    inner: list[LeastSquaresState] = [state.solver for state in states]
+    for before, after in itertools.pairwise(inner):
+        moved = np.flatnonzero(np.any(after.point != before.point, axis=1))
+        most = 8 if before.iteration < 3 else 4 if before.iteration < 6 else 1
+        assert moved.size <= most
+        assert set(moved) <= set(np.argsort(before.cost, kind="stable")[:most])
+    assert inner[-1].iteration > 6
 
 
 def test_differences_step_inward_at_the_upper_bound() -> None:

@@ -1,0 +1,1 @@
+"""Search methods as swappable values with plain states, and the loop that drives them."""

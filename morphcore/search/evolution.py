@@ -1,0 +1,159 @@
+"""Covariance matrix adaptation (CMA-ES, Hansen & Ostermeier 2001) by the package cma, resumable to the bit.
+
+The strategy's own state is spread over many objects. Ours is what it was told: the costs of all generations.
+Asked and told the same again it goes through the same states, which takes about a millisecond a generation
+and no flights. Its normal numbers come from a generator of its own, and numpy's global one is put back after
+each call.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.geometry.fields import WholeNumbers
+from morphcore.search.checkpoint import stored
+from morphcore.search.solver import Batch, Outcome, Problem, Solver
+
+Array = NDArray[np.float64]
+
+FEWEST = 4  # models of a generation: with fewer there is nothing to weigh
+FIRST_SPREAD = 0.1  # standard deviation of the first generation, in the unit cube
+
+
+@cache
+def strategies() -> Any:
+    """Import the package, for the first strategy only, since it brings matplotlib along."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it warns of packages for plots that it misses
+        import cma
+    return cma
+
+
+@dataclass(frozen=True)
+class EvolutionSettings(WholeNumbers):
+    """``particles`` models a generation; the search ends before ``generations`` where it has converged."""
+
+    particles: int = 32
+    generations: int = 200
+
+
+@stored
+@dataclass(frozen=True)
+class EvolutionState:
+    """The first mean (d,) in the unit cube, and the costs (g, p) of g generations of p models."""
+
+    mean: Array
+    costs: Array
+
+    @property
+    def generation(self) -> int:
+        """Generations flown."""
+        return int(self.costs.shape[0])
+
+
+class EvolutionStrategy(Solver[EvolutionState, Outcome]):
+    """A strategy in a problem's box, around the best guess.
+
+    Parameters
+    ----------
+    problem : gives the box.
+    settings : EvolutionSettings
+    seed : int
+    """
+
+    name = "evolution"
+
+    def __init__(self, problem: Problem[Any], settings: EvolutionSettings, seed: int) -> None:
+        self._box = problem.box
+        self._settings, self._seed = settings, seed
+        # the package's strategy as it was last used: what it was told, and the generation that it asks for
+        self._strategy: Any = None
+        self._told = EvolutionState(np.empty(0), np.empty((0, 0)))
+        self._asked: Array | None = None
+
+    def init(self, known: Outcome) -> EvolutionState:
+        """Begin around the first point."""
+        return EvolutionState(self._box.to_unit(known.points[0]), np.empty((0, self._settings.particles)))
+
+    def ask(self, state: EvolutionState) -> Batch:
+        """Return the generation that follows a state."""
+        self._go_to(state)
+        if self._asked is None:
+            with _own_numbers():
+                self._asked = np.array(self._strategy.ask())
+        return Batch(self._box.from_unit(self._asked))
+
+    def tell(self, state: EvolutionState, outcome: Outcome) -> EvolutionState:
+        """Add the costs of a generation."""
+        return replace(state, costs=np.concatenate([state.costs, outcome.cost[None]]))
+
+    def done(self, state: EvolutionState) -> bool:
+        """Return whether all generations have been flown, or the strategy sees no use in going on."""
+        if state.generation >= self._settings.generations:
+            return True
+        self._go_to(state)
+        with _own_numbers():
+            return bool(self._strategy.stop())
+
+    def share(self, state: EvolutionState) -> float:
+        """Return the share of the generations that have been flown."""
+        return state.generation / self._settings.generations
+
+    def remarks(self, outcome: Outcome) -> dict[str, float]:
+        """Return the mean cost of a generation."""
+        return {"mean_cost": float(outcome.cost.mean())}
+
+    def _go_to(self, state: EvolutionState) -> None:
+        """Tell the strategy what it has not been told yet; begin again where it was told something else."""
+        known = self._told.generation
+        if (
+            self._strategy is None
+            or known > state.generation
+            or not np.array_equal(self._told.mean, state.mean)
+            or not np.array_equal(self._told.costs, state.costs[:known])
+        ):
+            self._told, self._asked = replace(state, costs=state.costs[:0]), None
+            self._strategy = self._begun(state.mean)
+        for cost in state.costs[self._told.generation :]:
+            with _own_numbers():
+                asked = self._strategy.ask() if self._asked is None else list(self._asked)
+                self._strategy.tell(asked, cost.tolist())
+            self._asked = None
+        self._told = state
+
+    def _begun(self, mean: Array) -> Any:
+        numbers = np.random.default_rng(self._seed)
+        options = {
+            "bounds": [0.0, 1.0],
+            "maxstd": np.inf,  # the package's own limit raises where the spread reaches it
+            "popsize": self._settings.particles,
+            "randn": lambda *shape: numbers.standard_normal(shape),
+            "seed": np.nan,  # the package must not seed numpy's global generator
+            "tolfun": 1e-12,  # rad^2: costs differ by less only for the arithmetic
+            "verbose": -9,
+            "verb_log": 0,  # no files
+            "signals_filename": None,  # and none read
+        }
+        with _own_numbers():
+            return strategies().CMAEvolutionStrategy(mean, FIRST_SPREAD, options)
+
+
+@contextmanager
+def _own_numbers() -> Iterator[None]:
+    """Numpy's global generator is in a known state inside and unchanged outside; no warnings come out."""
+    others = np.random.get_state(legacy=True)  # noqa: NPY002 - parts of the package know no other
+    np.random.seed(0)  # noqa: NPY002
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        np.random.set_state(others)  # noqa: NPY002

@@ -1,0 +1,119 @@
+"""A descent from what is known and, where that ends in a poor fit, another one from screened candidates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.search.checkpoint import stored
+from morphcore.search.least_squares import LeastSquares, LeastSquaresState
+from morphcore.search.solver import Batch, Outcome, Problem, Solver
+
+Array = NDArray[np.float64]
+
+SCREENING = "screen"  # as the history of a result calls the candidate screening
+
+
+@stored
+@dataclass(frozen=True)
+class HybridState:
+    """Which descent runs, or the screening between them.
+
+    Attributes
+    ----------
+    stage : what comes next.
+    centre : (d,) the best guess, around which candidates are drawn.
+    descent : the state of the descent that runs, or that ended before the screening.
+    best_cost : of all points so far.
+    """
+
+    stage: Literal["first", "screening", "second"]
+    centre: Array
+    descent: LeastSquaresState
+    best_cost: float
+
+
+class Hybrid(Solver[HybridState, Outcome]):
+    """Descents, with a screening of candidates between them where the first leaves more than ``good_cost``.
+
+    Parameters
+    ----------
+    problem : gives the box.
+    descent : LeastSquares
+    candidates : int
+        flown around the best guess, to choose ``starts`` of the second descent.
+    spread : float
+        standard deviation of the candidates, in search coordinates.
+    good_cost : float
+        the first descent may have ended in a wrong valley where its cost is higher.
+    seed : int
+    """
+
+    def __init__(
+        self,
+        problem: Problem[Any],
+        descent: LeastSquares,
+        *,
+        candidates: int,
+        starts: int,
+        spread: float,
+        good_cost: float,
+        seed: int,
+    ) -> None:
+        self._box, self._descent = problem.box, descent
+        self._candidates, self._starts, self._spread = candidates, starts, spread
+        self._good_cost, self._seed = good_cost, seed
+
+    def init(self, known: Outcome) -> HybridState:
+        """Begin with the descent from what is known."""
+        return HybridState("first", known.points[0], self._descent.init(known), float(known.cost.min()))
+
+    def ask(self, state: HybridState) -> Batch:
+        """Return the descent's batch, or the candidates."""
+        if state.stage != "screening":
+            return self._descent.ask(state.descent)
+        drawn = self._spread * even_normals(self._candidates, state.centre.size, self._seed)
+        return Batch(np.clip(state.centre + drawn, self._box.lower, self._box.upper))
+
+    def tell(self, state: HybridState, outcome: Outcome) -> HybridState:
+        """Go on with the descent; begin the second one from the best candidates."""
+        if state.stage == "screening":
+            chosen = np.argsort(outcome.cost, kind="stable")[: self._starts]
+            starts = Outcome(outcome.points[chosen], outcome.cost[chosen])
+            return replace(state, stage="second", descent=self._descent.init(starts))
+        descent = self._descent.tell(state.descent, outcome)
+        best = min(state.best_cost, self._descent.best(descent, outcome)[1])
+        poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost
+        return replace(state, stage="screening" if poor else state.stage, descent=descent, best_cost=best)
+
+    def done(self, state: HybridState) -> bool:
+        """Return whether the last descent is over."""
+        return state.stage != "screening" and self._descent.done(state.descent)
+
+    def best(self, state: HybridState, outcome: Outcome) -> tuple[Array, float]:
+        """Return the descent's best start, or the best candidate."""
+        return self._descent.best(state.descent, outcome)
+
+    def between_steps(self, state: HybridState) -> bool:
+        """Return whether an iteration of the descent, or the screening, has ended."""
+        return self._descent.between_steps(state.descent)
+
+    def phase(self, state: HybridState) -> str:
+        """Return the descent's name, or the screening's."""
+        return SCREENING if state.stage == "screening" else self._descent.phase(state.descent)
+
+    def share(self, state: HybridState) -> float:
+        """Return the share of two descents: the second is not always needed."""
+        descent = self._descent.share(state.descent)
+        return {"first": 0.5 * descent, "screening": 0.5, "second": 0.5 + 0.5 * descent}[state.stage]
+
+
+def even_normals(count: int, d: int, seed: int) -> Array:
+    """Return normal numbers (count, d), more even than independent draws: a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # as large as half of the library, and many searches need no screening
+
+    draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
+    return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])

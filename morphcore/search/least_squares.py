@@ -1,0 +1,296 @@
+"""Multi-start Levenberg-Marquardt in a box that follows curved valleys; all starts are one batch.
+
+Levenberg (1944), Marquardt (1963): J(x) is lowered by the step s that minimises |r + D s|^2 + mu |s|^2. Few
+directions of such a problem are stiff and many are loose ("sloppy": Transtrum, Machta & Sethna 2011), and its
+valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: by
+what its residuals differ from the linear forecast, c = r(x + s) - r - D s, the same least-squares problem is
+amended, solved and flown again. The first correction is the geodesic acceleration of Transtrum & Sethna
+(2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the multi-step method of
+Fan (2012) does. A correction costs one flight, a Jacobian d.
+
+The damping is Levenberg's (equal in all coordinates, which are of order one), not Marquardt's: scaled by the
+Jacobian's columns it would let a coordinate that the samples hardly see run far off. Several damping values
+are tried at once, since a wider batch costs hardly more than a narrow one. Bounds by the active set (a
+coordinate at its bound whose descent leads outward is held).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.search.checkpoint import stored
+from morphcore.search.solver import Batch, Outcome, Problem, Solver
+
+Array = NDArray[np.float64]
+Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
+
+# forward-difference step in coordinates of order one: residuals are good to 1e-12, and a slope is off by half
+# a step times their second derivative
+PROBE = 1e-5
+DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # times the present one
+CORRECTIONS = 2  # of each trial step, by what its flight differs from the forecast
+FIRST_DAMPING = 1e-3  # in units of the sum of the squares of the Jacobian
+MIN_DAMPING, MAX_DAMPING = 1e-14, 1e6
+STALLED = 0.01  # relative decrease of the cost that counts as none: past it, only unseen directions drift
+PATIENCE = 3  # iterations without decrease before a start has converged
+EXACT_RMS = 1e-8  # residuals below it are those of the arithmetic: nothing is left to fit
+# hopeless starts are dropped as the descent goes on: iteration -> starts kept (as a share of the first field)
+NARROWING = ((3, 1.0), (6, 0.5))
+
+
+@stored
+@dataclass(frozen=True)
+class TrialSteps:
+    """Trial steps of an iteration under way, of s starts with t dampings each.
+
+    Attributes
+    ----------
+    starts : (s,) which starts move.
+    error, jacobian : (s, m) and (s, m, d) residuals at the starts, and their derivatives.
+    dampings : (s, t)
+    tried : (s, t, d) the points that come next.
+    correction : number of corrections that have been made.
+    best, cost, winner : (s, d), (s,), (s,) the best trial so far, and the damping that led to it.
+    """
+
+    starts: NDArray[np.int64]
+    error: Array
+    jacobian: Array
+    dampings: Array
+    tried: Array
+    correction: int
+    best: Array
+    cost: Array
+    winner: NDArray[np.int64]
+
+
+@stored
+@dataclass(frozen=True)
+class LeastSquaresState:
+    """Starts s of a descent: points (s, d); costs, dampings, stalls (s,); the iteration and its trials."""
+
+    point: Array
+    cost: Array
+    damping: Array
+    stalled: NDArray[np.int64]
+    iteration: int = 0
+    trials: TrialSteps | None = field(default=None, repr=False)
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """(s,) starts that still move."""
+        return self.stalled < PATIENCE
+
+
+class LeastSquares(Solver[LeastSquaresState, Outcome]):
+    """Descents from all points that are known.
+
+    Parameters
+    ----------
+    problem : gives the box.
+    iterations : int
+        at most.
+    prior : being off ``prior_point`` by one unit costs as much as one residual of this size. A weak prior
+        settles the directions that the residuals cannot see.
+    prior_point : (d,)
+    """
+
+    name = "polish"  # as the history of a result calls it
+
+    def __init__(
+        self, problem: Problem[Any], iterations: int, prior: float = 0.0, prior_point: Array | None = None
+    ) -> None:
+        self._lower, self._upper = problem.box.lower, problem.box.upper
+        self._iterations = iterations
+        self._prior = prior
+        self._prior_point = np.zeros_like(self._lower) if prior_point is None else prior_point
+
+    def init(self, known: Outcome) -> LeastSquaresState:
+        """Start at every point."""
+        count = known.points.shape[0]
+        damping, stalled = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
+        return LeastSquaresState(known.points, known.cost, damping, stalled)
+
+    def ask(self, state: LeastSquaresState) -> Batch:
+        """Return the starts and their probes, then three rounds of trial steps."""
+        if state.trials is None:
+            probed, _ = _probes(state.point[_moving(state)], self._upper)
+            return Batch(probed, residuals=True)
+        return Batch(state.trials.tried.reshape(-1, self._lower.size), residuals=True)
+
+    def tell(self, state: LeastSquaresState, outcome: Outcome) -> LeastSquaresState:
+        """Take the first trial steps, correct them, or accept the best of them."""
+        residuals = self._with_prior(outcome)
+        if state.trials is None:
+            return replace(state, trials=self._first_trials(state, residuals))
+        trials = self._judged(state, state.trials, residuals)
+        if trials.correction <= CORRECTIONS:
+            return replace(state, trials=trials)
+        return _accepted(state, trials)
+
+    def done(self, state: LeastSquaresState) -> bool:
+        """Return whether none of the starts in the field moves any more, or the iterations are used up."""
+        if state.trials is not None:
+            return False
+        return state.iteration >= self._iterations or _moving(state).size == 0
+
+    def best(self, state: LeastSquaresState, outcome: Outcome) -> tuple[Array, float]:
+        """Return the best start after an iteration, its cost without the prior."""
+        if state.trials is None and state.iteration == 0:
+            return super().best(state, outcome)
+        leader = int(np.argmin(state.cost))
+        point = state.point[leader]
+        if state.trials is not None:
+            return point, np.inf
+        return point, float(state.cost[leader] - self._prior**2 * np.sum((point - self._prior_point) ** 2))
+
+    def between_steps(self, state: LeastSquaresState) -> bool:
+        """Return whether an iteration has ended."""
+        return state.trials is None
+
+    def share(self, state: LeastSquaresState) -> float:
+        """Return the share of the iterations that have been made."""
+        return state.iteration / self._iterations
+
+    def _with_prior(self, outcome: Outcome) -> Array:
+        if outcome.residuals is None:
+            raise TypeError("the batch asked for residuals")
+        if self._prior == 0.0:
+            return outcome.residuals
+        off = self._prior * (outcome.points - self._prior_point)
+        return np.concatenate([outcome.residuals, off], axis=1)
+
+    def _first_trials(self, state: LeastSquaresState, residuals: Array) -> TrialSteps:
+        """Return damped steps from the residuals of the starts and their probes."""
+        starts = _moving(state)
+        points = state.point[starts]
+        error, jacobian = _differences(residuals, _probes(points, self._upper)[1])
+        dampings = np.clip(state.damping[starts, None] * DAMPING_TRIALS, MIN_DAMPING, MAX_DAMPING)
+        # as if there were no curvature
+        assumed = np.repeat(error[:, None, :], dampings.shape[1], axis=1)
+        return TrialSteps(
+            starts,
+            error,
+            jacobian,
+            dampings,
+            self._steps(points, jacobian, dampings, assumed),
+            correction=0,
+            best=points.copy(),
+            cost=np.full(starts.size, np.inf),
+            winner=np.zeros(starts.size, dtype=np.int64),
+        )
+
+    def _judged(self, state: LeastSquaresState, trials: TrialSteps, residuals: Array) -> TrialSteps:
+        """Return the trials with the best of the flown ones, and with corrected steps to be flown next."""
+        points, tried = state.point[trials.starts], trials.tried
+        count, tests = trials.dampings.shape
+        rows = np.arange(count)
+        flown = residuals.reshape(count, tests, -1)
+        costs = np.einsum("stm,stm->st", flown, flown)
+        leader = np.argmin(costs, axis=1)
+        better = costs[rows, leader] < trials.cost
+        correction = trials.correction + 1
+        if correction <= CORRECTIONS:
+            assumed = flown - (tried - points[:, None, :]) @ trials.jacobian.transpose(0, 2, 1)
+            tried = self._steps(points, trials.jacobian, trials.dampings, assumed)
+        return replace(
+            trials,
+            tried=tried,
+            correction=correction,
+            best=np.where(better[:, None], trials.tried[rows, leader], trials.best),
+            cost=np.where(better, costs[rows, leader], trials.cost),
+            winner=np.where(better, leader, trials.winner),
+        )
+
+    def _steps(self, points: Array, jacobian: Array, dampings: Array, assumed: Array) -> Array:
+        """Return where steps of all dampings (s, t) lead from points (s, d), (s, t, d).
+
+        ``assumed`` : (s, t, m) residuals that the linear model has where no step is made.
+        """
+        squares = jacobian.transpose(0, 2, 1) @ jacobian
+        # the floor is for samples that see nothing at all
+        scale = np.maximum(np.trace(squares, axis1=1, axis2=2), np.finfo(float).tiny / MIN_DAMPING)
+        gradients = assumed @ jacobian
+        return np.array(
+            [
+                [
+                    _step(x, gradient, square, unit * damping, self._lower, self._upper)
+                    for gradient, damping in zip(of_start, row, strict=True)
+                ]
+                for x, of_start, square, unit, row in zip(
+                    points, gradients, squares, scale, dampings, strict=True
+                )
+            ]
+        )
+
+
+def _moving(state: LeastSquaresState) -> NDArray[np.int64]:
+    """Return the starts (s,) in the field that still move, the best first."""
+    share = next((share for limit, share in NARROWING if state.iteration < limit), 0.0)
+    keep = max(1, round(share * state.cost.size))
+    order = np.argsort(state.cost, kind="stable")[:keep]
+    return np.asarray(order[state.active[order]])
+
+
+def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState:
+    """Return the state after an iteration: each start at its best trial where that is better."""
+    chosen, dampings = trials.starts, trials.dampings
+    before = np.einsum("sm,sm->s", trials.error, trials.error)
+    improved = trials.cost < before
+    point, cost = state.point.copy(), state.cost.copy()
+    damping, stalled = state.damping.copy(), state.stalled.copy()
+    point[chosen] = np.where(improved[:, None], trials.best, state.point[chosen])
+    cost[chosen] = np.where(improved, trials.cost, before)
+    raised = dampings[:, -1] * DAMPING_TRIALS[-1]
+    lowered = dampings[np.arange(chosen.size), trials.winner]
+    damping[chosen] = np.clip(np.where(improved, lowered, raised), MIN_DAMPING, MAX_DAMPING)
+    stalled[chosen] = np.where(before - trials.cost < STALLED * before, stalled[chosen] + 1, 0)
+    stalled[chosen[cost[chosen] < trials.error.shape[1] * EXACT_RMS**2]] = PATIENCE
+    return LeastSquaresState(point, cost, damping, stalled, state.iteration + 1)
+
+
+def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
+    """Return residuals (s, m) and forward-difference Jacobians (s, m, d) at points (s, d), in one batch."""
+    probed, steps = _probes(points, upper)
+    return _differences(residuals(probed), steps)
+
+
+def _probes(points: Array, upper: Array) -> tuple[Array, Array]:
+    """Return points (s (1 + d), d), each of (s, d) followed by its probes, and the probes' steps (s, d)."""
+    count, d = points.shape
+    # step inward at an upper bound
+    steps = np.where(points + PROBE > upper, -PROBE, PROBE)
+    probed = points[:, None, :] + np.concatenate(
+        [np.zeros((count, 1, d)), steps[:, :, None] * np.eye(d)], axis=1
+    )
+    return probed.reshape(-1, d), steps
+
+
+def _differences(residuals: Array, steps: Array) -> tuple[Array, Array]:
+    flown = residuals.reshape(steps.shape[0], steps.shape[1] + 1, -1)
+    jacobian = (flown[:, 1:] - flown[:, :1]) / steps[:, :, None]
+    return flown[:, 0], jacobian.transpose(0, 2, 1)
+
+
+def _step(x: Array, gradient: Array, squares: Array, damping: float, lower: Array, upper: Array) -> Array:
+    """Return where one damped Gauss-Newton step from x leads, in the box.
+
+    A coordinate that would leave the box stops at its bound, and the others make up for it.
+    """
+    free = ~(((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0)))
+    system = squares + damping * np.eye(x.size)
+    move = np.zeros_like(x)
+    while free.any():
+        pull = gradient[free] + system[np.ix_(free, ~free)] @ move[~free]
+        move[free] = np.linalg.solve(system[np.ix_(free, free)], -pull)
+        leaving = free & ((x + move < lower) | (x + move > upper))
+        if not leaving.any():
+            break
+        move[leaving] = np.clip(x + move, lower, upper)[leaving] - x[leaving]
+        free &= ~leaving
+    return np.clip(x + move, lower, upper)

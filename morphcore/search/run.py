@@ -1,0 +1,153 @@
+"""The one loop of all searches: ask, evaluate, tell, with time limit, stop and a state after each step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.search.checkpoint import stored
+from morphcore.search.solver import Batch, Problem, Result, Solver
+from morphcore.stopping import Deadline, Stop
+from morphcore.threads import one_blas_thread
+
+Array = NDArray[np.float64]
+Clock = Callable[[], float]
+
+FIRST = "baseline"  # as the history of a result calls the step that evaluates what is known
+UNFINISHED = 0.99  # largest fraction of a search that goes on
+
+
+@stored
+@dataclass(frozen=True)
+class SearchState:
+    """A search between two steps.
+
+    Attributes
+    ----------
+    budget_s : time that the search may take, s; None for no limit.
+    prepared : what the problem chose before its first evaluation.
+    solver : the method's own state; None before the first evaluation.
+    best : (d,) the point of least cost so far; ``best_cost`` is infinite where there is none.
+    generation : steps after the first. flights : flown so far. wall_s : s.
+    history : one row for each step.
+    over : whether the search has ended, by itself or because its time was up.
+    """
+
+    budget_s: float | None = None
+    prepared: Any = None
+    solver: Any = field(default=None, repr=False)
+    best: Array = field(default_factory=lambda: np.zeros(0))
+    best_cost: float = np.inf
+    generation: int = 0
+    flights: int = 0
+    wall_s: float = 0.0
+    history: tuple[dict[str, Any], ...] = field(default=(), repr=False)
+    over: bool = False
+
+    @property
+    def feasible(self) -> bool:
+        """Whether any point keeps all limits."""
+        return bool(np.isfinite(self.best_cost))
+
+
+class Search(Generic[Result]):
+    """A solver at work on a problem.
+
+    Parameters
+    ----------
+    problem, solver : what is searched in, and how.
+    clock : seconds that only rise.
+    """
+
+    def __init__(
+        self, problem: Problem[Result], solver: Solver[Any, Result], clock: Clock = time.perf_counter
+    ) -> None:
+        self.problem, self.solver = problem, solver
+        self._clock = clock
+
+    def advance(self, state: SearchState, stop: Stop | None = None) -> SearchState:
+        """Return the state after the next step; without it, and over, where the time is up before its end.
+
+        What is known is evaluated in any case: there is a result however little time there was.
+
+        Raises
+        ------
+        Interrupted : ``stop`` said so.
+        """
+        begin = self._clock()
+        left_s = None if state.budget_s is None else state.budget_s - state.wall_s
+        deadline = Deadline(left_s, stop)
+        with one_blas_thread():
+            if state.solver is None:
+                state = replace(state, prepared=self.problem.prepare(deadline))
+            if state.feasible:
+                ended = replace(state, over=True)
+                moved = deadline.before_it(lambda limited: self._step(state, limited), ended)
+            else:
+                moved = self._step(state, stop)
+        return self._timed(moved, self._clock() - begin)
+
+    def task(self, state: SearchState) -> Batch | None:
+        """Return the batch of the next step if its costs are all that it needs; then others may find them."""
+        if state.over or state.solver is None:
+            return None
+        batch = self.solver.ask(state.solver)
+        return None if batch.residuals else batch
+
+    def tell(self, state: SearchState, outcome: Result, wall_s: float) -> SearchState:
+        """Return the state after the step of a `task` that was evaluated elsewhere, in ``wall_s`` seconds."""
+        with one_blas_thread():
+            return self._timed(self._step(state, None, outcome), wall_s)
+
+    def fraction(self, state: SearchState) -> float:
+        """Return how far a search has come, 0..1."""
+        if state.over:
+            return 1.0
+        return 0.0 if state.solver is None else min(self.solver.share(state.solver), UNFINISHED)
+
+    def _step(self, state: SearchState, stop: Stop | None, outcome: Result | None = None) -> SearchState:
+        """Ask, evaluate and tell until a step ends. ``outcome`` : of the first batch, if it is known."""
+        solver, inner = self.solver, state.solver
+        best, best_cost, evaluations = state.best, state.best_cost, 0
+        while True:
+            if outcome is None:
+                batch = self.problem.first() if inner is None else solver.ask(inner)
+                outcome = self.problem.evaluate(batch, stop)
+            inner = solver.init(outcome) if inner is None else solver.tell(inner, outcome)
+            evaluations += outcome.evaluations
+            point, cost = solver.best(inner, outcome)
+            if cost < best_cost:
+                best, best_cost = point, cost
+            if solver.between_steps(inner):
+                break
+            outcome = None
+        first = state.solver is None
+        moved = replace(
+            state,
+            solver=inner,
+            best=best,
+            best_cost=best_cost,
+            generation=0 if first else state.generation + 1,
+            flights=state.flights + evaluations * self.problem.flights_each,
+            over=self.problem.box.lower.size == 0 or solver.done(inner),
+        )
+        row = {
+            "generation": moved.generation,
+            "phase": FIRST if first else solver.phase(state.solver),
+            "particles": 0 if first else evaluations,
+            "flights": moved.flights,
+            "best_cost": moved.best_cost,
+            **({} if first else solver.remarks(outcome)),
+        }
+        return replace(moved, history=(*state.history, row))
+
+    def _timed(self, state: SearchState, elapsed_s: float) -> SearchState:
+        """Count the time of a step; where it has used up the search's time, it is the last."""
+        wall_s = state.wall_s + elapsed_s
+        up = state.feasible and state.budget_s is not None and wall_s >= state.budget_s
+        return replace(state, wall_s=wall_s, over=state.over or up)

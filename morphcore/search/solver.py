@@ -1,0 +1,180 @@
+"""What every search method is: a value that asks for batches of points and is told what they cost.
+
+A solver holds settings only. All that a search knows lies in its state, a plain value: dataclasses marked
+`stored`, tuples, dictionaries, arrays, numbers and texts. So whoever reads the state can go on with it, in
+another process and to the bit, and batches can be evaluated anywhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.lanes import TOGETHER
+from morphcore.search.checkpoint import stored
+from morphcore.stopping import Deadline, Stop
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Box:
+    """The space to search: ``lower`` and ``upper`` bounds (d,)."""
+
+    lower: Array
+    upper: Array
+
+    def from_unit(self, unit: Array) -> Array:
+        """Points (p, d) of the box from points of the unit cube."""
+        return np.asarray(self.lower + (self.upper - self.lower) * unit)
+
+    def to_unit(self, points: Array) -> Array:
+        """Points (p, d) of the unit cube from points of the box."""
+        return np.asarray((points - self.lower) / (self.upper - self.lower))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Points (p, d) to be evaluated; ``residuals`` says that their costs alone are not enough."""
+
+    points: Array
+    residuals: bool = False
+
+    def parts(self, max_parts: int) -> list[Array]:
+        """Split the points into parts of about one size, which any process may evaluate on its own.
+
+        A part is whole blocks of SIMD lanes: each model flies in the block, with the neighbours, that it has
+        when one process flies them all. What a block's lanes share (the strips that any of them touches)
+        could otherwise differ.
+
+        Parameters
+        ----------
+        max_parts : int
+
+        Returns
+        -------
+        At most so many arrays (k, d), none of them empty, in the order of the points.
+        """
+        blocks = -(-self.points.shape[0] // TOGETHER)
+        count = max(1, min(max_parts, blocks))
+        bounds = np.arange(count + 1) * blocks // count * TOGETHER
+        return [self.points[low:high] for low, high in itertools.pairwise(bounds)]
+
+
+@stored
+@dataclass(frozen=True)
+class Outcome:
+    """An evaluated batch.
+
+    Attributes
+    ----------
+    points : (p, d) what was evaluated. A problem may repair points that it cannot evaluate.
+    cost : (p,)
+    residuals : (p, m), where they were asked for.
+    evaluations : number of points that were evaluated for it, those of repairs included.
+    """
+
+    points: Array
+    cost: Array
+    residuals: Array | None = None
+    evaluations: int = 0
+
+
+State = TypeVar("State")
+Result = TypeVar("Result", bound=Outcome)
+Result_co = TypeVar("Result_co", bound=Outcome, covariant=True)
+
+
+class Solver(ABC, Generic[State, Result]):
+    """A search method.
+
+    A method defines `init`, `ask`, `tell` and `done`; the rest has defaults that suit a method whose batches
+    are generations of candidates.
+    """
+
+    name = "search"  # of its steps, in progress and in the history of a result
+
+    @abstractmethod
+    def init(self, known: Result) -> State:
+        """Return the first state, given evaluated points of which the first is the best guess."""
+
+    @abstractmethod
+    def ask(self, state: State) -> Batch:
+        """Return the batch to be evaluated next."""
+
+    @abstractmethod
+    def tell(self, state: State, outcome: Result) -> State:
+        """Return the state after the batch that the present state asks for."""
+
+    @abstractmethod
+    def done(self, state: State) -> bool:
+        """Return whether the search is over."""
+
+    def best(self, state: State, outcome: Result) -> tuple[Array, float]:
+        """Return the best point (d,) that the last outcome led to, and its cost; infinite where to none.
+
+        ``state`` : after that outcome was told.
+        """
+        del state
+        least = int(np.argmin(outcome.cost))
+        return outcome.points[least], float(outcome.cost[least])
+
+    def between_steps(self, state: State) -> bool:
+        """Return whether a step ends here; a step may take several batches."""
+        del state
+        return True
+
+    def phase(self, state: State) -> str:
+        """Return the name of the step that comes next."""
+        del state
+        return self.name
+
+    def share(self, state: State) -> float:
+        """Return how far the search has come, 0..1, as far as one can know."""
+        del state
+        return 0.0
+
+    def remarks(self, outcome: Result) -> dict[str, float]:
+        """Return what else the history should say about a step that ended with an outcome."""
+        del outcome
+        return {}
+
+
+class Problem(Protocol[Result_co]):
+    """What is searched in."""
+
+    @property
+    def box(self) -> Box:
+        """The bounds of the search."""
+        ...
+
+    @property
+    def flights_each(self) -> int:
+        """Flights that the evaluation of one point takes."""
+        ...
+
+    def arranged(self, points: Array) -> Array:
+        """Return random points (p, d) of the box, or of the unit cube, with coordinates in a useful order."""
+        ...
+
+    def prepare(self, deadline: Deadline) -> Any:
+        """Return what has to be chosen before the first evaluation, a plain value that the state keeps."""
+        ...
+
+    def first(self) -> Batch:
+        """Return the points that are evaluated before any method begins, the best guess first."""
+        ...
+
+    def evaluate(self, batch: Batch, stop: Stop | None) -> Result_co:
+        """Evaluate a batch.
+
+        Raises
+        ------
+        Interrupted : ``stop`` said so.
+        """
+        ...
