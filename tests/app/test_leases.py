@@ -124,7 +124,7 @@ def test_subscribers_are_part_of_the_change(database: Database, table: LeasedTab
         held = claim(session, table)
         assert held is not None
         table.settle(session, held, attempt=1)  # without a note it is no news
-        table.settle(session, held, note=Note("progress"))
+        table.settle(session, held, note=Note("progress"), attempt=1)
     with pytest.raises(Undone), database.write() as session:
         table.settle(session, held, note=Note("finished"), status=DONE)
     assert seen == ["progress held", "finished done", "end"]
