@@ -32,7 +32,7 @@ CHUNK_LEASE_S = 2.0
 def test_a_spread_search_is_the_search(tmp_path: Path, search: dict[str, Any], links: int) -> None:
     """Two workers by turns (each with plans of its own) end with the document of the mode `single`.
 
-    One link fits poorly: the hybrid screens candidates, which are spread, between two descents, which are not.
+    One link fits poorly: the hybrid screens candidates, which is spread, between descents, which are not.
     Wall times are left out: no two runs share them. What the kind of database could change is under test with
     flocks.
     """
