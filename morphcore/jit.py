@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import logging
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -76,11 +77,16 @@ class _PartCompiler(Compiler):
 
 
 class _SharedCache(FunctionCache):
-    """Numba's cache, safe for processes that compile the same entry for different types at the same time.
+    """Numba's cache, with two faults mended.
 
     Numba reads the index of an entry, adds a line and writes it back: two processes that do so at once give
-    both pieces of code the same file.
+    both pieces of code the same file. And it takes the code of an entry for current while the entry's own
+    file has not changed, whatever has become of the kernels that are compiled into it.
     """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file._source_stamp = (self._cache_file._source_stamp, kernel_digest())  # noqa: SLF001 - as below
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code while no other process does."""
@@ -91,6 +97,14 @@ class _SharedCache(FunctionCache):
     def filled(self) -> bool:
         """Whether there is code of this version of the source."""
         return bool(self._cache_file._load_index())  # noqa: SLF001 - a subclass
+
+
+@functools.cache
+def kernel_digest() -> str:
+    """Digest of the source of all kernels, any of which may be compiled into an entry."""
+    root = Path(__file__).parent
+    sources = [root / "jit.py", root / "lanes.py", *sorted(root.glob("**/kernels/*.py"))]
+    return hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()
 
 
 @contextlib.contextmanager

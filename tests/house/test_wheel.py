@@ -110,6 +110,9 @@ def test_the_base_installation_computes(installation: Installation) -> None:
     installation.run("identify", *FLIGHT, *SAMPLES, *SMALL, "--links", "1", *SEARCH, "--json", "out.json")
     found = json.loads((installation.folder.path / "out.json").read_text())
     assert found["model"]["links_per_wing"] == 1
+    swarm = ("--method", "pso", "--particles", "4", "--generations", "1")
+    installation.run("identify", *FLIGHT, *SAMPLES, *SMALL, "--links", "1", *swarm, "--json", "swarm.json")
+    assert not (installation.folder.path / "report.log").exists(), "pyswarms reads our logging settings"
     installation.run("study", *FLIGHT, *SAMPLES, *SMALL, "--links", "1,2", *SEARCH, "--json", "study.json")
     schedule = ("--schedule", "train_rate_0.8.csv", "--out", "flight.csv")
     installation.run("simulate", *FLIGHT, "--model", "equivalent", "--parameters", "out.json", *schedule)
