@@ -102,6 +102,17 @@ def test_processes_that_compile_at_once_keep_all_their_code(tmp_path: Path) -> N
     assert hits() == ["1", "1"]
 
 
+def test_code_is_kept_only_while_all_kernels_are_what_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An entry's own file says nothing about the kernels in its code: with other kernels it is compiled anew."""
+    if is_kept(_four_times) is None:
+        pytest.skip("nothing is compiled here")
+    _four_times(np.ones(3))
+    function = _four_times.py_func  # type: ignore[attr-defined]  # of a dispatcher
+    assert is_kept(entry_kernel(function))
+    monkeypatch.setattr("morphcore.jit.kernel_digest", lambda: "of other kernels")
+    assert is_kept(entry_kernel(function)) is False
+
+
 def test_kernels_that_cannot_be_kept_are_compiled_anew(tmp_path: Path) -> None:
     """A library that nobody can write, used without a home folder, works and says once what would help."""
     (tmp_path / "__pycache__").touch()  # a file: not even root makes a folder of it
