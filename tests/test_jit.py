@@ -103,7 +103,7 @@ def test_processes_that_compile_at_once_keep_all_their_code(tmp_path: Path) -> N
 
 
 def test_code_is_kept_only_while_all_kernels_are_what_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An entry's own file says nothing about the kernels in its code: with other kernels it is compiled anew."""
+    """With another kernel in its code an entry is compiled anew, though its own file is what it was."""
     if is_kept(_four_times) is None:
         pytest.skip("nothing is compiled here")
     _four_times(np.ones(3))
