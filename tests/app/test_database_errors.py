@@ -87,7 +87,7 @@ def test_an_exhausted_pool_passes() -> None:
 def test_what_a_client_is_told(sqlstate: str, status: int, code: str, retry: str | None) -> None:
     """A database that is away or full is 503 with `Retry-After`; a fault of ours stays a 500."""
     app = FastAPI()
-    install_problem_handlers(app, known_fields=list)
+    install_problem_handlers(app)
 
     @app.get("/")
     def fail() -> None:

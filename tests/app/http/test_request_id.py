@@ -51,7 +51,7 @@ def test_a_body_that_is_too_large_has_an_id(service: RunningService) -> None:
 def test_unforeseen_errors_have_an_id() -> None:
     """Even the answer to an error that nobody foresaw leads to the log."""
     app = FastAPI()
-    install_problem_handlers(app, known_fields=list)
+    install_problem_handlers(app)
     seen: list[str] = []
 
     @app.get("/")
