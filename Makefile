@@ -58,7 +58,7 @@ test: setup  ## the tests (under 12 minutes on two cores)
 # services have both and come afterwards
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
-	models morphdata multibody optimise paper simulate)
+	models morphdata multibody optimise paper search simulate)
 COMMAND_TESTS := tests/morphid tests/clients
 
 test-api: setup
