@@ -124,7 +124,7 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
         watcher = JobWatcher(database, settings.event_poll_s)
         background = BackgroundWriter(database)
         keys = KeyRing(database, background)
-        key_watch = KeyWatch(database)
+        key_watch = KeyWatch(database, on_lost=keys.forget)
         app.state.service = Service(
             settings=settings,
             database=database,

@@ -77,6 +77,10 @@ class KeyRing:
             self._background.put(partial(note_use, key_id=key.id))
         return key
 
+    def forget(self, key: ApiKey) -> None:
+        """Read a key anew at its next use: it is known to have changed."""
+        self._remembered.pop(key.prefix, None)
+
     def _read(self, prefix: str) -> _Remembered | None:
         read_at = self._clock()  # before the read: what is remembered is never younger than it seems
         with self._database.read() as session:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager, suppress
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -92,12 +92,15 @@ class KeyWatch:
     Parameters
     ----------
     database : Database
+    on_lost : callable
+        Called with a key that opens no more, before its requests are broken off.
     look_s : float
         Time between two looks, s.
     """
 
-    def __init__(self, database: Database, look_s: float = LOOK_S) -> None:
+    def __init__(self, database: Database, on_lost: Callable[[ApiKey], None], look_s: float = LOOK_S) -> None:
         self._database = database
+        self._on_lost = on_lost
         self._look_s = look_s
         self._in_use: dict[str, set[KeyInUse]] = {}
         self._task: asyncio.Task[None] | None = None
@@ -137,6 +140,8 @@ class KeyWatch:
         for key_id in ids:
             for in_use in tuple(self._in_use.get(key_id, ())):
                 if not in_use.lost and not in_use.opens_as(found.get(key_id)):
+                    if in_use.key is not None:
+                        self._on_lost(in_use.key)
                     in_use.lose()
 
     async def _run(self) -> None:

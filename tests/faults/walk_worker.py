@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import event
 from sqlalchemy.engine import Engine
 
+from morphdata import operations as descriptors
 from tests.faults import wrong_clock
 from tests.faults.ledger import SEED
 from tests.faults.walk_length import flight_steps
@@ -72,8 +74,11 @@ def kernels(_threads: int) -> None:
 
 
 here = "tests.faults.walk_worker"
-walks: Mapping[str, str] = {"walk": f"{here}:begin", "simulate": f"{here}:begin_flight"}
-operations.OPERATIONS = walks
+flight = descriptors.operation_named("simulate")
+descriptors.OPERATIONS = (
+    replace(flight, name="walk", begin=f"{here}:begin"),
+    replace(flight, begin=f"{here}:begin_flight"),
+)
 numerics.warm_up_library = kernels
 
 if "MORPHID_TEST_PAGES" in os.environ:

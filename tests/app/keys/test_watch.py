@@ -11,7 +11,7 @@ from sqlalchemy import delete, update
 
 from app.database import Database, Session, database_time
 from app.errors import Unauthorized
-from app.keys.records import Scope
+from app.keys.records import ApiKey, Scope
 from app.keys.service import revoke_key
 from app.keys.watch import KeyInUse, KeyWatch
 from app.tables import api_keys
@@ -44,9 +44,10 @@ HARMLESS: dict[str, Change] = {
 def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
     """Whatever takes from a key what its request was let in by breaks off the wait; nothing else does."""
     mine, other = make_key(database).key, make_key(database).key
+    told: list[ApiKey] = []
 
     async def play() -> tuple[bool, bool]:
-        watch = KeyWatch(database)
+        watch = KeyWatch(database, on_lost=told.append)
 
         async def wait(in_use: KeyInUse) -> None:
             async with in_use.while_it_opens():
@@ -70,6 +71,7 @@ def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
             return ended == [True] and first.lost, second.lost
 
     assert asyncio.run(play()) == (name in LOSSES, False)
+    assert [key.id for key in told] == [mine.id] * (name in LOSSES)
 
 
 def test_a_database_that_is_away_ends_nothing(database: Database, tmp_path: Path) -> None:
@@ -77,7 +79,7 @@ def test_a_database_that_is_away_ends_nothing(database: Database, tmp_path: Path
     away = Database(f"sqlite:///{tmp_path / 'empty.sqlite3'}")  # there is not even a table
 
     async def play() -> bool:
-        watch = KeyWatch(away)
+        watch = KeyWatch(away, on_lost=lambda _: None)
         with watch.use(make_key(database).key) as in_use:
             await watch.look()
             return in_use.lost

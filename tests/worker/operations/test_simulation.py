@@ -65,7 +65,7 @@ def test_a_flight_is_cancelled_within_two_seconds(worker: RealWorker) -> None:
 
 def test_a_second_attempt_flies_from_the_start(worker: RealWorker) -> None:
     """A worker told to end hands the flight back; the next one flies it anew, says so, to the same flight."""
-    request = simulation(0.8, kind="flexible", lattice={})
+    request = simulation(4.0, kind="flexible", lattice={})  # long enough to be interrupted
     job_id = worker.add("simulate", request)
     assert worker.run(lambda: worker.job(job_id).progress is not None) is Ending.RELEASED
     assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
