@@ -49,7 +49,7 @@ class BackgroundWriter:
         try:
             self._waiting.put_nowait(write)
         except queue.Full:
-            logger.warning("a note was dropped: %d others wait for the database", MAX_WAITING)
+            logger.warning("dropped a deferred write: %d are waiting for the database", MAX_WAITING)
 
     def _run(self) -> None:
         while (write := self._waiting.get()) is not None:

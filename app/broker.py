@@ -102,7 +102,8 @@ def _refuse_unknown(scheme: str, options: dict[str, str]) -> None:
                 TLS_OPTIONS if scheme == "rediss" else frozenset()
             )
             raise ValueError(
-                f"MORPHID_BROKER_URL: no option {name[:40]!r}; there are {', '.join(sorted(known))}"
+                f"MORPHID_BROKER_URL: unknown option {name[:40]!r}; the options are "
+                f"{', '.join(sorted(known))}"
             )
 
 

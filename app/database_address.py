@@ -32,7 +32,7 @@ def sqlite_url(file: Path) -> str:
     if os.fsencode(file) != str(file).encode("utf-8", "replace"):
         shown = os.fsencode(file).decode("utf-8", "replace")
         raise UnusableAddress(
-            f"{shown} is no name that SQLite finds in this locale ({sys.getfilesystemencoding()}). "
+            f"SQLite cannot open the path {shown} in this locale ({sys.getfilesystemencoding()}). "
             "Set PYTHONUTF8=1, or choose a folder with a name in ASCII."
         )
     return URL.create("sqlite", database=str(file)).render_as_string(hide_password=False)
@@ -60,7 +60,7 @@ def require_usable(url: str) -> None:
     try:
         parsed = make_url(normal_url(url))
     except (ArgumentError, ValueError):  # the second: of a port that is no number
-        raise UnusableAddress(f"this is no address of a database. Write {EXAMPLES}.") from None
+        raise UnusableAddress(f"this is not a database URL. Write {EXAMPLES}.") from None
     backend, _, driver = parsed.drivername.partition("+")
     known = DRIVERS.get(backend)
     if known is None:

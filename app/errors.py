@@ -84,7 +84,7 @@ class NotFound(ServiceError):
 
     status = 404
     code = "not_found"
-    title = "There is nothing here"
+    title = "Not found"
 
 
 class JobNotFound(NotFound):
@@ -152,7 +152,7 @@ class Conflict(ServiceError):
 
     status = 409
     code = "conflict"
-    title = "Not in this state"
+    title = "Not possible in this state"
 
 
 class IdempotencyConflict(Conflict):
@@ -165,7 +165,7 @@ class IdempotencyConflict(Conflict):
         super().__init__(
             f"The key {key!r} was used before with another body or operation.",
             "#header/Idempotency-Key",
-            "Make a new key for a new request; repeat a key only with the very same body.",
+            "Use a new key for a new request; reuse a key only with an identical body.",
         )
 
 
@@ -220,7 +220,7 @@ class WebhookPending(Conflict):
         super().__init__(
             f"The receiver of webhook {webhook_id} has not answered the challenge yet.",
             "#path/webhook_id",
-            "Have it answer with the challenge; POST /webhooks/{id}/enable sends another.",
+            "Make the receiver return the challenge; POST /webhooks/{id}/enable sends a new one.",
         )
 
 
@@ -249,7 +249,7 @@ class MissingScope(ServiceError):
 
     status = 403
     code = "missing_scope"
-    title = "The API key may not do this"
+    title = "The API key lacks permission"
 
     def __init__(self, scopes: list[str]) -> None:
         self.scopes = scopes
@@ -295,7 +295,7 @@ class TooManyRefusals(TooManyRequests):
     def __init__(self, retry_after_s: int) -> None:
         super().__init__(
             "This address has sent too many invalid API keys.",
-            "Correct the key; then ask again after the time of Retry-After.",
+            "Correct the key and retry after the time in Retry-After.",
             retry_after_s=retry_after_s,
         )
 
@@ -310,7 +310,7 @@ class TooManyStreams(TooManyRequests):
     def of_streams(cls, limit: int) -> TooManyStreams:
         """Tell that there are as many event streams as one owner may have."""
         return cls(
-            f"You have {limit} event streams open, and may have no more at once.",
+            f"You have {limit} open event streams, which is the limit.",
             "Close one that is not needed, or read the events a page at a time: Accept: application/json.",
             retry_after_s=STREAM_ENDS_S,
         )
@@ -319,15 +319,15 @@ class TooManyStreams(TooManyRequests):
     def of_waits(cls, limit: int) -> TooManyStreams:
         """Tell that as many requests wait as one owner may have."""
         return cls(
-            f"{limit} requests of yours wait for jobs (Prefer: wait), and no more may at once.",
-            "Ask without Prefer: wait, or again when one of them has been answered.",
+            f"{limit} of your requests are waiting for jobs (Prefer: wait), which is the limit.",
+            "Send the request without Prefer: wait, or retry when one of them has been answered.",
             retry_after_s=STREAM_ENDS_S,
         )
 
 
 QUOTA_HINTS = {
     "jobs_in_flight": "Wait until a job has ended, or cancel one.",
-    "flights_per_day": "Wait until midnight UTC, or ask for less: fewer particles, generations, samples.",
+    "flights_per_day": "Wait until midnight UTC, or use fewer particles, generations or samples.",
     "stored_bytes": "Delete jobs and flights that are not needed any more.",
 }
 
@@ -342,7 +342,7 @@ class QuotaExceeded(TooManyRequests):
         self.quota, self.limit, self.used, self.asked = quota, limit, used, asked
         words = quota.replace("_", " ")
         super().__init__(
-            f"The key may have {limit} {words}; {used} are used and this asks for {asked} more.",
+            f"The key's quota is {limit} {words}; {used} are used and this request needs {asked} more.",
             QUOTA_HINTS.get(quota, "Ask the operator for a larger quota."),
             retry_after_s=retry_after_s,
         )
@@ -366,7 +366,7 @@ class WrongHost(ServiceError):
 
     status = 421
     code = "wrong_host"
-    title = "The service does not answer for this host"
+    title = "The service does not accept this host name"
 
 
 class DatabaseAway(ServiceError):
@@ -394,7 +394,7 @@ class StorageFull(ServiceError):
 
     def __init__(self) -> None:
         super().__init__(
-            "The database has no room left; nothing was stored.",
+            "The database is out of disk space; nothing was stored.",
             hint="Delete finished jobs that are not needed, or ask the operator for more disk space.",
         )
 

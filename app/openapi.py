@@ -30,7 +30,9 @@ DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
 PROBLEM = "#/components/schemas/Problem"
 PROBLEM_CONTENT = {MEDIA_TYPE: {"schema": {"$ref": PROBLEM}}}
 _AUTHENTICATE = {"WWW-Authenticate": {"description": "How, and for what.", "schema": {"type": "string"}}}
-_RETRY_AFTER = {"Retry-After": {"description": "When to ask again, s.", "schema": {"type": "string"}}}
+_RETRY_AFTER = {
+    "Retry-After": {"description": "Seconds to wait before retrying.", "schema": {"type": "string"}}
+}
 REFUSAL_HEADERS: dict[int | str, dict[str, Any]] = {
     401: _AUTHENTICATE,
     403: _AUTHENTICATE,
@@ -50,11 +52,11 @@ scope that the key must have; `GET /me` tells what yours has.
 """
 TAGS = [
     *({"name": operation.name, "description": operation.subject} for operation in OPERATIONS),
-    {"name": "jobs", "description": "Long work: its state, its events, what it leaves."},
+    {"name": "jobs", "description": "Jobs: state, events, results."},
     {"name": "trajectories", "description": "Sample flights as files."},
     {"name": "models", "description": "Identified models."},
-    {"name": "webhooks", "description": "Messages to an address of yours when jobs end."},
-    {"name": "keys", "description": "Who the caller is, and what it may do and use."},
+    {"name": "webhooks", "description": "Messages to your URL when jobs end."},
+    {"name": "keys", "description": "The caller's identity, scopes and quotas."},
     {"name": "health", "description": "For machines."},
 ]
 

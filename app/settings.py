@@ -68,7 +68,7 @@ class Settings(BaseSettings):
     )
     allowed_hosts: str = Field(
         default="",
-        description="Names that the service goes by, with commas between; without keys others are refused.",
+        description="Host names of the service, separated by commas; without keys others are refused.",
     )
     max_body_bytes: int = Field(
         default=64 * 2**20, ge=1024, description="Largest request body, counted as it streams."
@@ -89,7 +89,7 @@ class Settings(BaseSettings):
         default=10.0, gt=0.0, le=600.0, description="Time to send the headers of a request."
     )
     write_timeout_s: float = Field(
-        default=30.0, gt=0.0, le=3600.0, description="A client that reads nothing for so long is hung up on."
+        default=30.0, gt=0.0, le=3600.0, description="Disconnect a client that reads nothing for this long."
     )
     parsers: int = Field(
         default=2,
@@ -118,7 +118,7 @@ class Settings(BaseSettings):
         default=10.0,  # lease 60 s + one round + loading the kernels stay within 90 s of a worker's death
         gt=0.0,
         le=3600.0,
-        description="How often it is looked for jobs whose worker is gone.",
+        description="Interval of the search for jobs whose worker is lost.",
     )
     job_max_attempts: int = Field(default=3, ge=1, le=100)
     job_max_seconds: float = Field(
@@ -144,14 +144,14 @@ class Settings(BaseSettings):
     webhook_dial_only: str = Field(
         default="",
         description="Hosts that webhooks may go to, as URLs name them, `host` or `host:port`, with commas "
-        "between; no other is looked up or connected to. Empty: any.",
+        "between; no other host is contacted. Empty: any.",
     )
 
     log_format: Literal["text", "json"] = Field(
-        default="text", description="Lines for eyes, or one JSON object per line for machines."
+        default="text", description="`text` for people or `json`, one object per line."
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
-        default="info", description="Least severity that is logged."
+        default="info", description="Minimum severity that is logged."
     )
     traces: str = Field(
         default="", description="Address of an OpenTelemetry collector (OTLP over HTTP); empty: no traces."
@@ -175,7 +175,7 @@ class Settings(BaseSettings):
             raise UnsafeSettings(
                 f"host {self.host} is reachable from other machines and MORPHID_AUTH=off demands no keys. "
                 "Leave MORPHID_AUTH out to have them demanded, "
-                "or set MORPHID_ALLOW_OPEN=1 to let everyone in on purpose."
+                "or set MORPHID_ALLOW_OPEN=1 to allow everyone deliberately."
             )
         self._refuse_default_password()
         if self.webhook_allow_private and not is_loopback(self.host):
@@ -204,7 +204,7 @@ class Settings(BaseSettings):
             return
         if password.lower() in DEFAULT_PASSWORDS or (password and password == unquote(parts.username or "")):
             raise UnsafeSettings(
-                "the password in MORPHID_DATABASE_URL is one that everybody tries first, and the database at "
+                "the password in MORPHID_DATABASE_URL is one that attackers try first, and the database at "
                 f"{parts.hostname} can be reached over a network. Choose another: `openssl rand -hex 24` "
                 "makes one."
             )

@@ -30,7 +30,7 @@ LENGTHS = {
 def swarm_memory(samples_dir: str | Path, particles: int) -> Figures:
     """Peak of resident memory in MB beyond the warmed-up process, by length of the flights."""
     if not FORGET.exists():
-        return {"skipped": "this system does not tell the peak of a process's memory"}
+        return {"skipped": "this system does not report peak memory"}
     peaks = {
         name: in_fresh_process("benchmarks.memory:generation_memory", str(samples_dir), particles, *how)
         for name, how in LENGTHS.items()

@@ -115,7 +115,7 @@ def flight_meter(bench: Bench, links: int, sweep: str) -> Meter:
     with counting(meter):
         fly_attitudes(model, guess, case, found)
     if not meter.by_kernel:
-        raise RuntimeError("the flight passed no kernel of simulate/batch.py: count at its new door")
+        raise RuntimeError("the flight passed no kernel of simulate/batch.py: count at its new entry point")
     return meter
 
 

@@ -61,7 +61,7 @@ def _threads(figures: Figures) -> Iterator[Line]:
         )
     path = "threads/speed_up"
     yield Line(
-        "speed-up of the threads, by the wall",
+        "speed-up by threads, wall time",
         f"{threads['speed_up']:.2f} x",
         _must(figures, path, unit=" x"),
     )
@@ -109,7 +109,9 @@ def _operations(figures: Figures) -> Iterator[Line]:
             value = " + ".join(f"{1e-6 * parts[part]['total']:.2f}" for part in ("structure", "lattice"))
             yield Line(what, f"{value} M")
     growth = f"{figures['structural_growth']:.4g}"
-    yield Line("dearest further link over the second one", growth, _must(figures, "structural_growth"))
+    yield Line(
+        "most expensive additional link relative to the second", growth, _must(figures, "structural_growth")
+    )
 
 
 def _search(figures: Figures) -> Iterator[Line]:
@@ -119,7 +121,9 @@ def _search(figures: Figures) -> Iterator[Line]:
     what = f"searches from {len(found['samples'])} flights that end within 10 % of the best J"
     yield Line(what, f"{arrived} of {runs}", _must(figures, "search/arrived_share"))
     path = "search/flight_sets_to_target"
-    yield Line("flight sets to there, the worst", f"{found['flight_sets_to_target']:,}", _must(figures, path))
+    yield Line(
+        "model evaluations to target, worst", f"{found['flight_sets_to_target']:,}", _must(figures, path)
+    )
     path = "search/wall_s_to_target"
     value = f"{found['wall_s_to_target']:.3g} s"
     yield Line("time to there, median", value, _must(figures, path, unit=" s"))
@@ -138,7 +142,9 @@ def _mujoco(figures: Figures) -> Iterator[Line]:
     for name, text in (("batch", "in a batch"), ("single", "alone")):
         value = f"{found[f'{name}_ratio']:.3g} x"
         yield Line(
-            f"MuJoCo's best over ours {text}", value, _must(figures, f"mujoco/{name}_ratio", unit=" x")
+            f"time of MuJoCo's best integrator over ours {text}",
+            value,
+            _must(figures, f"mujoco/{name}_ratio", unit=" x"),
         )
     yield Line("both programs' converged attitudes differ by", f"{found['agreement_rad']:.2g} rad")
 
@@ -173,7 +179,7 @@ def _start_up(figures: Figures) -> Iterator[Line]:
         yield Line(what, value, must)
     imported = stages["import"]
     yield Line(
-        "importing the library, beside numpy, scipy.optimize and numba",
+        "import time relative to numpy, scipy.optimize and numba",
         f"{imported['library_s']:.2f} s, {imported['ratio']:.2f} times",
         _must(figures, "start_up/import/ratio"),
     )
@@ -183,7 +189,7 @@ def _compilation(figures: Figures) -> Iterator[Line]:
     found = figures["compilation"]
     value = f"{found['computing_s']:.0f} s"
     must = _must(figures, "compilation/computing_s", unit=" s")
-    yield Line("compiling what an identification needs anew", value, must)
+    yield Line("compiling the kernels of an identification", value, must)
     yield Line("then all other kernels", f"{found['further_computing_s']:.0f} s")
     for kernel, seconds in list(found["by_entry_s"].items())[:5]:
         yield Line(f"of it {kernel.removeprefix('morphcore.')}", f"{seconds:.1f} s")

@@ -125,7 +125,7 @@ def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
             ResultWarning(
                 "surfaces_overlap",
                 f"{names[0]!r} and {names[1]!r} overlap" + (f" ({turned})" if turned else ""),
-                "their vortices lie in each other and the air loads mean nothing there: check position_m, "
+                "their lattices intersect and the air loads are meaningless there: check position_m, "
                 "span_m and the hinges",
                 f"/aircraft/surfaces/{second}",
             )
@@ -146,7 +146,7 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
             + (", beyond the vertical" if beyond else ", nearly the vertical"),
             "no Euler angle theta lies beyond pi/2: check the unit, which may be degrees"
             if beyond
-            else "roll and yaw cannot be told apart there: do not read or fit them around that time",
+            else "roll and yaw cannot be distinguished there: do not interpret or fit them near that time",
             pointer,
         )
     ]
@@ -169,7 +169,7 @@ def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> l
             ResultWarning(
                 "looks_like_degrees",
                 f"the angles of {name} are about {as_radians / motion:.0f} times what the aircraft would do, "
-                "and fit when they are taken for degrees",
+                "and fit if they are read as degrees",
                 "give them in rad, or name the columns phi_deg, theta_deg, psi_deg",
                 pointer,
             )
@@ -183,7 +183,9 @@ def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list
     if not np.isfinite(error) or error <= max(LARGEST_ERROR * size, LEAST_ERROR_RAD):
         return []
     share = (
-        f"{100.0 * error / size:.0f} per cent of its motion" if size > 0.0 else "and it does not move at all"
+        f"{100.0 * error / size:.0f} per cent of its motion"
+        if size > 0.0
+        else "although the sample does not move"
     )
     return [
         ResultWarning(

@@ -87,7 +87,7 @@ class Fuselage(Document):
         elif self.inertia_kg_m2 is None:
             yield Fault(
                 "missing",
-                "A given mass needs a given inertia.",
+                "mass_kg needs inertia_kg_m2.",
                 "/inertia_kg_m2",
                 "Add three diagonal terms or a 3 x 3 matrix about the centre of mass.",
             )
@@ -262,7 +262,7 @@ class Surface(Document):
         if self.hinge is None and self.position_m is None:
             yield Fault(
                 "missing",
-                f"{self.name!r} is attached nowhere.",
+                f"{self.name!r} has neither a hinge nor a position.",
                 "/hinge",
                 "Add a hinge, or position_m for a fixed surface.",
             )

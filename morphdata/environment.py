@@ -53,7 +53,7 @@ class Environment(Document):
 
     gust: Gust | None = None
     turbulence: Turbulence | None = None
-    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same air.")
+    seed: int = Field(default=1, ge=0, le=MAX_SEED, description="The same seed gives the same turbulence.")
 
     @property
     def still(self) -> bool:

@@ -27,15 +27,15 @@ class Execution(Document):
         description="Among your own jobs the highest runs first; other owners take their turns all the same.",
     )
     label: Label | None = Field(
-        default=None, description="A word of your own, to find the job again: `GET /jobs?label=`."
+        default=None, description="Free text, to find the job again: `GET /jobs?label=`."
     )
     max_attempts: Annotated[int, Field(ge=1, le=MAX_ATTEMPTS)] | None = Field(
         default=None,
-        description="How often the job may be begun, again after its worker was lost; the service's own "
+        description="Maximum number of attempts; a new one starts after a worker is lost; the service's own "
         "number when left out.",
     )
     expires_in_s: Annotated[float, Field(ge=1.0, le=MONTH_S)] | None = Field(
-        default=None, description="A job that has not begun by then is not begun any more: it is `expired`."
+        default=None, description="A job that has not started by then will not start: it is `expired`."
     )
 
 
@@ -44,7 +44,7 @@ class SpreadExecution(Execution):
 
     mode: Literal["single", "distributed"] = Field(
         default="single",
-        description="`distributed`: whatever workers there are fly each generation together.",
+        description="`distributed`: all available workers fly each generation together.",
     )
     chunks: int = Field(
         default=16, ge=1, le=MAX_CHUNKS, description="Parts of a generation in the mode `distributed`."

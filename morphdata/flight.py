@@ -79,7 +79,7 @@ class Flight(Document):
                 "unsupported_regime",
                 f"{self.airspeed_m_s:g} m/s at {self.altitude_m:g} m is Mach {mach:.2f}.",
                 "/mach",
-                f"Linear compressibility ends at Mach {MACH_LIMIT}: fly slower, or leave mach out.",
+                f"Linear compressibility ends at Mach {MACH_LIMIT}: fly slower, or omit mach.",
             )
 
 

@@ -85,7 +85,7 @@ def _bound_faults(name: str, low: float, high: float, limit: Identifiable) -> It
     elif low < limit.low or high > limit.high:
         yield Fault(
             "bound_out_of_range",
-            f"[{low:g}, {high:g}] leaves what is physical, [{limit.low:g}, {limit.high:g}].",
+            f"[{low:g}, {high:g}] exceeds the physical range [{limit.low:g}, {limit.high:g}].",
             f"/{name}/{0 if low < limit.low else 1}",
             "Narrow the bounds, or leave them out: they follow from beam theory.",
         )
@@ -108,7 +108,7 @@ class SoughtModel(Document):
         default=None,
         max_length=len(corrections()),
         description="Aerodynamic corrections that are sought; the others keep their neutral values. "
-        "Left out: those that the training samples can tell, which are all, but `profile_drag` only if one "
+        "Left out: those that the training samples determine, which are all, but `profile_drag` only if one "
         "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad).",
     )
     bounds: Annotated[Bounds | None, Option("--bounds", MODEL)] = Field(
@@ -255,7 +255,7 @@ def total_rows_faults(total: int) -> Iterator[Fault]:
     if total > MAX_TOTAL_ROWS:
         yield Fault(
             "too_many_rows",
-            f"The samples have {total} rows together.",
+            f"The samples have {total} rows in total.",
             "/samples",
             f"At most {MAX_TOTAL_ROWS}: 10 ms between rows are enough.",
         )
@@ -339,7 +339,7 @@ class CostEstimate(BaseModel):
 
     samples: int
     rows: int
-    parameters: int = Field(description="Unknowns of the search, of the largest model in a study.")
+    parameters: int = Field(description="Free parameters, of the largest model in a study.")
     flights: int = Field(description="Flights to be flown: parameter sets times samples.")
     flight_s: float = Field(description="Simulated time of all those flights.")
     core_s: float = Field(description="Computing time on one core.")
@@ -428,7 +428,7 @@ class Uncertainty(BaseModel):
         "samples do not bound it within the range of the search. Empty in a partial result.",
     )
     undetermined: list[str] = Field(
-        default=[], description="Parameters that the samples leave open by a factor e or more."
+        default=[], description="Parameters whose standard deviation exceeds a factor of e."
     )
     at_bound: list[str] = Field(default=[], description="Parameters that ended at a bound of the search.")
     correlation: list[list[float]] = Field(description="Of the search coordinates.")
@@ -450,4 +450,4 @@ class IdentifyResult(BaseModel):
     uncertainty: Uncertainty | None = None
     warnings: Warnings = []
     cost: dict[str, Any] | None = None
-    partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")
+    partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

@@ -102,7 +102,7 @@ class Morph(Document):
         elif self.goal != "minimum_time" and self.max_variation_rad2 is not None:
             yield Fault(
                 "not_used",
-                f"The goal {self.goal!r} has no limit of the variation.",
+                f"The goal {self.goal!r} does not use max_variation_rad2.",
                 "/max_variation_rad2",
                 'Leave it out, or use the goal "minimum_time".',
             )
@@ -157,7 +157,7 @@ class Weights(Document):
     def faults(self) -> Iterator[Fault]:
         """Check that an angle counts."""
         if self.phi == self.theta == self.psi == 0.0:
-            yield Fault("weights_all_zero", "No angle counts.", hint="Give one of them a weight.")
+            yield Fault("weights_all_zero", "All weights are zero.", hint="Give one of them a weight.")
 
 
 def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
@@ -280,7 +280,7 @@ class OptimizeRequest(Request):
         if morph.duration_s <= least_s:
             yield Fault(
                 "morph_too_short",
-                f"No motion within the limits takes {morph.duration_s:g} s or less.",
+                f"Within the limits the motion takes more than {morph.duration_s:g} s.",
                 "/morph/duration_s",
                 f"Give more than {least_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
             )
@@ -290,7 +290,7 @@ class OptimizeRequest(Request):
 class ScheduleCost(BaseModel):
     """What an optimisation would take, to an order of magnitude."""
 
-    parameters: int = Field(description="Unknowns of the search.")
+    parameters: int = Field(description="Free parameters.")
     flights: int = Field(description="Flights to be flown in the search, of the rigid model too.")
     flight_s: float = Field(description="Simulated time of all those flights.")
     core_s: float = Field(description="Computing time on one core, the flexible model's flights included.")
@@ -330,7 +330,7 @@ class Variations(BaseModel):
     model_config = ConfigDict(extra="allow")
 
     constant: Variation = Field(description="At constant rate.")
-    rigid_optimum: Variation = Field(description="Sought with the rigid model.")
+    rigid_optimum: Variation = Field(description="Optimised with the rigid model.")
     optimum: Variation = Field(description="Sought with the equivalent model.")
 
 
@@ -350,4 +350,4 @@ class OptimizeResult(BaseModel):
     )
     search: dict[str, Any]
     warnings: Warnings = []
-    partial: bool = Field(default=False, description="The best so far of a job that did not run to its end.")
+    partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

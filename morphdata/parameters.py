@@ -84,7 +84,7 @@ OwnOrMirrored = Annotated[
 
 
 class Parameters(Document):
-    """The `model` of an identification's result, as it stands there."""
+    """The `model` of an identification's result, unchanged."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_PARAMETERS]})
 
@@ -155,9 +155,9 @@ def _structure_faults(own: Parameters | SurfaceParameters, links: int) -> Iterat
             wanted = " x ".join(str(number) for number in (shape if len(rows) > 1 else shape[1:]))
             yield Fault(
                 "wrong_shape",
-                f"{name} does not hold {wanted} numbers, as {links} links per wing ask.",
+                f"{name} must have {wanted} numbers for {links} links per wing.",
                 f"/{name}",
-                "Give the model of an identification's result as it stands there.",
+                "Give the model of an identification's result unchanged.",
             )
     for shares in rows:
         if abs(sum(shares) - 1.0) > SUM_TOLERANCE:

@@ -26,7 +26,7 @@ HINTS = {
     "model_type": "Give an object.",
     "model_attributes_type": "Give a JSON object.",
     "bool_type": "Give true or false.",
-    "string_type": "Give a text.",
+    "string_type": "Use a string.",
     "string_pattern_mismatch": "Use letters, digits, . - and _, starting with a letter or digit.",
     "too_short": "Give more items.",
     "too_long": "Give fewer items: leave out rows (10 ms steps are enough) or split the flight.",
@@ -130,7 +130,7 @@ def _hint(kind: str, context: Mapping[str, Any]) -> str:
         tags = context.get("expected_tags")
         return f"Give {context.get('discriminator', 'a kind')}: {tags or 'one of the documented kinds'}."
     if kind == "literal_error":
-        return f"Use {context.get('expected', 'one of the documented words')}."
+        return f"Use {context.get('expected', 'one of the documented values')}."
     return HINTS.get(kind, "See the documentation of this field at /docs.")
 
 
@@ -141,7 +141,7 @@ def _unknown_hint(location: Sequence[str | int], model: type[BaseModel]) -> str:
     if near := difflib.get_close_matches(name, here, n=1):
         return f"Did you mean {near[0]!r}? Otherwise leave it out."
     if name in within:
-        return "It belongs to another object. Leave it out here."
+        return "This field belongs to another object; remove it here."
     if near := difflib.get_close_matches(name, within, n=1):
         return f"Did you mean {near[0]!r}, which belongs to another object? Otherwise leave it out."
     return f"Leave it out. Known fields: {', '.join(here)}."

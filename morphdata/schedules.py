@@ -79,7 +79,7 @@ class ConstantRate(Document):
         elif self.morph_s == 0.0:
             yield Fault(
                 "nothing_to_morph",
-                "At a rate from an angle to the same angle there is no time in which to move.",
+                "rate_rad_s needs two different angles.",
                 "/final_rad",
                 'Give another final_rad, or {"kind": "hold"}.',
             )
@@ -172,7 +172,7 @@ class Schedules(Document):
         if self.both is not None and (self.left is not None or self.right is not None):
             yield Fault(
                 "given_twice",
-                "Both sides have a schedule together, and one has its own.",
+                "`both` and a schedule for one side are given.",
                 "/both",
                 "Give both, or left and right.",
             )
@@ -194,7 +194,7 @@ class Schedules(Document):
             if side in hinges and self.of_side(side) is None:
                 yield Fault(
                     "missing",
-                    f"Nothing tells what the {side} hinges do.",
+                    f"There is no schedule for the {side} hinges.",
                     f"/{side}",
                     'Add it ({"kind": "hold"} keeps them still), or give both sides one schedule as both.',
                 )
@@ -243,7 +243,7 @@ def load_schedules(path: str | Path) -> Schedules:
     for row, (before, after) in enumerate(pairwise(times), start=1):
         if after <= before:
             raise InvalidInput(
-                f"{place_in(path, table, row)}: time does not rise",
+                f"{place_in(path, table, row)}: time does not increase",
                 hint="sort the rows by time and drop repeated ones",
             )
     return Schedules.parse(

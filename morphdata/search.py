@@ -21,7 +21,7 @@ class WarmStart(Document):
 
     job_id: Identifier | None = Field(
         default=None,
-        description="An identification or a study of yours; the best so far of one that did not end will do.",
+        description="An identification or a study of yours; the best result so far is accepted, too.",
         examples=["job_01k0c3v9fh8x2m4n6p8q0r2s4t"],
     )
     model_id: Identifier | None = Field(
@@ -40,7 +40,7 @@ class WarmStart(Document):
         if len(given) != 1:
             yield Fault(
                 "given_twice" if given else "missing",
-                f"{' and '.join(given) or 'Nothing'} is given to begin from.",
+                f"{' and '.join(given) or 'Nothing'} is given to start from; the search needs exactly one.",
                 hint=f"Give one of {', '.join(ways)}.",
             )
 
@@ -49,10 +49,10 @@ class SwarmSearch(Document):
     """Method, swarm, seed and time budget; how large the swarm may be is each search's own."""
 
     c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to a particle's best."
+        default=None, description="Weight of a particle's own best position (c1)."
     )
     c2: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
-        default=None, description="Pull to the swarm's best."
+        default=None, description="Weight of the swarm's best position (c2)."
     )
     inertia: Annotated[float, Field(ge=0.0, le=1.5)] | None = None
     seed: Annotated[int, Option("--seed", SEARCH)] = Field(

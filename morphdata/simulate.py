@@ -124,7 +124,7 @@ class SimulateRequest(Request):
                 "too_much_work",
                 f"The flight takes {self.steps} time steps of the {self.model.kind} model.",
                 "/duration_s",
-                f"At most {MAX_STEPS[self.model.kind]}: fly shorter, or choose a longer model.step_s.",
+                f"At most {MAX_STEPS[self.model.kind]}: reduce duration_s, or choose a longer model.step_s.",
             )
         if self.model.kind != "rigid":
             yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
@@ -136,7 +136,9 @@ class FlightCost(BaseModel):
     """What a simulation would take, to an order of magnitude."""
 
     rows: int = Field(description="Of the trajectory.")
-    steps: int = Field(description="Time steps: of 10 ms where they are chosen, which may become a quarter.")
+    steps: int = Field(
+        description="Number of time steps, of 10 ms if the step is chosen automatically (it may be less)."
+    )
     flight_s: float = Field(description="Simulated time.")
     core_s: float = Field(description="Computing time on one core.")
 

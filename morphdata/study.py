@@ -84,7 +84,7 @@ class Recommendation(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
-    links_per_wing: int | None = Field(description="null when no model flew.")
+    links_per_wing: int | None = Field(description="null if no model could be flown")
     reason: str
 
 

@@ -23,5 +23,5 @@ class ResultWarning(BaseModel):
 
 
 Warnings = Annotated[
-    list[ResultWarning], Field(description="What the method does not answer for; empty if nothing.")
+    list[ResultWarning], Field(description="Reasons to doubt the result; empty if there are none.")
 ]

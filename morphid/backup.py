@@ -126,13 +126,13 @@ def inspected(file: Path) -> Backup:
             told = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
             if told != ["ok"]:
                 raise CommandError(
-                    f"{file} is damaged: {told[0]}", code=Exit.INVALID_INPUT, hint="take another copy"
+                    f"{file} is damaged: {told[0]}", code=Exit.INVALID_INPUT, hint="use another backup"
                 )
             revision = str(link.execute("SELECT version_num FROM alembic_version").fetchone()[0])
             jobs = int(link.execute("SELECT count(*) FROM jobs").fetchone()[0])
     except (sqlite3.DatabaseError, TypeError) as error:
         raise CommandError(
-            f"{file} is no database of MorphID: {error}", code=Exit.INVALID_INPUT, hint="take another copy"
+            f"{file} is not a MorphID database: {error}", code=Exit.INVALID_INPUT, hint="use another backup"
         ) from None
     if revision > HEAD:
         raise CommandError(
@@ -168,7 +168,7 @@ def _nobody_serves(target: Path) -> Iterator[None]:
     busy = CommandError(
         f"a service uses {target}",
         code=Exit.ENVIRONMENT,
-        hint="end it first: a running service must not lose its file",
+        hint="stop it first: a running service must not lose its file",
     )
     with open_private(target.parent / LOCK_NAME, "a") as lock:
         try:
@@ -204,5 +204,5 @@ def _sentences(path: Path) -> Iterator[None]:
         yield
     except (OSError, sqlite3.OperationalError) as error:
         raise CommandError(
-            f"{path}: {error}", code=Exit.ENVIRONMENT, hint="is there room, and may you read and write here?"
+            f"{path}: {error}", code=Exit.ENVIRONMENT, hint="check free space and permissions"
         ) from None

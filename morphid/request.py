@@ -94,7 +94,7 @@ def changed(document: Document, changes: Iterable[str]) -> Document:
         pointer, equals, text = change.partition("=")
         if not pointer.startswith("/") or not equals:
             raise CommandError(
-                f"--set {change}: this is no POINTER=VALUE", code=Exit.USAGE, hint="--set /search/seed=2"
+                f"--set {change}: not of the form POINTER=VALUE", code=Exit.USAGE, hint="--set /search/seed=2"
             )
         try:
             value = json.loads(text)

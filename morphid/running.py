@@ -166,7 +166,7 @@ def hand_over(
     """
     if answer.result is not None:
         if answer.result.get("partial"):
-            stderr().print("ended before its end: this is the best so far")
+            stderr().print("stopped early: this is the best result so far")
         if json_out == STANDARD_OUTPUT:
             print_json(answer.result)
         else:

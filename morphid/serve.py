@@ -169,7 +169,7 @@ def _own_data_dir(home: Path) -> Iterator[None]:
             raise CommandError(
                 f"another `morphid serve` uses the data directory {home}",
                 code=Exit.ENVIRONMENT,
-                hint="end it first, or choose another: morphid serve --data-dir DIR",
+                hint="stop it first, or choose another: morphid serve --data-dir DIR",
             ) from None
         yield
 
@@ -184,7 +184,7 @@ def _close_to_others(home: Path) -> None:
     if not home.stat().st_mode & OTHERS:
         return
     if (not names or LOCK_NAME in names) and close_to_others(home):
-        said = f"the data directory {home} was open to other users; it is yours alone now"
+        said = f"the data directory {home} was open to other users; access is now restricted to you"
     else:
         said = f"other users may list {home}, not read what MorphID writes there; chmod 700 closes it"
     stderr().print(f"morphid: {said}", markup=False, soft_wrap=True)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
@@ -65,7 +68,18 @@ def compile_before(
         return
     if cache is not None and cache.get(REMEMBERED, None) == fingerprint():
         return
-    say("compiling kernels (a minute or two, once; before the tests and outside their time limits)")
-    compiling()
-    if cache is not None:
-        cache.set(REMEMBERED, fingerprint())
+    with _alone():
+        if cache is not None and cache.get(REMEMBERED, None) == fingerprint():
+            return  # another process has done it meanwhile
+        say("compiling kernels (a minute, once; before the tests and outside their time limits)")
+        compiling()
+        if cache is not None:
+            cache.set(REMEMBERED, fingerprint())
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Wait for other processes of this run: one compiles for all."""
+    with (Path(tempfile.gettempdir()) / f"compiling-{fingerprint()[:16]}.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -171,7 +171,7 @@ class Attempt:
         if self._kernels.ready:
             return True
         if self._checkpoint is None:  # what has come further shows how far
-            message = "making the numeric kernels ready (a minute or two at the first start on a machine)"
+            message = "compiling the numeric kernels (a minute or two at the first start on a machine)"
             self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
         return self._kernels.wait(self._keeper.should_stop)
 
@@ -228,7 +228,7 @@ class Attempt:
             return self._end(JobStatus.CANCELLED)
         if reason is StopReason.DEADLINE:
             hint = (
-                "raise search.max_seconds, or ask for less: fewer particles, generations or links, "
+                "raise search.max_seconds, or reduce the request: fewer particles, generations or links, "
                 "a shorter flight"
             )
             error = _error("deadline_exceeded", "the job did not end before its deadline", hint=hint)
@@ -255,7 +255,7 @@ class Attempt:
             try:
                 return self._finish(status, outcome=outcome, error=error)
             except StorageFull:
-                log.warning("job %s: no room for what it leaves", self._claim.job_id)
+                log.warning("job %s: no space for its artifacts", self._claim.job_id)
         return self._finish(status, error=error, even_if_full=True)
 
     def _best_so_far(self) -> Outcome | None:
@@ -304,7 +304,7 @@ def error_document(error: Exception, job_id: str) -> Document:
         return _error("unknown_operation", str(error), hint="update the workers")
     log.error("job %s: unforeseen", job_id, exc_info=error)
     hint = f"the worker's log tells more about {job_id}; please report it"
-    return _error("internal_error", "the worker met an unforeseen error", hint=hint)
+    return _error("internal_error", "unexpected error in the worker", hint=hint)
 
 
 def _error(code: str, detail: str, *, hint: str = "", pointer: str = "") -> Document:

@@ -78,7 +78,7 @@ class ChunkFlight:
             raise WorkInterrupted
         work, _ = self._cache.prepared(self._chunk, self._store, find_operation, self._kernels.threads)
         if not isinstance(work, SpreadWork):
-            raise TypeError(f"operation {self._chunk.operation!r} cannot be spread")
+            raise TypeError(f"operation {self._chunk.operation!r} cannot be distributed")
         return work.fly(self._chunk.task, self._keeper.should_stop)
 
     def _stopped(self) -> Ending:

@@ -84,7 +84,7 @@ def _unless_away() -> Iterator[None]:
         trouble = trouble_of(error)
         if trouble is None:
             raise
-        log.warning("the job store is %s; the reaper will come back to it", trouble.value)
+        log.warning("the job store is %s; the reaper will retry", trouble.value)
 
 
 def publish(job_id: str) -> bool:

@@ -42,7 +42,7 @@ async def livez() -> Liveness:
     responses={**documented(InvalidRequest), 503: {"model": Readiness, "description": "Not ready."}},
 )
 async def readyz(health: HealthDep, response: Response, *, strict: Strict = False) -> Readiness:
-    """Tell whether database, broker and workers do their part.
+    """Report whether database, broker and workers are available.
 
     A load balancer asks without `strict`: while broker or workers are away this process still takes jobs and
     keeps them. Who watches over the whole service asks with it.

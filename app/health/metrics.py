@@ -30,7 +30,7 @@ COUNTERS = {  # by the name of their rows
         "Malformed wake-up messages that workers have dropped.",
         (),
     ),
-    job_counts.REAP_ROUNDS: ("morphid_reap_rounds", "Rounds of the reaper: one that stays away is bad.", ()),
+    job_counts.REAP_ROUNDS: ("morphid_reap_rounds", "Rounds of the reaper; the count must keep rising.", ()),
     job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that were asked to end.", ()),
 }
 HISTOGRAMS = {
@@ -82,7 +82,7 @@ class _Rows(Collector):
         yield GaugeMetricFamily(
             "morphid_flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s
         )
-        yield _gauge("morphid_chunks", "Chunks of jobs that are spread.", "status", seen.chunks.items())
+        yield _gauge("morphid_chunks", "Chunks of distributed jobs.", "status", seen.chunks.items())
         yield GaugeMetricFamily(
             "morphid_webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting
         )

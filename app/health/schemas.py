@@ -21,7 +21,7 @@ class WorkerState(BaseModel):
         description="`stalled`: there are workers, and none of them takes jobs; `unknown`: no database."
     )
     alive: int = Field(description="Workers that take jobs.")
-    stalled: int = Field(description="Workers that have ceased to, and have not ended.")
+    stalled: int = Field(description="Workers that no longer accept jobs but have not exited.")
     slots: int = Field(description="Jobs that can run at once.")
     busy: int = Field(description="Slots in use.")
 

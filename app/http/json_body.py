@@ -38,7 +38,7 @@ def media_type(request: Request) -> str:
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     if coding not in ("identity", ""):
         raise UnsupportedMediaType(
-            f"The body is announced as compressed ({coding[:40]!r}).",
+            f"The Content-Encoding of the body is {coding[:40]!r}.",
             "#header/Content-Encoding",
             "Send it as it is, without Content-Encoding.",
         )
@@ -112,7 +112,7 @@ class JsonRoute(APIRoute):
                 replay.empty = False
             elif kind or await _has_body(request):
                 raise UnsupportedMediaType(
-                    f"The body is announced as {kind or 'nothing'!r}.",
+                    f"The Content-Type of the body is {kind or 'nothing'!r}.",
                     "#header/Content-Type",
                     "Send JSON with Content-Type: application/json.",
                 )

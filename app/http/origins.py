@@ -56,17 +56,17 @@ def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
     if boundary.loopback_only and not _came_over_loopback(scope):
         return WrongHost(
             "The service was started for its own machine only.",
-            hint="Set MORPHID_HOST to the address that it listens on; it then demands API keys.",
+            hint="Set MORPHID_HOST to the address that it listens on; API keys are then required.",
         )
     if boundary.hosts is not None and not _answers_for(headers.get("host", ""), boundary.hosts):
         return WrongHost(
-            "The service does not go by the name in the Host header.",
+            "The Host header is not a name of this service.",
             "#header/Host",
             "Use its address, or add the name to MORPHID_ALLOWED_HOSTS.",
         )
     if _from_another_site(scope, headers):
         return CrossSiteRequest(
-            "A page of another site made the browser send this.",
+            "The request comes from a web page of another site.",
             "#header/Origin",
             "Open the service's own page, or call the API from a program.",
         )

@@ -145,5 +145,5 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     async def _unforeseen(request: Request, error: Exception) -> Response:
         logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
-        hint = "It is not your fault; the service's log tells more."
-        return problem_response(ServiceError("An unforeseen error.", hint=hint), request)
+        hint = "This is a fault of the service; its log has details."
+        return problem_response(ServiceError("An unexpected error.", hint=hint), request)

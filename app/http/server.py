@@ -82,10 +82,10 @@ LONG_ADDRESS = HttpError(
     414,
     "address_too_long",
     "The address of the request is too long",
-    f"Send at most {MAX_HEADER_BYTES // 1024} KiB; what is long belongs into the body.",
+    f"Send at most {MAX_HEADER_BYTES // 1024} KiB; send long data in the body.",
 )
 BAD_REQUEST = HttpError(
-    400, "bad_request", "This is not an HTTP request", "Escape the address, and send what HTTP/1.1 says."
+    400, "bad_request", "This is not an HTTP request", "Escape the URL and send a valid HTTP/1.1 request."
 )
 
 
@@ -255,7 +255,7 @@ class GuardedProtocol(H11Protocol):
     def _look_at_reader(self) -> None:
         unread = self.transport.get_write_buffer_size()
         if self._unread - unread < MIN_READ_RATE * self.limits.write_s:
-            logger.info("a client that does not read was hung up on")
+            logger.info("disconnected a client that does not read its response")
             self.transport.abort()
             return
         self._unread = unread

@@ -74,7 +74,7 @@ def _fail(session: Session, row: Row[*tuple[Any, ...]]) -> bool:
     error: Document = {
         "code": "worker_lost",
         "detail": f"The worker died or stalled in each of {row.attempt} attempts at a part of a generation.",
-        "hint": "A search that does not fit in memory does this: fewer particles, or see its log.",
+        "hint": "This happens if a search runs out of memory: use fewer particles, or see its log.",
     }
     return _end(session, row.job_id, row.job_fence, JobStatus.FAILED, {"error": error})
 

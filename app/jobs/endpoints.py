@@ -83,8 +83,10 @@ def _wanted(
     status: Annotated[list[JobStatus] | None, Query(description="Any of these; repeatable.")] = None,
     operation: Annotated[OperationName | None, Query()] = None,
     label: Annotated[Label | None, Query(description="The `execution.label` of the request.")] = None,
-    created_after: Annotated[AwareDatetime | None, Query(description="From this moment on.")] = None,
-    created_before: Annotated[AwareDatetime | None, Query(description="Before this moment.")] = None,
+    created_after: Annotated[
+        AwareDatetime | None, Query(description="Created at or after this time.")
+    ] = None,
+    created_before: Annotated[AwareDatetime | None, Query(description="Created before this time.")] = None,
 ) -> JobFilter:
     return JobFilter(tuple(status or ()), operation, label, created_after, created_before)
 
@@ -117,7 +119,7 @@ def list_jobs(
     "/jobs/{job_id}",
     dependencies=[demands(Scope.JOBS_READ)],
     operation_id="get_job",
-    summary="Look at a job",
+    summary="Get a job",
     response_model=Job,
     responses=documented(InvalidRequest, JobNotFound, TooManyStreams),
 )
@@ -194,7 +196,7 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
     responses={200: REQUEST, **documented(InvalidRequest, JobNotFound)},
 )
 def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
-    """Return what was asked for, whole: to look at it, or to post it again to the job's operation.
+    """Return the complete request: to look at it, or to post it again to the job's operation.
 
     Uploaded flights and identified models stand in it with their content, as they were when the job was
     posted, and so do the defaults. So the same job comes of it even where they were deleted since.

@@ -129,7 +129,7 @@ def _verdict(row: Row[Any]) -> tuple[str, Document]:
         error = {
             "code": "worker_lost",
             "detail": f"The worker died or stalled in each of {row.attempt} attempts.",
-            "hint": "A search that does not fit in memory does this: fewer particles, or see its log.",
+            "hint": "This happens if a search runs out of memory: use fewer particles, or see its log.",
         }
         return "failed", {**end, "status": JobStatus.FAILED.value, "error": error}
     return "requeued", {"status": JobStatus.QUEUED.value, "published_at": database_time()}

@@ -78,7 +78,7 @@ class RequestSummary(BaseModel):
 class QueuePlace(BaseModel):
     """Where a queued job stands; owners take turns, so another's long queue is not in the way."""
 
-    position: int = Field(description="1 for the job whose turn is next, if nobody posts anything.")
+    position: int = Field(description="Place in the queue, 1 is next, assuming no further jobs are posted.")
     eta_s: float | None = Field(
         description="Until it begins, from what jobs took lately and the workers there are; null while "
         "nothing is known."
@@ -115,14 +115,12 @@ class Job(BaseModel):
     id: str = Field(examples=[EXAMPLE_ID])
     operation: str = Field(examples=["identify"])
     status: JobStatus = Field(
-        description="`succeeded`, `failed`, `cancelled` and `expired` are final; `cancelling` winds down."
+        description="`succeeded`, `failed`, `cancelled`, `expired` are final; `cancelling` is about to end."
     )
     progress: Progress | None
     error: JobError | None
     partial: bool = Field(description="The result is the best so far of a job that did not run to its end.")
-    attempt: int = Field(
-        description="How often a worker took the job up; more than one after a worker was lost."
-    )
+    attempt: int = Field(description="Number of attempts; more than one after a worker was lost.")
     max_attempts: int
     priority: int
     label: str | None
@@ -198,7 +196,7 @@ class JobEventPage(BaseModel):
 
     events: list[JobEvent]
     last_seq: int = Field(description="Pass as `after` to go on from here.")
-    finished: bool = Field(description="There will be no more events after these.")
+    finished: bool = Field(description="No more events will follow.")
 
 
 class Artifact(BaseModel):

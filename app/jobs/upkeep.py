@@ -86,7 +86,7 @@ class Upkeep:
                     forget_in_s = 0.0 if more else FORGET_EVERY_S
                 self.tidy_disk()
             except SQLAlchemyError as error:
-                log.warning("no upkeep this time, the database does not answer: %s", error)
+                log.warning("maintenance skipped, the database does not answer: %s", error)
 
     def tidy_disk(self) -> None:
         """Keep the reserve whole, and give back what deleted rows have left."""

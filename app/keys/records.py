@@ -26,7 +26,7 @@ SCOPE_MEANINGS = {
     Scope.JOBS_WRITE: "start, cancel and delete jobs; validate requests",
     Scope.DATA_READ: "read uploaded flights and identified models",
     Scope.DATA_WRITE: "upload flights; delete flights and identified models",
-    Scope.WEBHOOKS: "make, look at and remove webhooks",
+    Scope.WEBHOOKS: "create, read, test and delete webhooks",
     Scope.METRICS: "read the metrics of the whole service",
 }
 

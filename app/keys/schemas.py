@@ -47,5 +47,5 @@ class Me(BaseModel):
 
     owner: str = Field(description="Keys of one owner see the same things.", examples=["aeroelastics"])
     scopes: list[Scope]
-    key: KeyAbout | None = Field(description="Null where the service demands no keys.")
-    quotas: Quotas | None = Field(description="Null where the service demands no keys.")
+    key: KeyAbout | None = Field(description="Null if the service requires no keys.")
+    quotas: Quotas | None = Field(description="Null if the service requires no keys.")

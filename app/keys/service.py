@@ -58,7 +58,7 @@ def create_key(
     if not name.strip() or len(name) > NAME_LENGTH or not name.isprintable():
         raise KeyRefused(f"the name {name!r} is not 1 to {NAME_LENGTH} printable characters")
     if not scopes:
-        raise KeyRefused("a key without a scope opens nothing")
+        raise KeyRefused("a key needs at least one scope")
     text = KeyText.new()
     key = repository.insert_key(
         session, text, owner=owner, name=name, scopes=scopes, quota=quota, expires_at=expires_at

@@ -37,7 +37,7 @@ def pack(value: Any) -> bytes:
     arrays: list[tuple[bytes, bytes]] = []
     text = json.dumps(_skeleton(value, arrays), separators=(",", ":")).encode()
     if len(text) > MAX_TEXT_BYTES:
-        raise BadFrame(f"{len(text)} bytes that are no numbers")
+        raise BadFrame(f"{len(text)} bytes are not a whole number of values")
     parts = [HEAD.pack(MAGIC, len(text), len(arrays)), text]
     for code, data in arrays:
         parts += [ARRAY.pack(code, len(data)), data]

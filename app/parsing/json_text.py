@@ -86,7 +86,7 @@ def _refuse_unstorable(document: Any) -> None:
         texts = [value] if isinstance(value, str) else list(value) if isinstance(value, dict) else []
         if any(UNSTORABLE.search(text) for text in texts):
             raise MalformedBody(
-                "A text holds the character zero or half of a surrogate pair.",
+                "A string contains a null character or an unpaired surrogate.",
                 pointer,
                 "Leave it out; write characters beyond U+FFFF as they are or as a whole pair.",
             )

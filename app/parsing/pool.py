@@ -171,7 +171,7 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
 
 
 def _drained(pipe: Any, deadline: float) -> bytes:
-    """What comes out of a pipe; BadFrame when it is too much, TimeoutError when it takes too long."""
+    """What comes out of a pipe; BadFrame when it is too much, TimeoutError when reading it takes too long."""
     found = bytearray()
     ready = select.poll()
     ready.register(pipe, select.POLLIN | select.POLLHUP)
@@ -184,7 +184,7 @@ def _drained(pipe: Any, deadline: float) -> bytes:
             return bytes(found)
         found += piece
         if len(found) > MAX_ANSWER_BYTES:
-            raise BadFrame("too long an answer")
+            raise BadFrame("the reader's output is too large")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -196,8 +196,8 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _reason(error: Exception, exit_code: int | None) -> str:
     if isinstance(error, BadFrame) and exit_code not in (-signal.SIGXCPU, -signal.SIGKILL):
-        return "its reader broke off"
-    return "it takes too long"
+        return "its reader process crashed"
+    return "reading it takes too long"
 
 
 def _environment() -> dict[str, str]:

@@ -23,7 +23,7 @@ class QuotaUse(BaseModel):
     name: str = Field(examples=["jobs_in_flight"])
     limit: int
     used: int
-    asked: int = Field(description="What the request wants on top.")
+    asked: int = Field(description="Additional use by this request.")
 
 
 class Problem(BaseModel):

@@ -85,7 +85,7 @@ async def upload_trajectory(
         upload = TrajectoryUpload.parse(await json_document(request))
     else:
         raise UnsupportedMediaType(
-            f"The body is announced as {kind[:60] or 'nothing'!r}.",
+            f"The Content-Type of the body is {kind[:60] or 'nothing'!r}.",
             "#header/Content-Type",
             "Send multipart/form-data with a `file` (curl -F file=@flight.csv), or application/json.",
         )

@@ -149,7 +149,7 @@ class AddressPolicy:
     resolve : callable
         ``(host, port) -> addresses``; raises OSError for a name that is not known.
     dial_only : frozenset of str
-        ``host`` or ``host:port``, as a URL names them: no other is looked up or connected to. Empty: any.
+        ``host`` or ``host:port``, as a URL names them: no other host is contacted. Empty: any.
     """
 
     allow_private: bool = False
@@ -188,7 +188,7 @@ class AddressPolicy:
         name = f"[{host}]" if ":" in host else host
         if self.dial_only and not self.dial_only & {name, f"{name}:{port}"}:
             raise AddressRefused(
-                "This service sends webhooks to chosen hosts alone, and this is none of them.",
+                "This service sends webhooks only to certain hosts, and this is not one of them.",
                 "Ask the operator to name the host in MORPHID_WEBHOOK_DIAL_ONLY.",
             )
 

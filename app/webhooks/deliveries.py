@@ -29,9 +29,9 @@ from app.webhooks.retries import MAX_TRIES, next_delay_s
 Clock = Callable[[], ColumnElement[float]]  # an SQL expression: the database's time unless a test says other
 
 LEASE_S = 60.0  # far beyond the patience with one receiver and one commit
-GONE_REASON = "The receiver answered 410 Gone: it wants no more messages."
+GONE_REASON = "The receiver answered 410 Gone: it refuses further messages."
 DISABLED = "The webhook was disabled."
-NEVER_SETTLED = "Every sender ended before it knew what became of its try."
+NEVER_SETTLED = "Every sender stopped before the outcome of its try was known."
 MAX_CLAIMS = MAX_TRIES + 5  # more: senders die over this delivery
 MAX_ERROR = 300
 

@@ -45,7 +45,7 @@ WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
 @router.post(
     "/webhooks",
     operation_id="create_webhook",
-    summary="Be told when jobs end",
+    summary="Create a webhook",
     status_code=201,
     responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, TooManyWebhooks),
 )
@@ -120,7 +120,7 @@ def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) ->
     responses=documented(InvalidRequest, WebhookNotFound, WebhookDisabled, WebhookPending),
 )
 def test_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Delivery:
-    """Send a `webhook.test` message within a few seconds; see the deliveries for what became of it."""
+    """Send a `webhook.test` message within a few seconds; see its outcome in the deliveries."""
     with app.database.write() as session:
         return service.test(session, owner, webhook_id)
 
@@ -138,7 +138,7 @@ def list_webhook_deliveries(
     cursor: CursorQuery = None,
     limit: LimitQuery = 50,
 ) -> DeliveryPage:
-    """Messages with the fate of their last try, newest first."""
+    """Messages with the outcome of their last try, newest first."""
     with app.database.read() as session:
         return repository.list_deliveries(session, owner, webhook_id, cursor=cursor, limit=limit)
 
@@ -163,7 +163,7 @@ def job_ended(message: Message) -> None:
 @messages.post(
     "webhook_challenge",
     operation_id="webhook_challenge",
-    summary="Do you want these messages?",
+    summary="Challenge",
     responses={
         200: {"description": "The challenge as it came: the webhook is enabled."},
         "default": {"description": "Not answered: it is sent again. 410 disables the webhook."},

@@ -211,8 +211,8 @@ def _why(failure: Exception) -> str:
         chain = chain.__cause__ or chain.__context__
     sentences: tuple[tuple[tuple[type[Exception], ...], str], ...] = (
         ((TimeoutError, httpx.TimeoutException), "There was no answer in time."),
-        ((httpx.ConnectError,), "No (secure) connection came about."),
-        ((httpx.HTTPError,), "The exchange broke off."),
+        ((httpx.ConnectError,), "No (secure) connection could be made."),
+        ((httpx.HTTPError,), "The connection broke."),
         ((OSError,), "The name is not known."),
     )
     return next(

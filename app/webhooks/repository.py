@@ -17,7 +17,7 @@ from app.webhooks.deliveries import give_up_waiting, lock_waiting
 from app.webhooks.outbox import WAITING
 from app.webhooks.schemas import Delivery, DeliveryPage, Webhook, WebhookStatus
 
-REOPENED = "A new challenge took its place."
+REOPENED = "Replaced by a new challenge."
 
 COLUMNS = (
     webhooks.c.id,

@@ -31,7 +31,7 @@ class WebhookRequest(Document):
         "try. Port 443, or 1024 and above."
     )
     events: Annotated[list[JobEvent], Field(min_length=1, max_length=4)] = Field(
-        default=EVERY_EVENT, description="Each once; every end when left out."
+        default=EVERY_EVENT, description="No duplicates; default: all."
     )
 
     @field_validator("events")
@@ -52,7 +52,9 @@ class Webhook(BaseModel):
     )
     enabled: bool = Field(description="Whether `status` is `enabled`.")
     disabled_at: datetime | None
-    disabled_reason: str | None = Field(description="Why nothing is sent any more; enable it when mended.")
+    disabled_reason: str | None = Field(
+        description="Why the webhook is disabled; enable it after the receiver is repaired."
+    )
     failures: int = Field(description="Tries that failed since the last success.")
     created_at: datetime
 

@@ -177,7 +177,7 @@ def prandtl_glauert(mach: float) -> float:
         raise UnsupportedRegime(
             f"Mach {mach:.2f} is outside 0..{MACH_LIMIT}, where linear compressibility holds",
             pointer="/flight/mach",
-            hint="lower the airspeed, or leave mach out for incompressible flow",
+            hint="lower the airspeed, or omit mach for incompressible flow",
         )
     return float(np.sqrt(1.0 - mach**2))
 

@@ -151,7 +151,7 @@ def convergence_figure(document: Document) -> Figure:
     ]
     cost = [float(row["best_cost"]) for row in history]
     axes.set_xlabel("flights flown" if by_flights else "generation")
-    axes.set_ylabel("least cost J so far, rad²")
+    axes.set_ylabel("best J so far, rad²")
     light_grid(axes)
     if not history:
         axes.text(0.5, 0.5, "no generation was finished", transform=axes.transAxes, ha="center", fontsize=9)

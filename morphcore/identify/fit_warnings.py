@@ -48,7 +48,7 @@ def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: Equivale
     elif all(fit.ending("rigid") for fit in lost):
         pointer = "/aircraft"
         hint = (
-            "the rigid aircraft does not fly them either: check masses, positions and hinges of the "
+            "the rigid aircraft cannot fly them either: check masses, positions and hinges of the "
             "aircraft, and the flight condition"
         )
     elif settings.bounds is not None and settings.bounds.given():

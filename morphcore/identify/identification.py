@@ -76,7 +76,7 @@ class Identification:
             require_flight(sample, f"/samples/{number}")
         if self.settings.start == "given" and flight.start is None:
             raise InvalidInput(
-                "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
+                "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         free: Sequence[str] | None = self.settings.aero_coefficients
@@ -159,7 +159,7 @@ class Identification:
 
     def judged(self, checkpoint: bytes) -> IdentifyResult:
         """The same whether its model flies or not; one that does not has no model in its document."""
-        say("judging what was found")
+        say("evaluating the result")
         with one_blas_thread():
             return identify_result(self, self.state(checkpoint))
 

@@ -79,7 +79,7 @@ def _reason(chosen: StudyRow, flown: Sequence[StudyRow], role: Role) -> str:
     if _is_resolved(chosen):
         sentences.append(f"An RMS of {1e3 * RESOLUTION_RAD:g} mrad is all that the integration resolves")
     elif others:
-        sentences.append("A link more has to halve the error at least")
+        sentences.append("An additional link must at least halve the error")
     sentences += _overfitted(chosen, flown)
     return ". ".join(sentence[0].upper() + sentence[1:] for sentence in sentences) + "."
 
@@ -91,7 +91,9 @@ def _compared(label: str, rows: Sequence[StudyRow], chosen: StudyRow, role: Role
     best = min(rows, key=lambda row: _error(row, role))
     own, other = _error(chosen, role), _error(best, role)
     said = f"{label} {_links(best.links_per_wing)}, "
-    said += f"has {_two_digits(other / own)} times the error" if own > 0.0 else "has an error, this one none"
+    said += (
+        f"has {_two_digits(other / own)} times the error" if own > 0.0 else "has an error; this one has none"
+    )
     if chosen.flight_s and best.flight_s:
         said += f" and takes {_two_digits(best.flight_s / chosen.flight_s)} times as long to fly"
     return [said]

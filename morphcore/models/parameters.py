@@ -366,7 +366,7 @@ PROFILE_DRAG = Parameter(
     # the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and
     # a fit would put it where it mends other errors of pitch
     asymmetric=True,
-    at_bound={"lower": "no drag is less than none: the samples may show something that the model lacks"},
+    at_bound={"lower": "drag cannot be negative: the model may lack an effect that the samples show"},
 )
 
 LAG = Parameter(

@@ -65,7 +65,7 @@ class MorphCase:
             )
         if self.start == "given" and flight.start is None:
             raise InvalidInput(
-                "the flight has no start", pointer="/flight/start", hint="add it, or choose start = trim"
+                "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
 
     def space(self, duration_s: float) -> MorphSpace:
@@ -151,9 +151,12 @@ class MorphCase:
         """The error of a search in which no schedule flew to its end."""
         why = soft_joint(*self.chain("equivalent")) or Obstacle(
             "/model/parameters",
-            "the model leaves its domain in every morph that was tried: check its stiffness and damping, or "
-            "identify it anew",
+            "the model leaves its range of validity in every morph that was tried: check its stiffness and "
+            "damping, or "
+            "identify the model again",
         )
         return NotFlyable(
-            "the equivalent model flies no morph to its end", pointer=why.pointer, hint=why.hint
+            "no morph that was tried could be flown to its end with the equivalent model",
+            pointer=why.pointer,
+            hint=why.hint,
         )

@@ -121,7 +121,7 @@ class ScheduleOptimisation(MorphCase):
         ------
         NotFlyable : the equivalent model does not fly the best schedule to its end.
         """
-        say("judging what was found")
+        say("evaluating the result")
         with one_blas_thread():
             found = schedule_result(self, self.search, self.weights, self.state(checkpoint))
         if found.lost:
@@ -272,7 +272,7 @@ class ScheduleOptimisation(MorphCase):
                 hint = f"raise duration_s to about {time_s:g}, or the limit to {rounded_up(least):g} or more"
                 break
         else:
-            hint = f"raise the limit to {rounded_up(least):g} or more; the air alone takes much of it"
+            hint = f"raise the limit to {rounded_up(least):g} or more; the air loads alone require much of it"
         return InvalidInput(
             f"the hinges bear {least:.4g} N m at least in a morph of {found.duration_s:g} s, more than "
             f"max_hinge_torque_nm = {most:g}",

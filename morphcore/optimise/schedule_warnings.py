@@ -40,7 +40,7 @@ def schedule_warnings(
                 ResultWarning(
                     "verification_failed",
                     f"the {name} was not flown in the flexible model: {item.failure}",
-                    "the figures of the rigid and the equivalent model stand without this proof",
+                    "the figures of the rigid and the equivalent model are not verified",
                     "/flexible",
                 )
             )

@@ -154,7 +154,7 @@ def trim_flexible(
     """
     if start == "given" and flight.model.flight.start is None:
         raise InvalidInput(
-            "the start is to be taken as given, but the flight has none",
+            'start = "given", but the flight has no field `start`',
             pointer="/flight/start",
             hint='give alpha_rad, force_b_n and moment_b_n_m, or use start = "trim"',
         )

@@ -77,7 +77,7 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     Raises
     ------
     InvalidInput : the file cannot be read, a column is missing or holds something that is not a finite
-        number, time does not rise, the flight is longer than 600 s, or an angle is no angle in rad.
+        number, time does not increase, the flight is longer than 600 s, or an angle is no angle in rad.
     """
     path = Path(path)
     columns = read_flight(path)

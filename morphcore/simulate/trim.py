@@ -74,7 +74,7 @@ def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: S
     """
     if start == "given" and model.flight.start is None:
         raise InvalidInput(
-            "the start is to be taken as given, but the flight has none",
+            'start = "given", but the flight has no field `start`',
             pointer="/flight/start",
             hint="add start with alpha_rad, force_b_n and moment_b_n_m, or choose start = trim",
         )

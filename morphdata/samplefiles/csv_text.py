@@ -256,7 +256,7 @@ class _Table:
             if factor is None:
                 raise FileFault(
                     "unknown_unit",
-                    f"the unit of {shown(column.title)} is {shown(cell)!r}, which is not read",
+                    f"the unit {shown(cell)!r} of {shown(column.title)} is not supported",
                     known_units(name),
                     line=line,
                     title=column.title,
@@ -264,7 +264,7 @@ class _Table:
             if column.factor not in (None, factor):
                 raise FileFault(
                     "two_units",
-                    f"{shown(column.title)} has another unit in the line below, {shown(cell)!r}",
+                    f"the row of units gives another unit for {shown(column.title)}: {shown(cell)!r}",
                     "say the unit once",
                     line=line,
                     title=column.title,

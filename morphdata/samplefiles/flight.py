@@ -85,7 +85,7 @@ def _time_faults(times: Sequence[float]) -> Iterator[FileFault]:
         if after - before < SHORTEST_STEP_S:
             yield FileFault(
                 "time_not_rising",
-                f"time does not rise at row {row}: it goes from {before:g} s to {after:g} s",
+                f"time does not increase at row {row}: it goes from {before:g} s to {after:g} s",
                 f"sort the rows by time and drop repeated ones; steps must be at least {SHORTEST_STEP_S:g} s",
                 row=row,
                 title="t",

@@ -84,7 +84,7 @@ def _parsed(data: bytes) -> Any:
     except UnicodeDecodeError:
         raise FileFault("not_json", "the text is not UTF-8", "save it in UTF-8") from None
     if data and not text:
-        raise FileFault("not_json", "there is no text in UTF-8", "save it in UTF-8")
+        raise FileFault("not_json", "the text is not UTF-8", "save it in UTF-8")
     if is_octave(text):
         raise octave_text()
     try:

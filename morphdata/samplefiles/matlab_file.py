@@ -88,7 +88,7 @@ def _contents(stream: BinaryIO) -> Contents:
 def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns:
     if len(contents) > MOST_COLUMNS:
         raise FileFault(
-            "too_many_columns", f"the file has {len(contents)} variables", "keep those that count"
+            "too_many_columns", f"the file has {len(contents)} variables", "keep only the six columns needed"
         )
     if not any(meaning(name, wanted.names) for name in contents):
         structs = [name for name, (_, kind) in contents.items() if kind == "struct"]

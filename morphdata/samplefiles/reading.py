@@ -30,9 +30,7 @@ def kind_of(ending: str) -> str:
     """The kind of a file by the ending of its name; FileFault for one that is not read."""
     kind = ENDINGS.get(ending.lower())
     if kind is None:
-        raise FileFault(
-            "unknown_format", f"files of the kind {shown(ending)!r} are not read", f"give {FORMATS}"
-        )
+        raise FileFault("unknown_format", f"{shown(ending)!r} files are not supported", f"give {FORMATS}")
     return kind
 
 
@@ -87,7 +85,7 @@ def read_flight(path: Path) -> FlightColumns:
     Raises
     ------
     InvalidInput
-        As of `read_file`; or time does not rise, the flight is longer than 600 s, an angle is none in rad.
+        As of `read_file`; or time does not increase, the flight is too long, or an angle is not in rad.
     """
     columns = read_file(path)
     for fault in flight_faults(columns.values):

@@ -16,8 +16,10 @@ audit = typer.Typer(help="Look at the audit log.", no_args_is_help=True, epilog=
 @reports_errors
 def list_entries(
     owner: Annotated[str | None, typer.Option(help="Only deeds of this owner.")] = None,
-    action: Annotated[str | None, typer.Option(help="Only deeds of this kind, such as auth.refused.")] = None,
-    limit: Annotated[int, typer.Option(min=1, max=10_000, help="At most so many.")] = 50,
+    action: Annotated[
+        str | None, typer.Option(help="Only actions of this kind, such as auth.refused.")
+    ] = None,
+    limit: Annotated[int, typer.Option(min=1, max=10_000, help="Maximum number shown.")] = 50,
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:

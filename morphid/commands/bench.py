@@ -25,7 +25,7 @@ def bench(
     ] = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Measure this machine: speed, operations, memory and start, each beside what it must be."""
+    """Benchmark this machine and compare each figure with its requirement."""
     from worker import numerics
 
     _require_checkout()

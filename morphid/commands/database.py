@@ -13,7 +13,7 @@ from morphid.screen import print_json, reports_errors, stdout
 if TYPE_CHECKING:
     from morphid.backup import Backup
 
-database = typer.Typer(help="Migrate, copy and put back the database.", no_args_is_help=True)
+database = typer.Typer(help="Migrate, back up and restore the database.", no_args_is_help=True)
 
 
 @database.command("upgrade")
@@ -42,7 +42,7 @@ def downgrade_database(
 @database.command("backup")
 @reports_errors
 def backup_database(
-    target: Annotated[Path, typer.Argument(metavar="FILE", help="Is made; must not exist.")],
+    target: Annotated[Path, typer.Argument(metavar="FILE", help="New file; must not exist.")],
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
@@ -60,7 +60,7 @@ def restore_database(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Put FILE in the place of the SQLite database of a service that has ended."""
+    """Restore the SQLite database from FILE; the service must be stopped."""
     from morphid.backup import restore
     from morphid.migrate import configured_url
 

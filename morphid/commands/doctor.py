@@ -28,7 +28,7 @@ def doctor(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Say what is wrong with this installation, with a remedy for each; 6 when something fails."""
+    """Check this installation and suggest remedies; exit code 6 if a check fails."""
     from morphid.doctor.findings import State
     from morphid.doctor.round import round_here, round_there
 
@@ -60,13 +60,11 @@ def doctor(
 
 @reports_errors
 def ready(
-    worker: Annotated[
-        bool, typer.Option("--worker", help="Only: does this machine's worker take jobs?")
-    ] = False,
+    worker: Annotated[bool, typer.Option("--worker", help="Check only this machine's worker.")] = False,
     wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
     data_dir: options.DataDir = None,
 ) -> None:
-    """Tell by the exit code whether jobs that are posted now will run: 0 yes, 6 no."""
+    """Exit with 0 if jobs submitted now will run, otherwise with 6."""
     from morphid.ready import wait_until_ready
 
     stdout().print(wait_until_ready(data_dir, worker_here=worker, within_s=wait), soft_wrap=True)

@@ -26,7 +26,7 @@ def show_fit(result: Mapping[str, Any]) -> None:
     """Print how well the samples are met, and the model."""
     stdout().print(fit_table(result))
     if result.get("model") is None:
-        stdout().print("No model: nothing that was tried has flown the samples to fit.")
+        stdout().print("No model: no candidate flew the fitted samples.")
         return
     stdout().print(model_table(result))
     line = at_bound_line(result)

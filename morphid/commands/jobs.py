@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 JobId = Annotated[str, typer.Argument(metavar="JOB", help="Id of the job.")]
 
-jobs = typer.Typer(help="Look after the jobs of a service.", no_args_is_help=True, epilog=options.EXIT_CODES)
+jobs = typer.Typer(help="Manage the jobs of a service.", no_args_is_help=True, epilog=options.EXIT_CODES)
 
 
 @jobs.command("ls")
 @reports_errors
 def list_jobs(
     status: Annotated[str | None, typer.Option(help="Only jobs in this state.")] = None,
-    limit: Annotated[int, typer.Option(min=1, max=100, help="At most so many.")] = 20,
+    limit: Annotated[int, typer.Option(min=1, max=100, help="Maximum number shown.")] = 20,
     url: options.Url = DEFAULT_URL,
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
@@ -86,7 +86,7 @@ def watch_job(
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Follow a job to its end; the exit code tells how it ended. With --json, one line per change."""
+    """Follow a job to its end; the exit code reflects its outcome. With --json, one line per change."""
     from morphid.service import Service
 
     with Service(url, api_key) as service:
@@ -152,7 +152,7 @@ def cancel_job(
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Ask for a job's end; what it found so far is kept."""
+    """Cancel a job; its best result so far is kept."""
     from morphid.service import Service
 
     with Service(url, api_key) as service:

@@ -18,16 +18,16 @@ quota_option = "Quotas"
 @reports_errors
 def create_key(
     owner: Annotated[str, typer.Option(help="Whose key: keys of one owner see the same jobs and models.")],
-    name: Annotated[str, typer.Option(help="What it is for, so that you know it again.")],
+    name: Annotated[str, typer.Option(help="A name to recognise it by.")],
     scope: Annotated[
         list[str] | None,
         typer.Option(
-            help="What it may do; repeat. All but `metrics` when left out: see `morphid keys scopes`."
+            help="Scope; may be repeated. All but `metrics` when left out: see `morphid keys scopes`."
         ),
     ] = None,
     expires: Annotated[str | None, typer.Option(help="When: `90d`, `12h`, or a date in UTC.")] = None,
     max_jobs: Annotated[
-        int | None, typer.Option(min=1, help="Jobs in flight at once.", rich_help_panel=quota_option)
+        int | None, typer.Option(min=1, help="Unfinished jobs at a time.", rich_help_panel=quota_option)
     ] = None,
     max_flights_per_day: Annotated[
         int | None, typer.Option(min=1, help="Flights a day, UTC.", rich_help_panel=quota_option)
@@ -38,7 +38,7 @@ def create_key(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Make a key and show it: now or never, for only a digest of it is stored."""
+    """Create a key and show it once; only a digest is stored."""
     from app.keys.records import Quota
     from morphid import keys as work
 

@@ -56,7 +56,7 @@ def show_schedule(result: Mapping[str, Any]) -> None:
     if result.get("pareto"):
         stdout().print(front_table(result["pareto"]))
     if result["schedule"] is None:
-        stdout().print("No schedule: nothing that was tried has flown to its end.")
+        stdout().print("No schedule: no candidate could be flown to the end.")
     else:
         stdout().print(knot_table(result["schedule"]))
     for note in result.get("notes", ()):
@@ -90,7 +90,7 @@ def variation_table(result: Mapping[str, Any]) -> Table:
 
 def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
     """Show the front of duration (s) against variation (rad^2)."""
-    table = Table(title="Front: no schedule is both shorter and calmer", box=SIMPLE_HEAD)
+    table = Table(title="Pareto front of duration and variation", box=SIMPLE_HEAD)
     for title in ("duration, s", "variation, rad²", "at constant rate"):
         table.add_column(title, justify="right")
     for point in front:

@@ -25,7 +25,7 @@ HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters o
 
 # groups of options, as a command's help shows them
 model_option = partial(typer.Option, rich_help_panel=MODEL)
-answer_option = partial(typer.Option, rich_help_panel="Where it runs, and where the answer goes")
+answer_option = partial(typer.Option, rich_help_panel="Execution and output")
 
 
 class Core(StrEnum):
@@ -59,7 +59,7 @@ Workers = Annotated[int | None, setting("workers", "1", "Jobs that run at once."
 
 # of commands that talk to a service anyway
 Url = Annotated[str, typer.Option("--url", envvar=URL_VARIABLE, help="Address of the service.")]
-API_KEY_HELP = "Key of the service; better set MORPHID_API_KEY, which no process list shows."
+API_KEY_HELP = "Key of the service; prefer MORPHID_API_KEY, which does not appear in process listings."
 ApiKey = Annotated[
     str | None, typer.Option("--api-key", envvar=KEY_VARIABLE, show_default=False, help=API_KEY_HELP)
 ]

@@ -37,7 +37,7 @@ def paper(
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the kernels.")] = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Make every table and figure of the paper anew, as one HTML report."""
+    """Reproduce every table and figure of the paper, as one HTML report."""
     from worker import numerics
 
     count = threads or numerics.usable_cores()
@@ -101,7 +101,7 @@ def _samples(folder: Path | None) -> Path | None:
 def asked_table(summary: dict[str, Any]) -> Table:
     """Show every asked figure beside what was measured."""
     table = Table(
-        title=f"Asked and measured, seed {summary['seed']}, {summary['total_s']:.0f} s of work",
+        title=f"Required and measured, seed {summary['seed']}, {summary['total_s']:.0f} s of work",
         box=SIMPLE_HEAD,
         padding=(0, 1),
         collapse_padding=True,

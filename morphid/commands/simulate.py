@@ -65,9 +65,9 @@ def _put_schedules(
         end_s = _put_rate(request, rate, final)
     else:
         raise CommandError(
-            "what the hinges do is not told"
+            "there is no schedule for the hinges"
             if table is None
-            else "--schedule tells already what --rate tells",
+            else "--schedule and --rate exclude each other",
             code=Exit.USAGE,
             hint="give either --schedule S.csv, or both --rate and --final",
         )
@@ -95,7 +95,7 @@ def _put_table(request: Request, path: Path) -> float:
 def _put_rate(request: Request, rate: float, final: float) -> float:
     if not rate > 0.0 or final == 0.0:
         raise CommandError(
-            f"--rate {rate:g} --final {final:g}: no morph comes of these",
+            f"--rate {rate:g} --final {final:g}: these values do not define a morph",
             code=Exit.INVALID_INPUT,
             hint="give a positive rate in rad/s, and a final angle in rad other than 0",
         )

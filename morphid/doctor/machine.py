@@ -131,11 +131,15 @@ def compiler() -> Iterator[Finding]:
 def cores(workers: int) -> Iterator[Finding]:
     """Do the workers have a core each, and memory."""
     here, usable = os.cpu_count() or 1, usable_cores()
-    limited = "" if usable == here else f" (of {here}; affinity or a container's quota keeps the others away)"
+    limited = (
+        "" if usable == here else f" (of {here}; the rest is excluded by CPU affinity or a container quota)"
+    )
     shared = f"{workers} x {share_cores(workers)} threads on {usable} cores{limited}"
     if workers > usable:
         yield warn(
-            "cores", f"{shared}: jobs fight for cores", f"set MORPHID_WORKERS (--workers) to at most {usable}"
+            "cores",
+            f"{shared}: jobs compete for cores",
+            f"set MORPHID_WORKERS (--workers) to at most {usable}",
         )
     else:
         yield ok("cores", shared)

@@ -60,9 +60,11 @@ def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Fi
         yield fail("service", f"{url} answers {alive.status_code}, but is no MorphID", "correct --url")
         return
     if version != VERSION:
-        yield warn("service", f"{url} has version {version}, this is {VERSION}", "bring both to one version")
+        yield warn(
+            "service", f"{url} has version {version}, this is {VERSION}", "use the same version for both"
+        )
     elif took_s > SLOW_S:
-        yield warn("service", f"{url} took {took_s:.1f} s to answer", "its machine or the way there is busy")
+        yield warn("service", f"{url} took {took_s:.1f} s to answer", "the machine or the network is busy")
     else:
         yield ok("service", f"MorphID {version} at {url}")
     yield from _clock(alive)

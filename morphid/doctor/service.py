@@ -39,7 +39,7 @@ def unsafe(settings: Any) -> Iterator[Finding]:
             "leave out MORPHID_WEBHOOK_ALLOW_PRIVATE where others can post jobs",
         )
     else:
-        keys = "demanded" if settings.demands_keys else "not demanded: only this machine gets in"
+        keys = "demanded" if settings.demands_keys else "not required: only this machine has access"
         yield ok("settings", f"API keys are {keys}")
 
 
@@ -64,7 +64,7 @@ def database(settings: Any) -> Iterator[Finding]:
             sound = list(_sqlite(session, settings) if settings.uses_sqlite else _postgres(session))
     except SQLAlchemyError as error:
         sentence = str(getattr(error, "orig", None) or error).splitlines()[0]
-        remedy = "start it, or correct MORPHID_DATABASE_URL; a spoilt file: `morphid db restore`"
+        remedy = "start it, or correct MORPHID_DATABASE_URL; a damaged file: `morphid db restore`"
         yield fail("database", f"{url}: {masked(sentence)}", remedy)
         return
     finally:
@@ -217,7 +217,11 @@ def work(settings: Any) -> Iterator[Finding]:
         yield ok("workers", f"{workers.alive} with {workers.slots} slots, {workers.busy} busy")
     free = workers.slots - workers.busy
     if orphaned:
-        yield fail("jobs", f"{orphaned} belong to workers that are gone", "start a beat: nobody reaps")
+        yield fail(
+            "jobs",
+            f"{orphaned} jobs belong to lost workers",
+            "start a beat process: the reaper is not running",
+        )
     elif free > 0 and seen.oldest_queued_s > STUCK_S:
         yield fail(
             "jobs",
@@ -255,7 +259,7 @@ def keys(settings: Any) -> Iterator[Finding]:
         store.dispose()
     if not valid:
         yield warn(
-            "keys", "keys are demanded and there are none: nobody gets in", "morphid keys create --help"
+            "keys", "keys are required but none exist: no one has access", "morphid keys create --help"
         )
     else:
         yield ok("keys", f"{valid} are valid")
@@ -282,7 +286,7 @@ def port(host: str, number: int) -> Iterator[Finding]:
         version = served_version(client)
     if version is None:
         yield fail(
-            "port", f"{host}:{number}: {reason}, by something else than MorphID", "take another: --port"
+            "port", f"{host}:{number}: {reason}, by something else than MorphID", "choose another with --port"
         )
     else:
         yield ok("port", f"MorphID {version} serves {host}:{number}")

@@ -58,10 +58,10 @@ def test_an_installation_may_have_a_percent_sign(monkeypatch: pytest.MonkeyPatch
         ("postgresql+foo://me:secretword@127.0.0.1/x", "driver 'foo'"),
         ("postgresql+asyncpg://me:secretword@127.0.0.1/x", "driver 'asyncpg'"),
         ("sqlite+aiosqlite:///x", "driver 'aiosqlite'"),
-        ("nonsense", "no address"),
-        ("postgresql://me:secretword@127.0.0.1:port/x", "no address"),
-        ("://", "no address"),
-        ("sqlite:/x.sqlite3", "no address"),
+        ("nonsense", "not a database URL"),
+        ("postgresql://me:secretword@127.0.0.1:port/x", "not a database URL"),
+        ("://", "not a database URL"),
+        ("sqlite:/x.sqlite3", "not a database URL"),
     ],
 )
 def test_an_address_that_cannot_be_opened_is_a_sentence(url: str, words: str) -> None:

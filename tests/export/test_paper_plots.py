@@ -67,7 +67,7 @@ def test_searches_share_logarithmic_axes() -> None:
 
 
 def test_predictions_stand_beside_their_errors() -> None:
-    """One row for each angle that moves; errors are ours less theirs, in mrad, of both laws."""
+    """One row for each angle that moves; errors are ours minus theirs, in mrad, of both laws."""
     found = made_up.results()["independent"]
     figure = independent_figure(found["samples"], found["laws"])
     assert len(figure.axes) == 2 * len(found["samples"])

@@ -162,6 +162,6 @@ def test_a_started_service_dials_nothing_but_what_is_named(tmp_path: Path) -> No
             database.dispose()
         assert rows[allowed].status == "delivered"
         assert {rows[hook].error for hook in refused} == {
-            "Refused: This service sends webhooks to chosen hosts alone, and this is none of them."
+            "Refused: This service sends webhooks only to certain hosts, and this is not one of them."
         }
         assert (named.connections, other.connections) == (1, 0)

@@ -85,7 +85,7 @@ def test_the_reason_cites_the_figures() -> None:
         "2 links per wing: J = 0.04 rad^2 on the flights held out, RMS up to 10 mrad in an angle. "
         "The best with fewer, 1 link, has 10 times the error and takes 0.5 times as long to fly; "
         "the best with more, 3 links, has 0.9 times the error and takes 1.5 times as long to fly. "
-        "A link more has to halve the error at least."
+        "An additional link must at least halve the error."
     )
 
 

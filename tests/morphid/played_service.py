@@ -60,7 +60,7 @@ class PlayedService:
             f"GET /jobs/job_1/artifacts/{name}": httpx.Response(200, content=content)
             for name, content in self.files.items()
         }
-        return answers.get(call) or httpx.Response(404, json={"title": "There is nothing here"})
+        return answers.get(call) or httpx.Response(404, json={"title": "Not found"})
 
     def job(self, status: str) -> dict[str, Any]:
         """Give the job as it is."""

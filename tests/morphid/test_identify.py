@@ -140,7 +140,7 @@ def test_a_refused_sample_is_a_sentence(examples: Path, tmp_path: Path) -> None:
         ],
     )
     assert ended.exit_code == Exit.INVALID_INPUT
-    assert "rise" in ended.stderr
+    assert "does not increase" in ended.stderr
 
 
 def test_a_refused_flight_names_the_field(examples: Path, tmp_path: Path) -> None:

@@ -90,7 +90,7 @@ def test_the_first_interrupt_gives_the_best_so_far(
     ended = RUNNER.invoke(app, [*command(examples), "--json", str(out), "--plots", str(tmp_path / "plots")])
     assert ended.exit_code == Exit.INTERRUPTED
     assert json.loads(out.read_text())["partial"] is True
-    assert "best so far" in ended.stderr
+    assert "best result so far" in ended.stderr
     assert (tmp_path / "plots" / "result.json").is_file()
     assert signal.getsignal(signal.SIGINT) is before
 

@@ -121,7 +121,7 @@ def test_without_independent_flights_the_report_says_so() -> None:
     made = made_up.results()
     made["independent"] = {"available": False, "laws": []}
     page = report_page(PaperSettings(), made_up.finished(made))
-    assert "were not at hand" in page
+    assert "were not available" in page
     assert "another program's flights, predicted with nothing fitted" not in page
 
 

@@ -68,7 +68,7 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
         ("t,sweep_left\n0,0\n1,0\n2,0\n", "no column sweep_right"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,x\n2,0,0\n", "line 3: sweep_right is 'x'"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,nan\n2,0,0\n", "line 3: sweep_right is 'nan'"),
-        ("t,sweep_left,sweep_right\n0,0,0\n\n2,0,0\n1,0,0\n", "line 5: time does not rise"),
+        ("t,sweep_left,sweep_right\n0,0,0\n\n2,0,0\n1,0,0\n", "line 5: time does not increase"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0\n", "line 3: 2 cells under 3 titles"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,0\n", "holds 2 rows"),
     ],

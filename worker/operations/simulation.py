@@ -31,7 +31,7 @@ class SimulationWork:
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
         """Fly from the start, whatever an earlier attempt has left."""
-        again = "" if checkpoint is None else ", begun again from the start"
+        again = "" if checkpoint is None else ", restarted from the beginning"
         with library_errors():
             for step in self._run.steps(stop=stop):
                 yield Step(

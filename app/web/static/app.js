@@ -25,7 +25,7 @@ function keyView() {
     element("h1", {}, refused ? "This key is not valid" : "This service needs an API key"),
     refused ? element("p", { class: "soft" }, "It is unknown, was revoked or has expired.") : null,
     form,
-    element("p", { class: "soft" }, "It stays in this tab and is forgotten with it. The operator makes keys with "), element("pre", { class: "mono" }, "morphid keys create --owner NAME --name PURPOSE"),
+    element("p", { class: "soft" }, "It is kept in this tab only and deleted when the tab is closed. The operator makes keys with "), element("pre", { class: "mono" }, "morphid keys create --owner NAME --name PURPOSE"),
   ));
   field.focus();
 }

@@ -31,7 +31,7 @@ function queryOf({ status, operation, label }) {
 function filterForm(filters, onChange) {
   const choice = (status) => element("label", { class: "choice" }, element("input", { type: "checkbox", name: "status", value: status, checked: filters.status.includes(status) }), status);
   const operations = element("select", { id: "operation" }, element("option", { value: "" }, "any"), ...OPERATIONS.map((name) => element("option", { selected: filters.operation === name }, name)));
-  const label = element("input", { id: "label", type: "search", maxlength: MAX_LABEL, value: filters.label, placeholder: "the whole label", spellcheck: "false", autocomplete: "off" });
+  const label = element("input", { id: "label", type: "search", maxlength: MAX_LABEL, value: filters.label, placeholder: "exact label", spellcheck: "false", autocomplete: "off" });
   const clear = element("button", { type: "button", hidden: queryOf(filters) === "", on: { click: () => (location.hash = "#/") } }, "Clear filters");
   const form = element(
     "form",

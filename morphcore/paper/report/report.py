@@ -45,7 +45,7 @@ SECTIONS = {  # templates and their headings
     "computation": "Table 2: computation",
     "morph": "Table 3, figures 10 and 11: the optimised morph",
     "differences": "What differs from the paper, and why",
-    "provenance": "What made this report",
+    "provenance": "How this report was made",
 }
 PLOTS = SimpleNamespace(
     departure_figure=departure_figure,

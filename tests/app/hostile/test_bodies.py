@@ -148,7 +148,7 @@ def test_other_encodings_are_refused_by_header(
 
 
 def test_compressed_uploads_are_refused(service: RunningService) -> None:
-    """A form that is announced as compressed is not looked at."""
+    """A compressed form is not looked at."""
     answer = service.client.post(
         "/trajectories", files={"file": ("x.csv", b"t")}, headers={"Content-Encoding": "gzip"}
     )

@@ -49,7 +49,7 @@ def test_not_a_number_is_left_to_the_schema() -> None:
         ("{}".encode("utf-32"), "UTF-16"),
         (rb'{"a": "\ud800"}', "surrogate"),
         (rb'{"\uDC00": 1}', "surrogate"),
-        (rb'["a\u0000"]', "zero"),
+        (rb'["a\u0000"]', "null character"),
         (b"9" * 5000, "Not JSON"),
         (json.dumps({str(i): i for i in range(MAX_KEYS + 1)}).encode(), "fields"),
     ],

@@ -70,7 +70,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "an hour": ({"t": 100.0 * T + np.where(T > 0.2, 3600.0, 0.0)}, "the flight takes 3639 s"),
     "time that falls": (
         {"t": np.where(np.arange(ROWS) == 19, 0.1, T)},
-        "time does not rise at row 19: it goes from 0.18 s to 0.1 s",
+        "time does not increase at row 19: it goes from 0.18 s to 0.1 s",
     ),
 }
 

@@ -87,7 +87,7 @@ def test_every_format_gives_the_same_flight(tmp_path: Path, name: str) -> None:
         ({"theta": None}, "no column theta"),
         ({"theta": np.where(T > 0.2, np.nan, 0.0)}, r"row 21 \(from 0\): theta is 'nan', not a finite"),
         ({"theta_deg": T}, "both give theta"),
-        ({"t_ms": T[::-1]}, "time does not rise"),
+        ({"t_ms": T[::-1]}, "time does not increase"),
     ],
 )
 def test_faults_are_named_alike(tmp_path: Path, name: str, changes: dict[str, Any], said: str) -> None:
@@ -156,7 +156,7 @@ def opaque_variable(name: str, class_name: str) -> bytes:
         ("x.json", b'{"t": [1], "t": [2]}', "'t' appears twice", "one"),
         ("x.json", b"[" * 100_000, "nested", "lists"),
         ("x.json", b"\xff\xfe", "UTF-8", "UTF-8"),
-        ("x.xlsx", b"", "kind '.xlsx'", "Parquet"),
+        ("x.xlsx", b"", "'.xlsx' files", "Parquet"),
     ],
 )
 def test_files_of_another_kind_show_the_way_out(

@@ -114,7 +114,7 @@ class RealWorker:
         return endings[0], time.monotonic() - asked_at
 
     def job(self, job_id: str) -> Job:
-        """Look at a job."""
+        """Get a job."""
         with self.database.read() as session:
             return get_job(session, OWNER, job_id)
 

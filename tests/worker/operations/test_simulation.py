@@ -69,7 +69,7 @@ def test_a_second_attempt_flies_from_the_start(worker: RealWorker) -> None:
     job_id = worker.add("simulate", request)
     assert worker.run(lambda: worker.job(job_id).progress is not None) is Ending.RELEASED
     assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
-    assert "from the start" in (worker.job(job_id).progress or {})["message"]
+    assert "from the beginning" in (worker.job(job_id).progress or {})["message"]
     undisturbed = find_operation("simulate")(request, 1)
     *_, last = undisturbed.steps(None, lambda: False)
     assert worker.result(job_id)["trajectory"] == undisturbed.outcome(last.checkpoint).document["trajectory"]
