@@ -34,6 +34,15 @@ SHOWN_ITEMS = 4  # of a list, at a prompt
 LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 
 
+class Result(BaseModel):
+    """Base of what an operation gives: it may hold more than its fields say.
+
+    Pydantic makes its validator when it is first used; the library, which makes results, never does.
+    """
+
+    model_config = ConfigDict(extra="allow", defer_build=True)
+
+
 class Document(BaseModel):
     """Base of everything that a client sends: a misspelt field is an error, text is not a number.
 

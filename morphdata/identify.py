@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import ConfigDict, Field, create_model
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.base import Document
+from morphdata.base import Document, Result
 from morphdata.execution import Request, SpreadExecution
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
@@ -334,7 +334,7 @@ class IdentifyRequest(SamplesRequest):
             )
 
 
-class CostEstimate(BaseModel):
+class CostEstimate(Result):
     """What a search would take, to an order of magnitude."""
 
     samples: int
@@ -345,7 +345,7 @@ class CostEstimate(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class Angles(BaseModel):
+class Angles(Result):
     """One number per Euler angle."""
 
     phi: float | None
@@ -353,10 +353,8 @@ class Angles(BaseModel):
     psi: float | None
 
 
-class SampleFit(BaseModel):
+class SampleFit(Result):
     """How well one sample is met: J is the sum of squared angle errors, rad^2."""
-
-    model_config = ConfigDict(extra="allow")
 
     sample: str
     role: str
@@ -367,10 +365,8 @@ class SampleFit(BaseModel):
     max_abs_rad: Angles
 
 
-class AeroCorrections(BaseModel):
+class AeroCorrections(Result):
     """Identified aerodynamic corrections."""
-
-    model_config = ConfigDict(extra="allow")
 
     lift_factor: float
     centre_shift_m: float
@@ -378,10 +374,8 @@ class AeroCorrections(BaseModel):
     lag_s: float
 
 
-class IdentifiedParameters(BaseModel):
+class IdentifiedParameters(Result):
     """The identified equivalent model."""
-
-    model_config = ConfigDict(extra="allow")
 
     links_per_wing: int
     division: list[Any] = Field(description="Share of the span of each link.")
@@ -390,10 +384,8 @@ class IdentifiedParameters(BaseModel):
     aero: AeroCorrections
 
 
-class SearchReport(BaseModel):
+class SearchReport(Result):
     """How the search went."""
-
-    model_config = ConfigDict(extra="allow")
 
     method: str
     seed: int
@@ -409,14 +401,12 @@ class SearchReport(BaseModel):
 Interval = Annotated[list[float | None], Field(min_length=2, max_length=2)]
 
 
-class Uncertainty(BaseModel):
+class Uncertainty(Result):
     """How well the samples determine the parameters.
 
     Names are `division.1`, `stiffness_nm_rad.joint_1.flap`, `lag_s`, ...; where wings are separate, `wing_1.`
     stands before them.
     """
-
-    model_config = ConfigDict(extra="allow")
 
     method: str | None = Field(
         default=None, description="`white`: the residuals are taken for independent and of one variance."
@@ -437,10 +427,8 @@ class Uncertainty(BaseModel):
     )
 
 
-class IdentifyResult(BaseModel):
+class IdentifyResult(Result):
     """Result of an identification."""
-
-    model_config = ConfigDict(extra="allow")
 
     model: IdentifiedParameters | None = Field(
         description="null in a partial result whose best model never flew the samples to fit."
@@ -448,6 +436,6 @@ class IdentifyResult(BaseModel):
     fit: list[SampleFit]
     search: SearchReport
     uncertainty: Uncertainty | None = None
-    warnings: Warnings = []
+    warnings: Warnings = Field(default=[])
     cost: dict[str, Any] | None = None
     partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

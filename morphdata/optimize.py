@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.base import Angle, Document
+from morphdata.base import Angle, Document, Result
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
@@ -287,7 +287,7 @@ class OptimizeRequest(Request):
         yield from goal_faults(morph, limits)
 
 
-class ScheduleCost(BaseModel):
+class ScheduleCost(Result):
     """What an optimisation would take, to an order of magnitude."""
 
     parameters: int = Field(description="Free parameters.")
@@ -296,48 +296,38 @@ class ScheduleCost(BaseModel):
     core_s: float = Field(description="Computing time on one core, the flexible model's flights included.")
 
 
-class FoundSchedule(BaseModel):
+class FoundSchedule(Result):
     """A clamped cubic spline: at rest at both ends."""
-
-    model_config = ConfigDict(extra="allow")
 
     knot_time_s: list[float]
     knot_sweep_rad: list[float]
 
 
-class KeptLimits(BaseModel):
+class KeptLimits(Result):
     """Largest rate and acceleration that were allowed."""
-
-    model_config = ConfigDict(extra="allow")
 
     max_rate_rad_s: float | None
     max_accel_rad_s2: float | None
 
 
-class Variation(BaseModel):
+class Variation(Result):
     """Attitude variation of one schedule, rad^2, flown in each of the models; null where it was not."""
-
-    model_config = ConfigDict(extra="allow")
 
     rigid: float | None = None
     equivalent: float | None = None
     flexible: float | None = None
 
 
-class Variations(BaseModel):
+class Variations(Result):
     """The schedules that are compared."""
-
-    model_config = ConfigDict(extra="allow")
 
     constant: Variation = Field(description="At constant rate.")
     rigid_optimum: Variation = Field(description="Optimised with the rigid model.")
     optimum: Variation = Field(description="Sought with the equivalent model.")
 
 
-class OptimizeResult(BaseModel):
+class OptimizeResult(Result):
     """Result of a schedule optimisation."""
-
-    model_config = ConfigDict(extra="allow")
 
     schedule: FoundSchedule | None = Field(
         description="null in a partial result whose best schedule never flew to its end."
@@ -349,5 +339,5 @@ class OptimizeResult(BaseModel):
         "it, else in the equivalent one."
     )
     search: dict[str, Any]
-    warnings: Warnings = []
+    warnings: Warnings = Field(default=[])
     partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

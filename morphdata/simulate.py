@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.base import MAX_ROWS, MIN_ROWS, Document
+from morphdata.base import MAX_ROWS, MIN_ROWS, Document, Result
 from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault
@@ -132,7 +132,7 @@ class SimulateRequest(Request):
             yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
 
 
-class FlightCost(BaseModel):
+class FlightCost(Result):
     """What a simulation would take, to an order of magnitude."""
 
     rows: int = Field(description="Of the trajectory.")
@@ -143,28 +143,22 @@ class FlightCost(BaseModel):
     core_s: float = Field(description="Computing time on one core.")
 
 
-class FlownModel(BaseModel):
+class FlownModel(Result):
     """The model that was flown."""
-
-    model_config = ConfigDict(extra="allow")
 
     kind: str
 
 
-class TrimState(BaseModel):
+class TrimState(Result):
     """How the flight starts: in body axes, at the reference point."""
-
-    model_config = ConfigDict(extra="allow")
 
     alpha_rad: float
     force_b_n: list[float]
     moment_b_n_m: list[float]
 
 
-class SimulatedTrajectory(BaseModel):
+class SimulatedTrajectory(Result):
     """Columns of the flight: those of a sample, and body rates, velocity, position and wing tips."""
-
-    model_config = ConfigDict(extra="allow")
 
     time_s: list[float]
     sweep_left_rad: list[float]
@@ -174,10 +168,8 @@ class SimulatedTrajectory(BaseModel):
     psi_rad: list[float]
 
 
-class FlightSummary(BaseModel):
+class FlightSummary(Result):
     """The flight in a few numbers."""
-
-    model_config = ConfigDict(extra="allow")
 
     max_abs_rad: dict[str, float] = Field(description="Largest departure of each angle from its start.")
     variation_rad2: float = Field(
@@ -185,14 +177,12 @@ class FlightSummary(BaseModel):
     )
 
 
-class SimulateResult(BaseModel):
+class SimulateResult(Result):
     """Result of a simulation."""
-
-    model_config = ConfigDict(extra="allow")
 
     model: FlownModel
     trim: TrimState
     trajectory: SimulatedTrajectory
     summary: FlightSummary
-    warnings: Warnings = []
+    warnings: Warnings = Field(default=[])
     cost: dict[str, Any]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from morphdata.base import Result
 from morphdata.faults import Fault
 from morphdata.identify import (
     EXAMPLE_REQUEST,
@@ -58,10 +59,8 @@ class StudyRequest(SamplesRequest):
     model: StudiedModels = StudiedModels()
 
 
-class StudyRow(BaseModel):
+class StudyRow(Result):
     """Accuracy and cost of one number of links per wing."""
-
-    model_config = ConfigDict(extra="allow")
 
     links_per_wing: int
     bodies: int = Field(description="Rigid bodies of the whole model, fuselage included.")
@@ -76,31 +75,25 @@ class StudyRow(BaseModel):
     model: IdentifiedParameters | None = Field(
         description="null where no model of this size flew the samples to fit."
     )
-    warnings: Warnings = []
+    warnings: Warnings = Field(default=[])
 
 
-class Recommendation(BaseModel):
+class Recommendation(Result):
     """The number of links to take."""
-
-    model_config = ConfigDict(extra="allow")
 
     links_per_wing: int | None = Field(description="null if no model could be flown")
     reason: str
 
 
-class StudyReport(BaseModel):
+class StudyReport(Result):
     """How the study went."""
-
-    model_config = ConfigDict(extra="allow")
 
     seed: int
     wall_s: float
 
 
-class StudyResult(BaseModel):
+class StudyResult(Result):
     """Result of a study: a row per number of links, in rising order."""
-
-    model_config = ConfigDict(extra="allow")
 
     rows: list[StudyRow]
     recommended: Recommendation
