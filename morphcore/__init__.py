@@ -6,9 +6,14 @@ what lies inside a room by ``from morphcore.identify.settings import ...``.
 
 from __future__ import annotations
 
+import gc
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+_collecting = gc.isenabled()
+gc.disable()  # the imports leave no garbage, and looking for it would take a tenth of their time
+
 from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
-from morphcore.identify.study import study
-from morphcore.optimise import optimise_schedule
 from morphcore.simulate.flight import Simulation, simulate
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.warming import warm_up, warm_up_further
@@ -16,7 +21,16 @@ from morphdata.aircraft import Aircraft, load_aircraft
 from morphdata.flight import Flight, load_flight
 from morphdata.version import VERSION
 
+if _collecting:
+    gc.enable()
+
+if TYPE_CHECKING:
+    from morphcore.identify.study import study
+    from morphcore.optimise import optimise_schedule
+
 __version__ = VERSION
+
+_LATE = {"optimise_schedule": "morphcore.optimise", "study": "morphcore.identify.study"}
 
 __all__ = [
     "Aircraft",
@@ -37,3 +51,10 @@ __all__ = [
     "warm_up",
     "warm_up_further",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what not everyone needs when it is first used."""
+    if name not in _LATE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_LATE[name]), name)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from morphcore.errors import InvalidInput
 from morphdata import schedules as documents
+
+if TYPE_CHECKING:  # imported late: not every flight interpolates
+    from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -120,6 +122,8 @@ class Spline:
 
     def motion(self, time_s: ArrayLike) -> HingeMotion:
         """The motion."""
+        from scipy.interpolate import CubicSpline
+
         spline = CubicSpline(self.knot_time_s, self.knot_angle_rad, bc_type="clamped")
         return _held(spline, time_s, float(self.knot_time_s[0]), float(self.knot_time_s[-1]))
 
@@ -139,6 +143,8 @@ class Tabulated:
 
     @cached_property
     def _curve(self) -> Akima1DInterpolator:
+        from scipy.interpolate import Akima1DInterpolator
+
         return Akima1DInterpolator(self.time_s, self.angle_rad, method="makima")
 
     def motion(self, time_s: ArrayLike) -> HingeMotion:

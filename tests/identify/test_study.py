@@ -14,7 +14,7 @@ from morphcore.identify import Identification, Interrupted, SearchSettings, Step
 from morphcore.identify.study import Study, study, study_from_request
 from morphcore.identify.study_timing import ROUNDS, timed_flight
 from morphcore.search.checkpoint import UnreadableCheckpoint
-from morphdata.identify import EquivalentModel
+from morphdata.identify import EquivalentModel, IdentifySearch
 from morphdata.study import StudyRequest
 from tests.identification_request import identification
 from tests.identify.flights import (
@@ -244,7 +244,7 @@ def test_the_example_flights_want_few_links(seed: int) -> None:
     """
     samples = [example(name) for name in ("rate_0.2", "rate_0.5", "rate_0.8")]
     samples.append(example("asymmetric", "held_out"))
-    search = SearchSettings(seed=seed)
+    search = IdentifySearch(seed=seed)
     document = study(*reference_documents(), samples, search=search).to_document()
     for row in document["rows"]:
         print({name: value for name, value in row.items() if name not in ("fit", "model")})
