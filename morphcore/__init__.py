@@ -11,18 +11,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 _collecting = gc.isenabled()
-gc.disable()  # the imports leave no garbage, and looking for it would take a tenth of their time
-
-from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
-from morphcore.simulate.flight import Simulation, simulate
-from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.warming import warm_up, warm_up_further
-from morphdata.aircraft import Aircraft, load_aircraft
-from morphdata.flight import Flight, load_flight
-from morphdata.version import VERSION
-
-if _collecting:
-    gc.enable()
+gc.disable()  # the imports leave no garbage, and looking for it takes a twentieth of their time
+try:
+    from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
+    from morphcore.simulate.flight import Simulation, simulate
+    from morphcore.simulate.trajectory import Trajectory, load_trajectory
+    from morphcore.warming import warm_up, warm_up_further
+    from morphdata.aircraft import Aircraft, load_aircraft
+    from morphdata.flight import Flight, load_flight
+    from morphdata.version import VERSION
+finally:
+    if _collecting:
+        gc.enable()
 
 if TYPE_CHECKING:
     from morphcore.identify.study import study

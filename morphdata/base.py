@@ -176,7 +176,6 @@ def _whole(value: Any) -> Any:
     return value if isinstance(value, bool) or not isinstance(value, Integral) else int(value)  # numpy's own
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
 HALF_TURN_RAD = math.pi + 1e-9  # an angle written in degrees is rounded
 Angle = Annotated[float, Field(ge=-HALF_TURN_RAD, le=HALF_TURN_RAD)]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
 from morphdata.faults import Fault
 from morphdata.flight import Flight
 from morphdata.parameters import Parameters
+
+T = TypeVar("T")
 
 ANGLE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly zero
 
@@ -98,3 +101,26 @@ def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer:
             f"{pointer}/division",
             hint,
         )
+
+
+def paired_by_reflection(surfaces: Sequence[T], reflections: Sequence[T]) -> tuple[tuple[int, ...], ...]:
+    """Indices of surfaces by mirror pair, in order of first appearance.
+
+    Parameters
+    ----------
+    surfaces, reflections : sequence
+        Each surface and its image on the other side, both without their names, which do not count.
+
+    Returns
+    -------
+    tuple of tuples of int
+        Groups (first, image) and (first,): every surface is in one of them.
+    """
+    groups = []
+    waiting = list(range(len(surfaces)))
+    while waiting:
+        first = waiting.pop(0)
+        image = [k for k in waiting if surfaces[k] == reflections[first]][:1]
+        waiting = [k for k in waiting if k not in image]
+        groups.append((first, *image))
+    return tuple(groups)

@@ -10,7 +10,6 @@ from typing import Any
 
 from morphdata.samples import Role
 from morphid.exits import CommandError, Exit
-from morphid.files import read_json
 
 Document = dict[str, Any]
 SampleForm = Callable[[Path, Role], Document]
@@ -46,10 +45,6 @@ class Request:
             place = place.setdefault(parent, {})
         place[name] = value
         self._given_by[pointer] = option if isinstance(value, dict | list) else f"{option} {value}"
-
-    def put_file(self, pointer: str, path: Path, option: str) -> None:
-        """Fill in the content of a JSON file."""
-        self.put(pointer, read_json(path), f"{option} {path}")
 
     def add_samples(self, paths: Sequence[Path], role: Role, option: str) -> None:
         """Add sample files; how they go into the request depends on where it goes (see `body`)."""

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import platform
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -68,18 +65,7 @@ def compile_before(
         return
     if cache is not None and cache.get(REMEMBERED, None) == fingerprint():
         return
-    with _alone():
-        if cache is not None and cache.get(REMEMBERED, None) == fingerprint():
-            return  # another process has done it meanwhile
-        say("compiling kernels (a minute, once; before the tests and outside their time limits)")
-        compiling()
-        if cache is not None:
-            cache.set(REMEMBERED, fingerprint())
-
-
-@contextmanager
-def _alone() -> Iterator[None]:
-    """Wait for other processes of this run: one compiles for all."""
-    with (Path(tempfile.gettempdir()) / f"compiling-{fingerprint()[:16]}.lock").open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+    say("compiling kernels (a minute, once; before the tests and outside their time limits)")
+    compiling()
+    if cache is not None:
+        cache.set(REMEMBERED, fingerprint())

@@ -6,8 +6,6 @@ to is none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 from sqlalchemy import update
 
 from app.database import Session
@@ -18,6 +16,7 @@ from app.jobs.store import load_request
 from app.leases import LeasedRow, Note
 from app.models.repository import insert_model
 from app.tables import jobs
+from morphdata.operations import OPERATIONS
 from morphdata.parameters import has_flown
 
 
@@ -46,24 +45,8 @@ def extracted_model(operation: str, result: Document) -> Document | None:
 
     None for results that hold none.
     """
-    find = MODELS_IN_RESULTS.get(operation)
-    found = None if find is None else find(result)
+    descriptor = next((each for each in OPERATIONS if each.name == operation), None)
+    found = None if descriptor is None else descriptor.model_in(result)
     if found is None or found.get("model") is None or not has_flown(found.get("fit")):
         return None
     return found
-
-
-def _identified(result: Document) -> Document | None:
-    return result
-
-
-def _recommended(result: Document) -> Document | None:
-    links = (result.get("recommended") or {}).get("links_per_wing")
-    rows = (row for row in result.get("rows") or () if links is not None and row["links_per_wing"] == links)
-    return next(rows, None)
-
-
-MODELS_IN_RESULTS: Mapping[str, Callable[[Document], Document | None]] = {
-    "identify": _identified,
-    "study": _recommended,
-}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
 from morphcore.geometry.surface import Surface
+from morphdata.vehicle import paired_by_reflection
 
 Array = NDArray[np.float64]
 
@@ -45,15 +46,8 @@ def mirror_groups(surfaces: Sequence[Surface]) -> tuple[tuple[int, ...], ...]:
     tuple of tuples of int
         Groups (first, image) and (first,): every surface is in one of them.
     """
-    groups = []
-    waiting = list(range(len(surfaces)))
-    while waiting:
-        first = waiting.pop(0)
-        reflection = _reflection(surfaces[first])
-        image = [k for k in waiting if replace(surfaces[k], name=reflection.name) == reflection][:1]
-        waiting = [k for k in waiting if k not in image]
-        groups.append((first, *image))
-    return tuple(groups)
+    nameless = [replace(surface, name="") for surface in surfaces]
+    return paired_by_reflection(nameless, [_reflection(surface) for surface in nameless])
 
 
 def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:

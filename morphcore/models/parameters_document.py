@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.models.equivalent import ParameterBatch
-from morphcore.models.parameters import CHAIN_PARAMETERS
-from morphdata.parameters import AXES, Parameters, SurfaceParameters, WholeResult
+from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
+from morphdata.parameters import AXES, MirroredParameters, Parameters, SurfaceParameters, WholeResult
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -42,33 +42,28 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
 def parameter_batch(given: Parameters) -> ParameterBatch:
     """Return the parameters of a document as a batch of one particle; each division adds up to 1 exactly."""
-    links, wings = given.links_per_wing, len(given.divisions)
-    values = _structure(given, wings, links)
-    whole = set()
-    for parameter in CHAIN_PARAMETERS:
-        if not parameter.correction:
-            continue
-        value = np.full(1, getattr(given.aero, parameter.name, parameter.default), dtype=np.float64)
-        if parameter.scope == "aircraft":
-            whole.add(parameter.name)
-        values[parameter.name] = value if parameter.scope == "aircraft" else np.tile(value, wings)
-    surfaces = None
-    if given.surfaces:
-        owners = {name: [name] for name, own in given.surfaces.items() if isinstance(own, SurfaceParameters)}
-        for name, own in given.surfaces.items():
-            if not isinstance(own, SurfaceParameters):
-                owners[own.mirror_of].append(name)
-        sets = [own for own in given.surfaces.values() if isinstance(own, SurfaceParameters)]
-        rows = [_structure(own, 1, links) for own in sets]
-        for parameter in CHAIN_PARAMETERS:
-            if parameter.correction and parameter.scope != "aircraft":
-                for row, own in zip(rows, sets, strict=True):
-                    row[parameter.name] = np.full(1, getattr(own, parameter.name, parameter.default))
-        values |= {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        surfaces = tuple(tuple(names) for names in owners.values())
-    return ParameterBatch(
-        {name: value if name in whole else value[None] for name, value in values.items()}, surfaces
-    )
+    links, surfaces = given.links_per_wing, given.surfaces or {}
+    corrections = [parameter for parameter in CHAIN_PARAMETERS if parameter.correction]
+
+    def correction(holder: Any, parameter: Parameter) -> Array:
+        return np.full(1, getattr(holder, parameter.name, parameter.default), dtype=np.float64)
+
+    def sets_of(own: Parameters | SurfaceParameters, holder: Any, wings: int) -> dict[str, Array]:
+        theirs = {p.name: np.tile(correction(holder, p), wings) for p in corrections if p.scope != "aircraft"}
+        return {**_structure(own, wings, links), **theirs}
+
+    of_aircraft = {p.name: correction(given.aero, p) for p in corrections if p.scope == "aircraft"}
+    own = {name: each for name, each in surfaces.items() if isinstance(each, SurfaceParameters)}
+    if not own:
+        rows, groups = [sets_of(given, given.aero, len(given.divisions))], None
+    else:
+        rows = [sets_of(each, each, 1) for each in own.values()]
+        images = {
+            name: each.mirror_of for name, each in surfaces.items() if isinstance(each, MirroredParameters)
+        }
+        groups = tuple((name, *(image for image, of in images.items() if of == name)) for name in own)
+    values = {name: np.concatenate([row[name] for row in rows])[None] for name in rows[0]}
+    return ParameterBatch(values | of_aircraft, groups)
 
 
 def _structure(given: Parameters | SurfaceParameters, wings: int, links: int) -> dict[str, Array]:

@@ -24,7 +24,6 @@ from morphcore.search.solver import Batch, Outcome, Problem, Solver
 
 Array = NDArray[np.float64]
 
-FEWEST = 4  # models of a generation: with fewer there is nothing to weigh
 FIRST_SPREAD = 0.1  # standard deviation of the first generation, in the unit cube
 
 

@@ -14,7 +14,6 @@ from morphdata.samplefiles.csv_table import write_table
 Array = NDArray[np.float64]
 
 SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
-LEAST_ROWS = 3  # fewer do not tell how the hinge moves between them
 
 
 def write_schedule_csv(schedules: Mapping[str, Schedule], time_s: Array, path: str | Path) -> None:

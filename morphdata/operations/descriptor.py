@@ -45,6 +45,9 @@ class Operation(Generic[Asked]):
     deadline_s : callable
         ``deadline_s(request)`` gives the time, s, after which a running job is ended; None leaves that to the
         service.
+    model_in : callable
+        ``model_in(result)`` finds the identified model in a result, as an object with its ``model`` and its
+        ``fit``; None where there is none.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Operation(Generic[Asked]):
     summary: Callable[[Asked], Summary]
     begin: str
     deadline_s: Callable[[Asked], float | None] = lambda _request: None
+    model_in: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda _result: None
 
 
 def after_budget(report_s: float) -> Callable[[Any], float | None]:

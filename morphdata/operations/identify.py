@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 from morphdata.aircraft import Surface
 from morphdata.identifiable import corrections
@@ -16,6 +16,7 @@ from morphdata.identify import (
 )
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
+from morphdata.vehicle import paired_by_reflection
 
 # nominal figures, to an order of magnitude: what a request leaves out is the solver's choice
 SWARM_PARTICLES = {"pso": 200, "cma": 32}
@@ -75,25 +76,19 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
 
 def _mirror_groups(surfaces: Sequence[Surface]) -> int:
     """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
-    waiting: list[Surface] = []
-    groups = 0
-    for surface in (each for each in surfaces if each.flexible):
-        side: Literal["right", "left"] = "left" if surface.side == "right" else "right"
-        hinge = surface.hinge
-        changes = {
-            "side": side,
+    nameless = [each.model_copy(update={"name": ""}) for each in surfaces if each.flexible]
+    return len(paired_by_reflection(nameless, [_reflection(each) for each in nameless]))
+
+
+def _reflection(surface: Surface) -> Surface:
+    hinge = surface.hinge
+    return surface.model_copy(
+        update={
+            "side": "left" if surface.side == "right" else "right",
             "position_m": _across(surface.position_m),
             "hinge": hinge and hinge.model_copy(update={"position_m": _across(hinge.position_m)}),
         }
-        image = next(
-            (w for w in waiting if w == surface.model_copy(update={**changes, "name": w.name})), None
-        )
-        if image is None:
-            groups += 1
-            waiting.append(surface)
-        else:
-            waiting.remove(image)
-    return groups
+    )
 
 
 def _across(position_m: list[float] | None) -> list[float] | None:
@@ -147,4 +142,5 @@ IDENTIFY = Operation(
     summary=_summary,
     begin="worker.operations.identification:begin",
     deadline_s=after_budget(REPORT_TIME_S),
+    model_in=lambda result: result,
 )

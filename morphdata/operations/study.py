@@ -28,6 +28,12 @@ def _summary(request: StudyRequest) -> dict[str, Any]:
     return {**identify.samples_summary(request), "compared_links": request.model.links_per_wing}
 
 
+def _recommended(result: dict[str, Any]) -> dict[str, Any] | None:
+    links = (result.get("recommended") or {}).get("links_per_wing")
+    rows = (row for row in result.get("rows") or () if links is not None and row["links_per_wing"] == links)
+    return next(rows, None)
+
+
 STUDY = Operation(
     name="study",
     subject="How many links a model should have.",
@@ -44,4 +50,5 @@ STUDY = Operation(
     summary=_summary,
     begin="worker.operations.study:begin",
     deadline_s=after_budget(REPORT_TIME_S),
+    model_in=_recommended,
 )
