@@ -23,14 +23,21 @@ from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
-from app.jobs import repository, service, store
+from app.jobs import repository, store
 from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type
 from app.jobs.event_stream import EventStream, read_in_turn, wait_for_end
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
-from app.jobs.results import JobResult
-from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, OperationName
+from app.jobs.schemas import (
+    EXAMPLE_ID,
+    ArtifactList,
+    Job,
+    JobEventPage,
+    JobPage,
+    JobResult,
+    OperationName,
+)
 from app.keys.records import Scope
 from morphdata.execution import Label
 from morphdata.operations import OPERATIONS
@@ -111,8 +118,8 @@ def list_jobs(
 ) -> Response:
     """Your jobs, newest first, a page at a time."""
     with app.database.read() as session:
-        page = service.page(session, owner, wanted, cursor=cursor, limit=limit)
-    return as_json(page)
+        found, next_cursor = repository.list_jobs(session, owner, wanted, cursor=cursor, limit=limit)
+    return as_json(JobPage(jobs=[Job.of(job) for job in found], next_cursor=next_cursor))
 
 
 @router.get(
@@ -158,7 +165,7 @@ async def get_job_events(
 
     def read() -> JobEventPage:
         with app.database.read() as session:
-            return service.event_page(session, caller.owner, job_id, seen)
+            return repository.event_page(session, caller.owner, job_id, seen)
 
     page = await read_in_turn(app, caller.owner, read)
     accepted = request.headers.get("accept", "")
@@ -183,7 +190,7 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
     Of a cancelled or expired search it is the best so far, marked `"partial": true`.
     """
     with app.database.read() as session:
-        text = service.result(session, owner, job_id)
+        text = repository.required_result_json(session, owner, job_id)
     return Response(text, media_type="application/json")
 
 
@@ -216,18 +223,7 @@ def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response
 def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> ArtifactList:
     """Plots, curves and the result as files."""
     with app.database.read() as session:
-        found = repository.list_artifacts(session, owner, job_id)
-    return ArtifactList(
-        artifacts=[
-            Artifact(
-                name=item.name,
-                media_type=item.media_type,
-                size_bytes=item.size_bytes,
-                href=f"/jobs/{job_id}/artifacts/{item.name}",
-            )
-            for item in found
-        ]
-    )
+        return repository.list_artifacts(session, owner, job_id)
 
 
 @router.get(
@@ -254,7 +250,7 @@ def get_job_artifact(
     if not is_plain(name):  # and no database is asked for the character zero
         raise ArtifactNotFound(job_id, name)
     with app.database.read() as session:
-        _, data = repository.artifact_data(session, owner, job_id, name)
+        data = repository.artifact_data(session, owner, job_id, name)
     return Response(data, media_type=media_type(name), headers=artifact_headers(name))
 
 

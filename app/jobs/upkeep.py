@@ -29,16 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class Upkeep:
-    """One thread that makes a round every ten seconds.
-
-    Parameters
-    ----------
-    database : Database
-    publisher : Publisher
-        Takes the wake-up messages.
-    settings : Settings
-    reap_every_s : float
-    """
+    """One thread that makes a round every `reap_every_s`."""
 
     def __init__(
         self,
@@ -106,7 +97,7 @@ class Upkeep:
         return report
 
     def forget(self) -> bool:
-        """Make one round of retention; tell whether there is more to forget."""
+        """Make one round of retention; return whether there is more to delete."""
         if self._keep == Keep():
             return False
         with self._database.write() as session:

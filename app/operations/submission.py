@@ -14,10 +14,10 @@ from app.documents import Document, sealed
 from app.http.context import Caller, CallerDep, Service, ServiceDep
 from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
 from app.jobs import store
-from app.jobs.creation import Origin, Terms
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob
-from app.jobs.schemas import Job, QueuePlace
+from app.jobs.schemas import Job
+from app.jobs.store import Origin, Terms
 from app.keys import quota
 from app.keys.schemas import Quotas
 from app.observability.tracing import current_traceparent
@@ -137,6 +137,6 @@ def validated(app: Service, caller: Caller, operation: Operation[Any], request: 
         used = None if caller.key_id is None else quota.usage(session, caller.key_id)
     return {
         "cost": operation.cost(request),
-        "queue": QueuePlace.of(place),
+        "queue": place,
         "quotas": None if used is None else Quotas.of(used, caller.quota),
     }

@@ -55,9 +55,9 @@ def test_parts_of_another_version_are_not_used() -> None:
     assert len(parts) == 2
     old = step.checkpoint.replace(VERSION.encode(), b"identification 3")
     assert work.tasks(old, 4) is None
-    told = work.told(old, [work.fly(part, lambda: False) for part in parts], 0.1)
-    assert told.progress["phase"] == "baseline"
-    assert told.progress["message"].endswith(BEGUN_AGAIN)
+    again = work.combine(old, [work.fly(part, lambda: False) for part in parts], 0.1)
+    assert again.progress["phase"] == "baseline"
+    assert again.progress["message"].endswith(BEGUN_AGAIN)
 
 
 def test_a_model_that_flies_nothing_is_a_failed_job(worker: RealWorker) -> None:

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from morphcore import load_trajectory
+from morphdata.faults import MorphError
 from morphdata.simulate import SimulateResult
 from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation
 from worker.attempt import Ending
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 
 @pytest.mark.parametrize(
@@ -86,6 +87,6 @@ def test_a_spline_beyond_its_hinge_is_refused() -> None:
         }
     }
     work = find_operation("simulate")(request, 1)
-    with pytest.raises(WorkRefused) as refused:
+    with pytest.raises(MorphError) as refused:
         next(work.steps(None, lambda: False))
     assert (refused.value.code, refused.value.pointer) == ("invalid_input", "/schedules/both")

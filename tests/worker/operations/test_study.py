@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from morphdata.faults import MorphError
 from morphdata.study import StudyResult
 from tests.worker.operations.jobs_of_the_library import RealWorker, study
 from worker.attempt import Ending
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 TIMES = {"flight_s", "identify_s", "wall_s", "plan_s", "reason"}  # measured, or telling what was measured
 
@@ -65,6 +66,6 @@ def test_a_cancelled_study_keeps_its_rows(worker: RealWorker) -> None:
 
 def test_a_bad_list_is_refused() -> None:
     """The library's own check of the list reaches the user with its place."""
-    with pytest.raises(WorkRefused) as refused:
+    with pytest.raises(MorphError) as refused:
         find_operation("study")(study(2, 2), 1)
     assert refused.value.pointer == "/model/links_per_wing/1"
