@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
@@ -9,7 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import AwareDatetime, BaseModel
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
 from app.errors import (
     ArtifactNotFound,
@@ -42,7 +43,7 @@ from app.keys.records import Scope
 from morphdata.execution import Label
 from morphdata.operations import OPERATIONS
 
-router = APIRouter(tags=["jobs"])
+router = APIRouter(tags=["jobs"], generate_unique_id_function=attrgetter("name"))
 
 JobId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_ID])]
 FILE_KINDS: dict[str, Any] = {
@@ -104,7 +105,6 @@ JobFilterDep = Annotated[JobFilter, Depends(_wanted)]
 @router.get(
     "/jobs",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="list_jobs",
     summary="List jobs",
     response_model=JobPage,
     responses=documented(InvalidRequest),
@@ -125,7 +125,6 @@ def list_jobs(
 @router.get(
     "/jobs/{job_id}",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job",
     summary="Get a job",
     response_model=Job,
     responses=documented(InvalidRequest, JobNotFound, TooManyStreams),
@@ -139,7 +138,6 @@ async def get_job(app: ServiceDep, caller: CallerDep, job_id: JobId, prefer: Pre
 @router.get(
     "/jobs/{job_id}/events",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_events",
     summary="Follow a job",
     response_class=JSONResponse,
     response_model=JobEventPage,
@@ -179,7 +177,6 @@ async def get_job_events(
 @router.get(
     "/jobs/{job_id}/result",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_result",
     summary="Get the result of a job",
     response_model=JobResult,
     responses=documented(InvalidRequest, JobNotFound, ResultNotReady),
@@ -197,7 +194,6 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
 @router.get(
     "/jobs/{job_id}/request",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_request",
     summary="Get the request of a job",
     response_class=JSONResponse,
     responses={200: REQUEST, **documented(InvalidRequest, JobNotFound)},
@@ -216,7 +212,6 @@ def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response
 @router.get(
     "/jobs/{job_id}/artifacts",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="list_job_artifacts",
     summary="List the files of a job",
     responses=documented(InvalidRequest, JobNotFound),
 )
@@ -229,7 +224,6 @@ def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Artif
 @router.get(
     "/jobs/{job_id}/artifacts/{name}",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_artifact",
     summary="Get a file of a job",
     response_class=Response,
     responses={
@@ -257,7 +251,6 @@ def get_job_artifact(
 @router.post(
     "/jobs/{job_id}/cancel",
     dependencies=[demands(Scope.JOBS_WRITE)],
-    operation_id="cancel_job",
     summary="Cancel a job",
     responses=documented(InvalidRequest, JobNotFound),
 )
@@ -282,7 +275,6 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
 @router.delete(
     "/jobs/{job_id}",
     dependencies=[demands(Scope.JOBS_WRITE)],
-    operation_id="delete_job",
     summary="Delete a finished job",
     status_code=204,
     responses=documented(InvalidRequest, JobNotFound, JobNotFinished),

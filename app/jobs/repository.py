@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, delete, func, select, union_all
 from app.database import Session
 from app.documents import unpacked_json
 from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound, ResultNotReady
-from app.jobs.records import FINISHED, Job, moment
+from app.jobs.records import FINISHED, Job
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
 from app.jobs.schemas import Artifact, ArtifactList, JobEvent, JobEventPage
 from app.pages import read_page
@@ -116,7 +116,7 @@ def event_page(
         .order_by(job_events.c.seq)
         .limit(limit)
     )
-    events = [JobEvent(seq=row.seq, type=row.type, payload=row.payload, at=moment(row.at)) for row in rows]
+    events = [JobEvent.model_validate(row) for row in rows]
     last = events[-1].seq if events else after
     return JobEventPage(events=events, last_seq=last, finished=job.finished and last >= job.event_seq)
 

@@ -162,6 +162,8 @@ class JobPage(BaseModel):
 class JobEvent(BaseModel):
     """One event of a job's history."""
 
+    model_config = ConfigDict(from_attributes=True)
+
     seq: int = Field(description="Rises from 1.")
     type: str = Field(description="`queued`, `started`, `progress`, `requeued`, ... or the final status.")
     payload: dict[str, Any]

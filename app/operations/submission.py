@@ -9,7 +9,7 @@ from fastapi import Depends, Response
 from fastapi.concurrency import run_in_threadpool
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.documents import Document, sealed
 from app.http.context import Caller, CallerDep, Service, ServiceDep
 from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
@@ -52,15 +52,7 @@ class Submission:
     wait_s: float
 
     async def accept(self, operation: Operation[Any], request: Request) -> Job:
-        """Check the request, write its job, wake a worker, and wait for the end as far as asked.
-
-        Raises
-        ------
-        InvalidInput
-            Naming every fault.
-        IdempotencyConflict
-            The key was used for another request.
-        """
+        """Check the request, write its job, wake a worker, and wait for the end as far as requested."""
         job = await run_in_threadpool(self._write, operation, request)
         headers = self.response.headers
         if job.replayed:
@@ -124,13 +116,7 @@ SubmissionDep = Annotated[Submission, Depends(_submission)]
 
 
 def validated(app: Service, caller: Caller, operation: Operation[Any], request: Request) -> Document:
-    """Make the checks of a submission, start nothing; report what it would cost and how long it would wait.
-
-    Raises
-    ------
-    InvalidInput
-        Naming every fault.
-    """
+    """Make the checks of a submission and start nothing; report cost, place in the queue and quotas."""
     with app.database.read() as session:
         request = resolved(session, caller.owner, request)
         place = app.queue.place_of_next(session, caller.owner, operation.name, request.execution.priority)

@@ -23,7 +23,7 @@ LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
-    """What is said of a file: its document or columns, or what is wrong with it."""
+    """Return a file's document or columns, or what is wrong with it."""
     try:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
@@ -39,7 +39,7 @@ def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
 def main(arguments: list[str]) -> None:
     """Read standard input under limits and write a frame."""
     kind, *words, rows = arguments
-    limits = Limits.of(words)
+    limits = Limits(*map(int, words))
     confine_time(limits)
     for module in LOADED_BEFORE.get(kind, ()):
         try:
