@@ -99,9 +99,7 @@ class LeasedTable:
                 subscriber(session, row, note)
             if row.status in self.ends:
                 if self.on_end is None:
-                    raise RuntimeError(
-                        f"nobody has subscribed to ends of {self.table.name}: import app.on_end"
-                    )
+                    raise RuntimeError(f"no subscribers for ends of {self.table.name}: import app.on_end")
                 for subscriber in self.on_end:
                     subscriber(session, row, note)
         return row

@@ -279,7 +279,7 @@ def error_document(error: Exception, job_id: str) -> Document:
         hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
         return _error("out_of_memory", "the job needs more memory than there is", hint=hint)
     log.error("job %s: unforeseen", job_id, exc_info=error)
-    hint = f"the worker's log tells more about {job_id}; please report it"
+    hint = f"see the worker's log for {job_id}, and please report it"
     return _error("internal_error", "unexpected error in the worker", hint=hint)
 
 

@@ -1,7 +1,7 @@
 """A worker's signs of life: rows written from the very loop that hands jobs to its children.
 
 A process that is there but begins no jobs (stopped, hung) writes none, and one whose children are gone or do
-not answer writes that it has no slots: whoever reads the table sees it. Without a broker the rows are looked
+not answer writes that it has no slots. Without a broker the rows are looked
 at all the same (`worker.row_watch`), so the broker is no part of these signs. Each sign is a transaction on a
 connection of its own, closed at once: the parent process forks, and a child must not inherit a connection.
 """

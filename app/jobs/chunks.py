@@ -3,7 +3,7 @@
 Like the job store, every function takes a `Session` and leaves the commit to its caller. A chunk has a lease
 and a fence of its own; an outcome is stored where job, generation, number, fence and state are the claim's,
 and only there. The claim on the job itself is given up while its chunks are flown and taken again, with a
-higher fence, by whoever finds that all are stored or that the job must end.
+higher fence, by the worker that finds all stored or that must end the job.
 """
 
 from __future__ import annotations

@@ -42,6 +42,7 @@ from app.jobs.schemas import (
 from app.keys.records import Scope
 from morphdata.execution import Label
 from morphdata.operations import OPERATIONS
+from morphdata.operations.descriptor import Operation
 
 router = APIRouter(tags=["jobs"], generate_unique_id_function=attrgetter("name"))
 
@@ -80,6 +81,10 @@ REQUEST: dict[str, Any] = {
         }
     },
 }
+
+
+def _files_of(operation: Operation[Any]) -> str:
+    return f"Of `{operation.name}`: {', '.join(f'`{name}`' for name in operation.files)}"
 
 
 def as_json(answer: BaseModel) -> Response:
@@ -213,10 +218,11 @@ def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response
     "/jobs/{job_id}/artifacts",
     dependencies=[demands(Scope.JOBS_READ)],
     summary="List the files of a job",
+    description="Plots, tables and the result as files. " + "; ".join(map(_files_of, OPERATIONS)) + ".",
     responses=documented(InvalidRequest, JobNotFound),
 )
 def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> ArtifactList:
-    """Plots, curves and the result as files."""
+    """List the files, by name."""
     with app.database.read() as session:
         return repository.list_artifacts(session, owner, job_id)
 
@@ -268,7 +274,7 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
 
     job = app.database.write_even_if_full(cancel)
     if job.status is JobStatus.CANCELLING:
-        app.publisher.publish(job_id)  # a spread job is in nobody's hands: whoever is woken winds it down
+        app.publisher.publish(job_id)  # a spread job has no holder: the worker that is woken winds it down
     return Job.of(job)
 
 

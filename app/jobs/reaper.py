@@ -97,7 +97,7 @@ def _change(
     reason: str | None,
     values: Document,
 ) -> bool:
-    """Requeue or end a job as the reaper saw it; False when somebody else has changed it since."""
+    """Requeue or end a job as the reaper saw it; False when it has been changed since."""
     error = {"error": values["error"]} if "error" in values else {}
     note = Note(event, None if reason is None else {"reason": reason, **error})
     return JOBS.reap(session, (row.id,), row.fence, condition, note=note, **values) is not None
@@ -155,8 +155,8 @@ def _unheard(
 ) -> tuple[str, ...]:
     """Queued jobs whose message may have been lost; they are marked as published now.
 
-    As many as there are idle workers: a message is a wake-up for whatever job is next, and whoever ends a job
-    passes on the next one. So the longest queue sends no more messages than somebody has a use for.
+    As many as there are idle workers: a message wakes a worker for whatever job is next, and a worker that
+    ends a job passes on the next one. So even the longest queue sends no useless messages.
     """
     wanted = min(max(idle_slots(session), 1), PUBLISH_LIMIT)
     ids = session.scalars(
@@ -201,7 +201,7 @@ def _reopen(session: Session, row: Row[Any]) -> bool:
 
 
 def _never_wound_down(session: Session, clock: ColumnElement[float]) -> Rows:
-    """Cancelled jobs in nobody's hands that no worker came to end."""
+    """Cancelled jobs without a holder that no worker came to end."""
     cancelling = jobs.c.status == JobStatus.CANCELLING.value
     rows = session.execute(
         select(jobs.c.id, jobs.c.fence)

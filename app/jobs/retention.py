@@ -37,7 +37,7 @@ class Keep:
 
 @dataclass(frozen=True, slots=True)
 class Forgotten:
-    """How much one round forgot."""
+    """How many rows one round deleted."""
 
     jobs: int = 0
     trajectories: int = 0

@@ -1,7 +1,7 @@
 """Jobs and chunks as leased work, the conditions that select them, and job rows as values.
 
-A spread job is running and its work lies in `job_chunks`. While workers fly its chunks nobody holds the job
-itself: it has no lease. Whoever stored the last chunk, or learns that the job was cancelled or ran out of
+A spread job is running and its work lies in `job_chunks`. While workers fly its chunks the job itself has no
+holder and no lease. The worker that stored the last chunk, or learns that the job was cancelled or ran out of
 time, takes it over like any claim.
 """
 
@@ -29,7 +29,7 @@ FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second
 SPARSE_STEP = 120  # of what is older, one event a minute stays
 
 OPEN, RUNNING, DONE = "open", "running", "done"  # states of a chunk
-REST_S = 1.0  # workers take the next chunk within milliseconds; after this nobody is at it
+REST_S = 1.0  # workers take the next chunk within milliseconds; after this the job is at rest
 
 
 def write_event(session: Session, row: LeasedRow, note: Note) -> None:
@@ -68,7 +68,7 @@ CHUNKS = LeasedTable(
     dated={"at": database_time()},
 )
 
-# handed out: running, and in no single worker's hands
+# handed out to several workers: running, and held by none
 HANDED_OUT = and_(jobs.c.status.in_(HELD), jobs.c.lease_until.is_(None), jobs.c.spread)
 
 
@@ -107,14 +107,14 @@ def in_time() -> ColumnElement[bool]:
 
 
 def must_go_on() -> ColumnElement[bool]:
-    """Whether a spread job in nobody's hands waits for a worker to advance or to end it."""
+    """Whether a spread job without a holder waits for a worker to advance or to end it."""
     unfinished = job_chunks.c.status.in_((OPEN, RUNNING))
     flown = ~exists().where(job_chunks.c.job_id == jobs.c.id, job_chunks.c.owner == jobs.c.owner, unfinished)
     return and_(HANDED_OUT, or_(jobs.c.status == JobStatus.CANCELLING.value, deadline_passed(), flown))
 
 
 def at_rest() -> ColumnElement[bool]:
-    """Whether a spread job is in nobody's hands and nobody flies, or just flew, one of its chunks."""
+    """Whether a spread job has no holder and no worker flies, or just flew, one of its chunks."""
     lately = exists().where(
         job_chunks.c.job_id == jobs.c.id,
         or_(job_chunks.c.status == RUNNING, job_chunks.c.at > database_time() - REST_S),

@@ -1,6 +1,6 @@
 """Reaper, retention and disk space inside the API process: they go on while every worker is busy for hours.
 
-Workers reap too, whenever one is free. Each change is a compare-and-set, so nobody gets in another's way.
+Workers reap too, whenever one is free. Each change is a compare-and-set, so they do not interfere.
 """
 
 from __future__ import annotations
@@ -103,5 +103,5 @@ class Upkeep:
         with self._database.write() as session:
             forgotten = forget(session, self._keep)
         if forgotten.jobs or forgotten.trajectories:
-            log.info("forgot %d jobs and %d trajectories", forgotten.jobs, forgotten.trajectories)
+            log.info("deleted %d jobs and %d trajectories", forgotten.jobs, forgotten.trajectories)
         return forgotten.more

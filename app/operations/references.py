@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from app.database import Session
 from app.documents import Document
-from app.errors import JobNotFound, ModelNotFound
+from app.errors import NotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
@@ -56,6 +56,8 @@ def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
             _put(document, item, RESOLVERS[item.field](session, owner, item))
         except InvalidInput as error:
             faults += error.faults
+        except NotFound as error:
+            faults.append(Fault(error.code, error.detail, item.pointer, error.hint))
     if faults:
         raise InvalidInput.of(faults)
     try:
@@ -125,21 +127,13 @@ def _flight(session: Session, owner: str, reference: Reference) -> Document:
 
 
 def _model(session: Session, owner: str, reference: Reference) -> Document:
-    try:
-        _, document = models.get_model(session, owner, reference.id)
-    except ModelNotFound as error:
-        raise InvalidInput.of(
-            [Fault("model_not_found", error.detail, reference.pointer, error.hint)]
-        ) from None
+    _, document = models.get_model(session, owner, reference.id)
     return {"parameters": _as_given(document["model"])}
 
 
 def _model_of_job(session: Session, owner: str, reference: Reference) -> Document:
     """Find the model that a job left, whole or as its best so far."""
-    try:
-        job = get_job(session, owner, reference.id)
-    except JobNotFound as error:
-        raise InvalidInput.of([Fault("job_not_found", error.detail, reference.pointer, error.hint)]) from None
+    job = get_job(session, owner, reference.id)
     text = jobs.result_json(session, owner, job.id)
     left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:

@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> None:
         frame = pack({"failed": type(error).__name__})
     sys.stdout.buffer.write(frame)
     sys.stdout.buffer.flush()
-    os._exit(0)  # libraries' farewells are nobody's business, and may hang
+    os._exit(0)  # the libraries' own clean-up may hang
 
 
 if __name__ == "__main__":

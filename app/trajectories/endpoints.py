@@ -45,7 +45,7 @@ FORM_SCHEMA: dict[str, Any] = {
         "file": {
             "type": "string",
             "format": "binary",
-            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), told by the ending "
+            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), recognised by the ending "
             "of its name: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
         },
         "name": {

@@ -8,7 +8,7 @@ import pytest
 
 from morphcore.identify.identification import VERSION
 from tests.identification_request import identification
-from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker
+from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, undeclared
 from worker.attempt import Ending
 from worker.operations import find_operation
 from worker.operations.identification import IdentificationWork
@@ -33,7 +33,9 @@ def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any]) -> None:
     work = find_operation("identify")(request, 1)
     steps = list(work.steps(None, lambda: False))
     assert len(steps) > 3
-    whole = work.outcome(steps[-1].checkpoint).document
+    outcome = work.outcome(steps[-1].checkpoint)
+    assert undeclared(outcome.artifacts, "identify") == []
+    whole = outcome.document
     for cut in (0, len(steps) - 2):
         resumed = find_operation("identify")(request, 1)
         *_, last = resumed.steps(steps[cut].checkpoint, lambda: False)

@@ -14,7 +14,7 @@ from morphcore.simulate.schedule import scheduled
 from morphdata.faults import MorphError
 from morphdata.optimize import OptimizeResult
 from morphdata.schedules import load_schedules
-from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation
+from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation, undeclared
 from tests.worker.operations.test_study import timeless
 from worker.attempt import Ending
 from worker.operations import find_operation
@@ -35,6 +35,7 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
     assert result.variation.optimum.flexible is None
     files = worker.files(job_id)
     assert set(files) == {"result.json", *TABLES, *PICTURES}
+    assert undeclared(files, "optimize") == []
     path = tmp_path / "schedule.csv"
     path.write_bytes(files["schedule.csv"])
     given = load_schedules(path).left

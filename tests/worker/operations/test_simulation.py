@@ -13,7 +13,7 @@ import pytest
 from morphcore import load_trajectory
 from morphdata.faults import MorphError
 from morphdata.simulate import SimulateResult
-from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation
+from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation, undeclared
 from worker.attempt import Ending
 from worker.operations import find_operation
 
@@ -37,6 +37,7 @@ def test_each_model_flies(worker: RealWorker, model: dict[str, object]) -> None:
     assert np.isclose(result.trajectory.sweep_left_rad[-1], 0.4)
     files = worker.files(job_id)
     assert set(files) == {"result.json", "flight.csv", "flight.svg", "flight.png"}
+    assert undeclared(files, "simulate") == []
     assert json.loads(files["result.json"]) == worker.result(job_id)
     assert worker.job(job_id).model_id is None
 

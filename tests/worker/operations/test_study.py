@@ -10,7 +10,7 @@ import pytest
 
 from morphdata.faults import MorphError
 from morphdata.study import StudyResult
-from tests.worker.operations.jobs_of_the_library import RealWorker, study
+from tests.worker.operations.jobs_of_the_library import RealWorker, study, undeclared
 from worker.attempt import Ending
 from worker.operations import find_operation
 
@@ -33,6 +33,7 @@ def test_a_study_ends_with_rows_and_a_recommendation(worker: RealWorker) -> None
     assert result.recommended.links_per_wing in {1, 2}
     files = worker.files(job_id)
     assert set(files) == {"result.json", "study.csv", "study.svg", "study.png"}
+    assert undeclared(files, "study") == []
     assert len(list(csv.reader(io.StringIO(files["study.csv"].decode())))) == 3
     assert worker.job(job_id).model_id is not None
 
