@@ -84,7 +84,7 @@ REQUEST: dict[str, Any] = {
 
 
 def _files_of(operation: Operation[Any]) -> str:
-    return f"Of `{operation.name}`: {', '.join(f'`{name}`' for name in operation.files)}"
+    return f"Of `{operation.name}`: {', '.join(f'`{name}`' for name in operation.files)}."
 
 
 def as_json(answer: BaseModel) -> Response:
@@ -218,7 +218,7 @@ def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response
     "/jobs/{job_id}/artifacts",
     dependencies=[demands(Scope.JOBS_READ)],
     summary="List the files of a job",
-    description="Plots, tables and the result as files. " + "; ".join(map(_files_of, OPERATIONS)) + ".",
+    description=" ".join(["Plots, tables and the result as files.", *map(_files_of, OPERATIONS)]),
     responses=documented(InvalidRequest, JobNotFound),
 )
 def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> ArtifactList:
