@@ -278,7 +278,7 @@ class Simulation:
             step = next(iter(work.steps(None, lambda: False)))
         else:
             assert brought is not None
-            step = work.told(checkpoint, brought.outcomes, brought.elapsed_s)
+            step = work.combine(checkpoint, brought.outcomes, brought.elapsed_s)
         tasks = work.tasks(step.checkpoint, self.plan.chunks)
         if tasks is None:
             document = work.outcome(step.checkpoint).document
