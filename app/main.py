@@ -18,14 +18,12 @@ from app.database import Database, upgrade
 from app.errors import TooManyStreams
 from app.health.endpoints import router as health
 from app.health.service import Health
-from app.http.body_limit import BodyLimit, BodyLimits
+from app.http.body_limit import BodyLimit
 from app.http.context import Service
 from app.http.gate import Gate
-from app.http.head import HeadAsGet
+from app.http.middleware import HeadAsGet, RequestId, SecurityHeaders
 from app.http.observed import Observed
 from app.http.problems import install_problem_handlers
-from app.http.request_id import RequestId
-from app.http.security_headers import SecurityHeaders
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
 from app.jobs.upkeep import Upkeep
@@ -39,8 +37,7 @@ from app.observability.logs import configure_logging
 from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
 from app.operations.endpoints import router as operations
-from app.owner_limit import OwnerLimit
-from app.owner_turns import OwnerTurns
+from app.owner_turns import OwnerLimit, OwnerTurns
 from app.parsing.confinement import Limits
 from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
@@ -52,7 +49,6 @@ from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
 from morphdata.version import VERSION
 
-BODIES_AT_ONCE = 16  # of the largest size
 READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too
 
 
@@ -70,40 +66,24 @@ def routed_app() -> FastAPI:
 def create_app(settings: Settings | None = None, *, sending: SenderSettings | None = None) -> FastAPI:
     """Build the service; database and messages are opened when it starts.
 
-    Parameters
-    ----------
-    settings : Settings, optional
-        Those of the environment when left out.
-    sending : SenderSettings, optional
-        How webhooks are sent; as `settings` say when left out.
+    Settings come from the environment when they are left out, and webhooks are sent as the settings say.
     """
     chosen = settings or load_settings()
     if settings is None:  # a process of its own, not a guest in another's
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
-    app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
+    app.router.lifespan_context = _lifespan(chosen, sending or _sender_settings(chosen))
     install_problem_handlers(app)
-    bodies = BODIES_AT_ONCE * chosen.max_body_bytes
-    limits = BodyLimits(
-        chosen.max_body_bytes,
-        chosen.body_grace_s,
-        max_total_bytes=bodies,
-        max_owner_bytes=bodies // 2 if chosen.demands_keys else bodies,
-    )
     app.add_middleware(HeadAsGet)
-    app.add_middleware(BodyLimit, limits=limits)
+    app.add_middleware(BodyLimit, settings=chosen)
     app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
-    _wrap(app)
+    # these see every answer, also of unforeseen errors, which the framework answers outside of its middleware
+    inner = app.build_middleware_stack
+    app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
     return app
 
 
-def _wrap(app: FastAPI) -> None:
-    """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
-    inner = app.build_middleware_stack
-    app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
-
-
-def _sending(settings: Settings) -> SenderSettings:
+def _sender_settings(settings: Settings) -> SenderSettings:
     return SenderSettings(
         AddressPolicy(allow_private=settings.webhook_allow_private, dial_only=settings.webhook_hosts)
     )
@@ -192,7 +172,7 @@ def _streams_end_with_the_process(watcher: JobWatcher) -> Iterator[None]:
 
 
 def __getattr__(name: str) -> Any:
-    """Build ``app.main:app`` when a server asks for it, not on import."""
+    """Build ``app.main:app`` when a server looks it up, not on import."""
     if name == "app":
         return create_app()
     raise AttributeError(name)

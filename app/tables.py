@@ -34,6 +34,13 @@ STATUSES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled
 CHUNK_STATUSES = ("open", "running", "done")
 ZERO = text("0")  # what rows that are older than a column count as
 
+
+def _one_of(statuses: tuple[str, ...]) -> CheckConstraint:
+    return CheckConstraint(
+        "status IN ({})".format(", ".join(f"'{name}'" for name in statuses)), name="status"
+    )
+
+
 jobs = Table(
     "jobs",
     metadata,
@@ -47,9 +54,8 @@ jobs = Table(
     Column("error", JSON),
     Column("attempt", Integer, nullable=False),
     Column("max_attempts", Integer, nullable=False),
-    Column(
-        "fence", Integer, nullable=False
-    ),  # rises with every claim; a write with an old one changes nothing
+    # rises with every claim; a write with an old one changes nothing
+    Column("fence", Integer, nullable=False),
     Column("worker", String(128)),
     Column("lease_until", Double),
     Column("event_seq", Integer, nullable=False),  # the last event's number
@@ -68,11 +74,10 @@ jobs = Table(
     Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work lies in job_chunks
     Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
     Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
-    Column(
-        "size_bytes", BigInteger, nullable=False, server_default=ZERO
-    ),  # request, result, files; events too at the end
+    # request, result, files; events too at the end
+    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Column("label", String(100)),  # the owner's own word, to find the job again
-    CheckConstraint("status IN ({})".format(", ".join(f"'{name}'" for name in STATUSES)), name="status"),
+    _one_of(STATUSES),
     Index("ix_jobs_owner_id", "owner", "id"),
     # a list is the owner's, newest first: whatever it is filtered by, the rows of a page lie side by side
     Index("ix_jobs_owner_status_id", "owner", "status", "id"),
@@ -92,20 +97,13 @@ owners = Table(
     "owners",
     metadata,
     Column("owner", String(64), primary_key=True),
-    Column(
-        "served_at", Double, nullable=False, server_default=ZERO
-    ),  # when a worker last took a job of theirs
+    # when a worker last took a job of theirs
+    Column("served_at", Double, nullable=False, server_default=ZERO),
 )
 
 
-def _job_key(*, primary_key: bool = True) -> Column[str]:
-    return Column(
-        "job_id",
-        String(64),
-        ForeignKey("jobs.id", ondelete="CASCADE"),
-        primary_key=primary_key,
-        nullable=False,
-    )
+def _job_key() -> Column[str]:
+    return Column("job_id", String(64), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
 
 
 job_requests = Table(
@@ -159,9 +157,7 @@ job_chunks = Table(
     Column("task", LargeBinary, nullable=False),  # what to fly
     Column("outcome", LargeBinary),  # what came of it; stored once
     Column("at", Double, nullable=False),
-    CheckConstraint(
-        "status IN ({})".format(", ".join(f"'{name}'" for name in CHUNK_STATUSES)), name="status"
-    ),
+    _one_of(CHUNK_STATUSES),
     Index("ix_job_chunks_status_owner_job_id", "status", "owner", "job_id"),
     Index("ix_job_chunks_status_lease_until", "status", "lease_until"),
 )
@@ -320,7 +316,7 @@ workers = Table(
     Column("started_at", Double, nullable=False),
     Column("seen_at", Double, nullable=False),  # when it last showed that it takes jobs
     Column("stopped_at", Double),  # it ended as it should
-    Column("process", String(128)),  # as `app.health.processes` names it
+    Column("process", String(128)),  # as `app.health.presence` names it
     Index("ix_workers_seen_at", "seen_at"),
 )
 

@@ -20,7 +20,7 @@ router = APIRouter(tags=["health"])
 
 
 async def current_health(request: Request) -> Health:
-    """Return what the process that serves `request` tells of itself."""
+    """Return the health of the process that serves `request`."""
     health: Health = request.app.state.health
     return health
 
@@ -44,8 +44,8 @@ async def livez() -> Liveness:
 async def readyz(health: HealthDep, response: Response, *, strict: Strict = False) -> Readiness:
     """Report whether database, broker and workers are available.
 
-    A load balancer asks without `strict`: while broker or workers are away this process still takes jobs and
-    keeps them. Who watches over the whole service asks with it.
+    Load balancers check without `strict`: while broker or workers are away this process still takes jobs and
+    keeps them. Monitoring of the whole service checks with it.
     """
     state = await health.readiness()
     if state.status == "not_ready" or (strict and state.status == "degraded"):
@@ -61,5 +61,5 @@ async def readyz(health: HealthDep, response: Response, *, strict: Strict = Fals
     dependencies=[demands(Scope.METRICS)],
 )
 def metrics(health: HealthDep) -> Response:
-    """Jobs, queue, workers and counters as the rows tell them; requests as this process has served them."""
+    """Jobs, queue, workers and counters from the database; requests as this process has served them."""
     return Response(health.metrics.text(), media_type=MEDIA_TYPE)

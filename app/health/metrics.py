@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: what the rows tell, the same from every API process, and this one's requests."""
+"""Metrics for Prometheus: what is in the rows, the same from every API process, and this one's requests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from app.health.records import Snapshot
+from app.health.repository import Snapshot
 from app.observability import job_counts
 from app.observability.counters import Counted
 from app.observability.request_metrics import REGISTRY
@@ -31,7 +31,7 @@ COUNTERS = {  # by the name of their rows
         (),
     ),
     job_counts.REAP_ROUNDS: ("morphid_reap_rounds", "Rounds of the reaper; the count must keep rising.", ()),
-    job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that were asked to end.", ()),
+    job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that shut down.", ()),
 }
 HISTOGRAMS = {
     job_counts.WAIT_TIME: ("morphid_job_wait_seconds", "From a job's creation to its first claim."),
@@ -40,17 +40,10 @@ HISTOGRAMS = {
 
 
 class Metrics:
-    """The page that Prometheus reads.
+    """The page that Prometheus reads; `look` reads the rows."""
 
-    Parameters
-    ----------
-    look : reads the rows.
-    clock : seconds that only rise.
-    """
-
-    def __init__(self, look: Callable[[], Snapshot], *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, look: Callable[[], Snapshot]) -> None:
         self._look = look
-        self._clock = clock
         self._lock = threading.Lock()
         self._seen: Snapshot | None = None
         self._seen_at = float("-inf")
@@ -58,9 +51,9 @@ class Metrics:
     def text(self) -> bytes:
         """Write the page in the text format of Prometheus (version 0.0.4)."""
         with self._lock:
-            if self._seen is None or self._clock() - self._seen_at > FRESH_S:
+            if self._seen is None or time.monotonic() - self._seen_at > FRESH_S:
                 self._seen = self._look()
-                self._seen_at = self._clock()
+                self._seen_at = time.monotonic()
             seen = self._seen
         registry = CollectorRegistry()
         registry.register(_Rows(seen))
@@ -72,7 +65,7 @@ class _Rows(Collector):
         self._seen = seen
 
     def collect(self) -> Iterator[Metric]:
-        """Give what the rows tell."""
+        """Give the families of metrics."""
         seen = self._seen
         yield _gauge("morphid_jobs", "Jobs by state.", "status", seen.jobs.items())
         yield GaugeMetricFamily("morphid_queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"])

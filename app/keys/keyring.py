@@ -15,12 +15,12 @@ from app.keys.records import ApiKey
 from app.keys.repository import StoredKey, find_key, note_use
 from app.keys.secret import KeyText
 
-FRESH_S = 2.0  # a revoked key opens nothing after this long, in every process
+FRESH_S = 2.0  # a revoked key is refused after this long, in every process
 REMEMBERED = 10_000  # keys; further ones are read for each request
 
 
 class Refusal(StrEnum):
-    """Why a key does not open: for the audit log, never for the caller."""
+    """Why a key is not valid: for the audit log, never for the caller."""
 
     MALFORMED = "malformed"
     UNKNOWN = "unknown"
@@ -36,16 +36,7 @@ class _Remembered:
 
 
 class KeyRing:
-    """The keys of the database, remembered for a moment.
-
-    Parameters
-    ----------
-    database : Database
-    background : BackgroundWriter
-        Takes the note of a key's last use, which no request waits for.
-    clock
-        Seconds that only rise.
-    """
+    """The keys of the database, remembered for a moment; their last use is written in the background."""
 
     def __init__(
         self, database: Database, background: BackgroundWriter, clock: Callable[[], float] = time.monotonic
@@ -61,11 +52,11 @@ class KeyRing:
         return known is not None and self._clock() - known.read_at < FRESH_S
 
     def check(self, text: KeyText) -> ApiKey | Refusal:
-        """Return whose key it is, or why it opens nothing; reads the database unless it `is_fresh`."""
+        """Return whose key it is, or why it is not valid; reads the database unless it `is_fresh`."""
         known = self._remembered.get(text.prefix)
         if known is None or self._clock() - known.read_at >= FRESH_S:
             known = self._read(text.prefix)
-        if known is None or not text.opens(known.stored.secret_sha256):
+        if known is None or not text.matches(known.stored.secret_sha256):
             return Refusal.UNKNOWN
         key = known.stored.key
         if key.revoked_at is not None:

@@ -12,7 +12,7 @@ from app.audit.records import Action
 from app.audit.service import note
 from app.documents import Document, sealed
 from app.http.context import Caller, CallerDep, Service, ServiceDep
-from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
+from app.http.parameters import IdempotencyKeyHeader, PreferHeader, wait_seconds
 from app.jobs import store
 from app.jobs.creation import Origin, Terms
 from app.jobs.event_stream import wait_for_end

@@ -36,21 +36,11 @@ class Timeouts:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of one try.
+    """What came of one try."""
 
-    Attributes
-    ----------
-    status : int or None
-        HTTP status; None when there was no answer.
-    error : str or None
-        Why the try failed, in one short sentence that holds nothing of what the receiver said.
-    retry_after_s : float or None
-        What the receiver asked for.
-    """
-
-    status: int | None
-    error: str | None = None
-    retry_after_s: float | None = None
+    status: int | None  # of HTTP; None when there was no answer
+    error: str | None = None  # why the try failed, in a sentence that holds nothing of what the receiver said
+    retry_after_s: float | None = None  # as the receiver requested
 
     @property
     def delivered(self) -> bool:
@@ -72,14 +62,9 @@ class _Heard:
 
 
 class Poster:
-    """Posts messages; an asynchronous context that owns its client.
+    """Posts messages to addresses that `policy` allows; an asynchronous context that owns its client.
 
-    Parameters
-    ----------
-    policy : AddressPolicy
-        Which addresses may be connected to.
-    trust : ssl.SSLContext, optional
-        Whom to believe; the usual authorities when None.
+    Certificates are checked against `trust`, by default the usual authorities.
     """
 
     def __init__(
@@ -121,10 +106,7 @@ class Poster:
     ) -> Answer:
         """Send one message; every failure is an answer, never an exception.
 
-        Parameters
-        ----------
-        challenge : str, optional
-            The message is taken only by a receiver that answers ``{"challenge": "..."}`` with this text.
+        A message with a `challenge` is delivered only to a receiver that answers ``{"challenge": "..."}``.
         """
         import httpx
 
@@ -178,9 +160,9 @@ class Poster:
         response = await self._opened().send(request, stream=True)
         try:
             status = response.status_code
-            asked = parse_retry_after(response.headers.get("retry-after"), time.time())
+            retry_after_s = parse_retry_after(response.headers.get("retry-after"), time.time())
             error = None if 200 <= status < 300 else f"The receiver answered {status}."
-            heard.answer = Answer(status, error, asked)
+            heard.answer = Answer(status, error, retry_after_s)
             async for piece in response.aiter_raw():
                 heard.content += piece
                 if len(heard.content) > MAX_ANSWER_BYTES:
@@ -192,10 +174,10 @@ class Poster:
 def _echoes(content: bytearray, challenge: str) -> bool:
     """Whether an answer is a JSON object with the challenge in it."""
     try:
-        told = json.loads(content)
+        answer = json.loads(content)
     except (ValueError, RecursionError):
         return False
-    return isinstance(told, dict) and told.get("challenge") == challenge
+    return isinstance(answer, dict) and answer.get("challenge") == challenge
 
 
 def _why(failure: Exception) -> str:

@@ -30,35 +30,21 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class SenderSettings:
-    """How a sender goes about it.
-
-    Attributes
-    ----------
-    poll_s : float
-        Time between two looks at the table, s.
-    max_at_once, max_per_owner : int
-        Deliveries under way, in all and of one owner.
-    """
+    """How a sender works."""
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
     trust: ssl.SSLContext | None = None
     timeouts: Timeouts = field(default_factory=Timeouts)
-    poll_s: float = 1.0
-    max_at_once: int = 16
-    max_per_owner: int = 4
+    poll_s: float = 1.0  # between two looks at the table
+    max_at_once: int = 16  # deliveries under way
+    max_per_owner: int = 4  # of these
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
 
 
 class WebhookSender:
-    """Sends what waits in the outbox.
-
-    Parameters
-    ----------
-    database : Database
-    settings : SenderSettings
-    """
+    """Sends what waits in the outbox."""
 
     def __init__(self, database: Database, settings: SenderSettings) -> None:
         self._database = database
@@ -71,20 +57,19 @@ class WebhookSender:
 
     def start(self) -> None:
         """Begin to send, in a thread of its own."""
-        self._thread = threading.Thread(target=self._main, name="webhook-sender", daemon=True)
+        self._thread = threading.Thread(
+            target=asyncio.run, args=(self.run(),), name="webhook-sender", daemon=True
+        )
         self._thread.start()
 
-    def stop(self, patience_s: float = 2 * STOP_S + 1.0) -> None:
+    def stop(self) -> None:
         """End within a second or two; what is not done stays in the table."""
         self._stopping.set()
         loop, wake = self._loop, self._wake
         if loop is not None and wake is not None and not loop.is_closed():
             loop.call_soon_threadsafe(wake.set)
         if self._thread is not None:
-            self._thread.join(patience_s)
-
-    def _main(self) -> None:
-        asyncio.run(self.run())
+            self._thread.join(2 * STOP_S + 1.0)
 
     async def run(self) -> None:
         """Send until `stop` is called."""
@@ -158,13 +143,8 @@ class WebhookSender:
 
     def _settle(self, dispatch: Dispatch, answer: Answer) -> str | None:
         with self._database.write() as session:
-            return deliveries.settle(
-                session,
-                dispatch,
-                answer,
-                rng=self._settings.rng,
-                clock=self._settings.clock,
-            )
+            chosen = self._settings
+            return deliveries.settle(session, dispatch, answer, rng=chosen.rng, clock=chosen.clock)
 
     async def _wind_down(self) -> None:
         """Let what is under way end, for a moment; give the rest back."""

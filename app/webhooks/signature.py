@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 from standardwebhooks import Webhook
 
-SECRET_BYTES = 32  # the standard asks for 24 to 64
+SECRET_BYTES = 32  # the standard requires 24 to 64
 
 
 def new_secret() -> str:
@@ -19,14 +19,8 @@ def new_secret() -> str:
 def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
     """Headers by which the receiver knows sender, message and time.
 
-    Parameters
-    ----------
-    secret : str
-        ``whsec_<base64>``.
-    message_id : str
-        The same in every try, so that the receiver can leave out what it has seen.
-    timestamp : float
-        Of this try, s since 1970 UTC.
+    The message's id is the same in every try, so that the receiver can skip what it has seen; the timestamp
+    (s since 1970 UTC) is that of the try.
     """
     moment = datetime.fromtimestamp(int(timestamp), UTC)
     return {
