@@ -68,23 +68,18 @@ class _Rows(Collector):
         """Give the families of metrics."""
         seen = self._seen
         yield _gauge("morphid_jobs", "Jobs by state.", "status", seen.jobs.items())
-        yield GaugeMetricFamily("morphid_queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"])
-        yield GaugeMetricFamily(
-            "morphid_oldest_queued_seconds", "Age of the oldest job that waits.", seen.oldest_queued_s
-        )
-        yield GaugeMetricFamily(
-            "morphid_flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s
-        )
         yield _gauge("morphid_chunks", "Chunks of distributed jobs.", "status", seen.chunks.items())
-        yield GaugeMetricFamily(
-            "morphid_webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting
-        )
         workers = {"alive": seen.workers.alive, "stalled": seen.workers.stalled}
         yield _gauge("morphid_workers", "Workers by state.", "status", workers.items())
-        yield GaugeMetricFamily(
-            "morphid_worker_slots", "Jobs that living workers can run at once.", seen.workers.slots
-        )
-        yield GaugeMetricFamily("morphid_worker_slots_busy", "Of these, in use.", seen.workers.busy)
+        for name, help_text, value in (
+            ("queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"]),
+            ("oldest_queued_seconds", "Age of the oldest job that waits.", seen.oldest_queued_s),
+            ("flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s),
+            ("webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting),
+            ("worker_slots", "Jobs that living workers can run at once.", seen.workers.slots),
+            ("worker_slots_busy", "Of these, in use.", seen.workers.busy),
+        ):
+            yield GaugeMetricFamily(f"morphid_{name}", help_text, value)
         yield _gauge("morphid_build_info", "Version of this API process.", "version", [(VERSION, 1)])
         yield from _counters(seen.counters)
         for name, (shown, help_text) in HISTOGRAMS.items():

@@ -84,19 +84,20 @@ class RefusalLimit:
         """Count an invalid key; False when there were so many that this one should not be written down."""
         place, now = network_of(address), self._clock()
         bucket = self._buckets.get(place) or TokenBucket(BURST, REFILL_S, now)
-        _remember(self._buckets, place, bucket)
+        remember(self._buckets, place, bucket)
         return bucket.take(now) and self._notes.take(now)
 
     def note_valid(self, address: str, prefix: str) -> None:
         """Remember a valid key, so that others' guesses from the same address do not delay it."""
-        _remember(self._valid, (network_of(address), prefix), None)
+        remember(self._valid, (network_of(address), prefix), None)
 
     def forget(self, address: str, prefix: str) -> None:
         """Treat a key like any other again: it has expired or was revoked."""
         self._valid.pop((network_of(address), prefix), None)
 
 
-def _remember(known: OrderedDict[Key, Value], key: Key, value: Value) -> None:
+def remember(known: OrderedDict[Key, Value], key: Key, value: Value) -> None:
+    """Put a value into a cache of bounded size; the longest unused one gives way."""
     known[key] = value
     known.move_to_end(key)
     if len(known) > REMEMBERED:

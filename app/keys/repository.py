@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -27,13 +28,14 @@ USE_IS_DUE = or_(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class StoredKey:
     """A key with what is needed to check it."""
 
     key: ApiKey
     secret_sha256: str
     use_is_due: bool  # the noted last use is older than `USE_NOTED_EVERY_S`
+    read_at: float = -math.inf  # when it was read, by the clock of the reader
 
 
 def _key(row: Row[*tuple[Any, ...]]) -> ApiKey:

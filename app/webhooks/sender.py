@@ -49,6 +49,7 @@ class WebhookSender:
     def __init__(self, database: Database, settings: SenderSettings) -> None:
         self._database = database
         self._settings = settings
+        self._poster = Poster(settings.policy, settings.trust, settings.timeouts)
         self._under_way: dict[asyncio.Task[None], Dispatch] = {}
         self._stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -74,30 +75,28 @@ class WebhookSender:
     async def run(self) -> None:
         """Send until `stop` is called."""
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
-            waiting = asyncio.create_task(self._wake.wait())
-            try:
-                while not self._stopping.is_set():
-                    await self._begin(poster)
-                    await asyncio.wait(
-                        {waiting, *self._under_way},
-                        timeout=self._settings.poll_s,
-                        return_when=asyncio.FIRST_COMPLETED,
-                    )
-            finally:
-                waiting.cancel()
-                await self._wind_down()
+        waiting = asyncio.create_task(self._wake.wait())
+        try:
+            while not self._stopping.is_set():
+                await self._begin()
+                await asyncio.wait(
+                    {waiting, *self._under_way},
+                    timeout=self._settings.poll_s,
+                    return_when=asyncio.FIRST_COMPLETED,
+                )
+        finally:
+            waiting.cancel()
+            await self._wind_down()
 
     async def send_due(self) -> int:
         """Send what is due now, once each, and return how many tries were made."""
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
-            tries = 0
-            while begun := await self._begin(poster):
-                tries += begun
-                await asyncio.wait(set(self._under_way))
-            return tries
+        tries = 0
+        while begun := await self._begin():
+            tries += begun
+            await asyncio.wait(set(self._under_way))
+        return tries
 
-    async def _begin(self, poster: Poster) -> int:
+    async def _begin(self) -> int:
         """Claim as many deliveries as there is room for, and begin to send them."""
         room = self._settings.max_at_once - len(self._under_way)
         if room <= 0:
@@ -109,7 +108,7 @@ class WebhookSender:
             logger.warning("cannot look for webhook deliveries: %s", error)
             return 0
         for dispatch in taken:
-            task = asyncio.create_task(self._deliver(poster, dispatch))
+            task = asyncio.create_task(self._deliver(dispatch))
             self._under_way[task] = dispatch
             task.add_done_callback(self._ended)
         return len(taken)
@@ -129,11 +128,11 @@ class WebhookSender:
         with self._database.write() as session:
             return deliveries.claim(session, found, chosen.lease_s, chosen.clock)
 
-    async def _deliver(self, poster: Poster, dispatch: Dispatch) -> None:
+    async def _deliver(self, dispatch: Dispatch) -> None:
         body = json_bytes(dispatch.payload)
         headers = signed_headers(dispatch.secret, dispatch.id, dispatch.at, body)
         try:
-            answer = await poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
+            answer = await self._poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
             status = await asyncio.to_thread(self._settle, dispatch, answer)
         except SQLAlchemyError as error:
             # the claim's lease ends, and the delivery is sent again under the same id

@@ -43,8 +43,8 @@ def post(
     """Post once, believing `authority` or the usual ones."""
 
     async def once() -> Answer:
-        async with Poster(policy, authority and authority.trust(), timeouts) as poster:
-            return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
+        poster = Poster(policy, authority and authority.trust(), timeouts)
+        return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
 
     return asyncio.run(once())
 
