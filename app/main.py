@@ -119,8 +119,8 @@ def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
             streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
             waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
             webhook_policy=sending.policy,
+            health=Health(database, settings),
         )
-        app.state.health = Health(database, settings)
         background.start()
         publisher.start()
         watcher.start()

@@ -12,6 +12,7 @@ from starlette.types import Scope as AsgiScope
 from app.background_writer import BackgroundWriter
 from app.database import Database
 from app.errors import MissingScope, Unauthorized
+from app.health.service import Health
 from app.jobs.queue import Publisher
 from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
@@ -45,6 +46,7 @@ class Service:
     background: BackgroundWriter
     parsers: ParserPool
     webhook_policy: AddressPolicy
+    health: Health
     reads: OwnerTurns  # of the database, for clients that follow jobs
     streams: OwnerLimit  # of events
     waits: OwnerLimit  # requests with `Prefer: wait`

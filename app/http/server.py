@@ -19,7 +19,6 @@ from typing import Any
 import h11
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.server import ServerState
 
 from app.errors import HttpError, ServiceBusy, ServiceError
 from app.http.problems import closing_answer
@@ -114,14 +113,8 @@ class GuardedConfig(uvicorn.Config):
 class GuardedProtocol(H11Protocol):
     """One connection with time limits for headers and readers."""
 
-    def __init__(
-        self,
-        config: GuardedConfig,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> None:
-        super().__init__(config, server_state, app_state, _loop)
+    def __init__(self, config: GuardedConfig, *others: Any, **named: Any) -> None:
+        super().__init__(config, *others, **named)
         self.conn = BoundedConnection(h11.SERVER, MAX_HEADER_BYTES)
         self.config: GuardedConfig = config
         self._header_timer: asyncio.TimerHandle | None = None

@@ -111,7 +111,7 @@ class KeyWatch:
             yield in_use
         finally:
             requests.discard(in_use)
-            if not requests and self._in_use.get(key.id) is requests:
+            if not requests:
                 del self._in_use[key.id]
 
     async def look(self) -> None:

@@ -11,9 +11,11 @@ import ssl
 import threading
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from random import Random, SystemRandom
 
 from sqlalchemy.exc import SQLAlchemyError
+from standardwebhooks import Webhook
 
 from app.database import Database, database_time
 from app.documents import json_bytes
@@ -21,7 +23,6 @@ from app.webhooks import deliveries
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.deliveries import Clock, Dispatch
 from app.webhooks.posting import Answer, Poster, Timeouts
-from app.webhooks.signature import signed_headers
 
 STOP_S = 1.0  # what is under way may end; then it is given back and sent again by the next process
 
@@ -41,6 +42,20 @@ class SenderSettings:
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
+
+
+def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
+    """Headers by which the receiver knows sender, message and time (https://www.standardwebhooks.com).
+
+    The message's id is the same in every try, so that the receiver can skip what it has seen; the timestamp
+    (s since 1970 UTC) is that of the try.
+    """
+    signature = Webhook(secret).sign(message_id, datetime.fromtimestamp(int(timestamp), UTC), body.decode())
+    return {
+        "webhook-id": message_id,
+        "webhook-timestamp": str(int(timestamp)),
+        "webhook-signature": signature,
+    }
 
 
 class WebhookSender:
@@ -63,14 +78,14 @@ class WebhookSender:
         )
         self._thread.start()
 
-    def stop(self) -> None:
+    def stop(self, patience_s: float = 2 * STOP_S + 1.0) -> None:
         """End within a second or two; what is not done stays in the table."""
         self._stopping.set()
         loop, wake = self._loop, self._wake
         if loop is not None and wake is not None and not loop.is_closed():
             loop.call_soon_threadsafe(wake.set)
         if self._thread is not None:
-            self._thread.join(2 * STOP_S + 1.0)
+            self._thread.join(patience_s)
 
     async def run(self) -> None:
         """Send until `stop` is called."""

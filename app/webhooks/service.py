@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+import secrets
+
 from app.database import Session
 from app.errors import InvalidRequest, TooManyWebhooks, WebhookDisabled, WebhookPending
 from app.webhooks import repository
 from app.webhooks.addresses import AddressPolicy, AddressRefused
 from app.webhooks.outbox import TEST_EVENT, note_challenge, note_message
 from app.webhooks.schemas import Delivery, NewWebhook, Webhook, WebhookRequest
-from app.webhooks.signature import new_secret
 from morphdata.faults import Fault
 
 MAX_WEBHOOKS = 20  # of one owner
+SECRET_BYTES = 32  # Standard Webhooks requires 24 to 64
 
 
 def check_address(policy: AddressPolicy, url: str) -> None:
@@ -20,6 +23,11 @@ def check_address(policy: AddressPolicy, url: str) -> None:
         policy.check_now(url)
     except AddressRefused as error:
         raise InvalidRequest.of([Fault("address_refused", str(error), "/url", error.hint)]) from None
+
+
+def new_secret() -> str:
+    """Make a secret in the form that libraries of Standard Webhooks take."""
+    return "whsec_" + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
 
 
 def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
