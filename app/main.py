@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -72,7 +73,9 @@ def create_app(settings: Settings | None = None, *, sending: SenderSettings | No
     if settings is None:  # a process of its own, not a guest in another's
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
-    app.router.lifespan_context = _lifespan(chosen, sending or _sender_settings(chosen))
+    app.router.lifespan_context = partial(
+        _running, settings=chosen, sending=sending or _sender_settings(chosen)
+    )
     install_problem_handlers(app)
     app.add_middleware(HeadAsGet)
     app.add_middleware(BodyLimit, settings=chosen)
@@ -94,55 +97,52 @@ def _turns(settings: Settings, at_once: int) -> OwnerTurns:
     return OwnerTurns(at_once, max(1, at_once - 1) if settings.demands_keys else at_once)
 
 
-def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        start_tracing("morphid-api", settings.traces)
-        await asyncio.to_thread(upgrade, settings.database_url)
-        database = Database(settings.database_url)
-        publisher = Publisher(settings.broker_url)
-        watcher = JobWatcher(database, settings.event_poll_s)
-        background = BackgroundWriter(database)
-        keys = KeyRing(database, background)
-        key_watch = KeyWatch(database, on_lost=keys.forget)
-        app.state.service = Service(
-            settings=settings,
-            database=database,
-            publisher=publisher,
-            watcher=watcher,
-            queue=QueueView(),
-            keys=keys,
-            key_watch=key_watch,
-            background=background,
-            parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
-            reads=_turns(settings, READS_AT_ONCE),
-            streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
-            waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
-            webhook_policy=sending.policy,
-            health=Health(database, settings),
-        )
-        background.start()
-        publisher.start()
-        watcher.start()
-        key_watch.start()
-        sender = WebhookSender(database, sending)
-        sender.start()
-        upkeep = Upkeep(database, publisher, settings)
-        upkeep.start()
-        try:
-            with _streams_end_with_the_process(watcher):
-                yield
-        finally:
-            await watcher.stop()
-            await key_watch.stop()
-            await asyncio.to_thread(upkeep.stop)
-            await asyncio.to_thread(sender.stop)
-            await asyncio.to_thread(publisher.stop)
-            await asyncio.to_thread(background.stop)
-            database.dispose()
-            await asyncio.to_thread(stop_tracing)
+def _service(settings: Settings, database: Database, sending: SenderSettings) -> Service:
+    background = BackgroundWriter(database)
+    keys = KeyRing(database, background)
+    return Service(
+        settings=settings,
+        database=database,
+        publisher=Publisher(settings.broker_url),
+        watcher=JobWatcher(database, settings.event_poll_s),
+        queue=QueueView(),
+        keys=keys,
+        key_watch=KeyWatch(database, on_lost=keys.forget),
+        background=background,
+        parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
+        reads=_turns(settings, READS_AT_ONCE),
+        streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
+        waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
+        webhook_policy=sending.policy,
+        health=Health(database, settings),
+    )
 
-    return lifespan
+
+@asynccontextmanager
+async def _running(app: FastAPI, settings: Settings, sending: SenderSettings) -> AsyncIterator[None]:
+    """Start the parts of the process, and stop them when the block ends."""
+    start_tracing("morphid-api", settings.traces)
+    await asyncio.to_thread(upgrade, settings.database_url)
+    database = Database(settings.database_url)
+    service = app.state.service = _service(settings, database, sending)
+    sender = WebhookSender(database, sending)
+    upkeep = Upkeep(database, service.publisher, settings)
+    service.background.start()
+    service.publisher.start()
+    service.watcher.start()
+    service.key_watch.start()
+    sender.start()
+    upkeep.start()
+    try:
+        with _streams_end_with_the_process(service.watcher):
+            yield
+    finally:
+        await service.watcher.stop()
+        await service.key_watch.stop()
+        for stop in (upkeep.stop, sender.stop, service.publisher.stop, service.background.stop):
+            await asyncio.to_thread(stop)
+        database.dispose()
+        await asyncio.to_thread(stop_tracing)
 
 
 @contextmanager
