@@ -47,15 +47,14 @@ def wait_until_ready(data_dir: Path | None, *, worker_here: bool, within_s: floa
 def _look(settings: Settings, *, worker_here: bool) -> tuple[bool, str]:
     from app.database import Database
     from app.health.broker import BROKER_GOOD, broker_state
-    from app.health.service import database_state, worker_state
+    from app.health.service import database_state
 
     host = socket.gethostname() if worker_here else None
     store = Database(settings.database_url)
     try:
-        database, counts = database_state(store, settings.worker_seen_every_s, host=host)
+        database, workers = database_state(store, settings.worker_seen_every_s, host=host)
     finally:
         store.dispose()
-    workers = worker_state(counts)
     told = f"database {database}, workers {workers.status} ({workers.alive} alive, {workers.stalled} stalled)"
     if worker_here:
         return workers.status == "ok" and not workers.stalled, told

@@ -21,8 +21,7 @@ from app.errors import (
     TooManyStreams,
 )
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
-from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
-from app.http.prefer import PreferHeader, wait_seconds
+from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery, PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs import repository, store
 from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type

@@ -94,7 +94,7 @@ async def stream_events(service: Service, caller: Caller, job_id: str, after: in
 async def _news(subscription: Subscription, caller: Caller, seen: int, timeout_s: float) -> bool:
     """Wait for news, or the end of the caller's right to hear them; False after `timeout_s`."""
     try:
-        async with caller.key.while_it_opens():
+        async with caller.key.while_valid():
             return await subscription.wait(seen, timeout_s)
     except Unauthorized:
         return True
@@ -129,7 +129,7 @@ async def wait_for_end(
                     left = deadline - loop.time()
                     if job.finished or left <= 0.0 or service.watcher.closed:
                         break
-                    async with caller.key.while_it_opens():
+                    async with caller.key.while_valid():
                         await subscription.wait(job.event_seq, left)
         return await read_in_turn(service, caller.owner, show)
     except JobNotFound:

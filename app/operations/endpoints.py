@@ -15,7 +15,7 @@ from app.documents import Document, sealed
 from app.errors import IdempotencyConflict, QuotaExceeded
 from app.http.context import Caller, CallerDep, Service, ServiceDep, demands
 from app.http.json_body import BODY_ERRORS, JsonRoute
-from app.http.prefer import IdempotencyKeyHeader, PreferHeader, wait_seconds
+from app.http.parameters import IdempotencyKeyHeader, PreferHeader, wait_seconds
 from app.http.problems import documented
 from app.jobs.event_stream import wait_for_end
 from app.jobs.records import Job as StoredJob

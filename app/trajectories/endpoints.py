@@ -90,7 +90,7 @@ async def upload_trajectory(
             "Send multipart/form-data with a `file` (curl -F file=@flight.csv), or application/json.",
         )
 
-    caller.key.must_open()  # the body and its reader may have taken a minute
+    caller.key.require_valid()  # the body and its reader may have taken a minute
 
     def store() -> TrajectorySummary:
         with app.database.write() as session:
