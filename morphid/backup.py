@@ -123,10 +123,10 @@ def inspected(file: Path) -> Backup:
 
     try:
         with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as link:
-            told = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
-            if told != ["ok"]:
+            faults = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
+            if faults != ["ok"]:
                 raise CommandError(
-                    f"{file} is damaged: {told[0]}", code=Exit.INVALID_INPUT, hint="use another backup"
+                    f"{file} is damaged: {faults[0]}", code=Exit.INVALID_INPUT, hint="use another backup"
                 )
             revision = str(link.execute("SELECT version_num FROM alembic_version").fetchone()[0])
             jobs = int(link.execute("SELECT count(*) FROM jobs").fetchone()[0])

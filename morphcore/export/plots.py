@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from morphcore.export.curves import file_stems
 from morphcore.export.figure import (
     ANGLES,
     BLUE,
@@ -39,6 +37,7 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
+from morphcore.export.tables import file_stems
 from morphcore.frames import wrap_angle
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -105,7 +104,8 @@ def attitude_figure(sample: Document) -> Figure:
             quiet(axes, SILENT_SPAN_DEG)
     if has_sweep:
         draw_sweep(rows[-1], time_s, sample)
-    _finish(figure, rows, time_s, _title(sample, "attitude"), list(flown))
+    time_axis(figure, rows, time_s)
+    _legend(figure, ["measured", *flown], _title(sample, "attitude"))
     return figure
 
 
@@ -141,7 +141,7 @@ def residual_figure(sample: Document) -> Figure:
 
 
 def convergence_figure(document: Document) -> Figure:
-    """Least cost J so far against flights flown (or generations, if flights are not told), logarithmic."""
+    """Least cost J so far against flights flown (or generations, if flights are not counted), logarithmic."""
     history = [row for row in document.get("search", {}).get("history", []) if is_cost(row.get("best_cost"))]
     figure = Figure(figsize=(7.2, 3.8))
     axes = figure.add_axes((0.115, 0.13, 0.865, 0.77))
@@ -187,11 +187,6 @@ def convergence_figure(document: Document) -> Figure:
 
 def _line(model: str) -> dict[str, Any]:
     return {"label": LABELS[model], **STYLES[model]}
-
-
-def _finish(figure: Figure, rows: Sequence[Axes], time_s: Array, title: str, models: Sequence[str]) -> None:
-    time_axis(figure, rows, time_s)
-    _legend(figure, ["measured", *models], title)
 
 
 def _legend(figure: Figure, models: Sequence[str], title: str) -> None:

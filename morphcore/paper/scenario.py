@@ -29,7 +29,6 @@ PAPER_OPTIMUM = -4.23  # attitude variation of the optimised morph against const
 PAPER_RIGID_OPTIMUM = 4.12  # of the morph optimised with the rigid model
 
 LINKS = 3  # a wing, of the equivalent model whose flights are shown
-SWARM_PARTICLES = 2500  # of the paper's identification
 
 # how each sample flight begins and ends: held, and rates ramped, as the independent program's flights
 HELD_BEFORE_S = 0.2
@@ -99,10 +98,6 @@ class PaperFlight:
     def schedules(self) -> Schedules:
         """What both hinges do."""
         return Schedules.parse({"both": self.schedule})
-
-    def to_document(self) -> Document:
-        """JSON form."""
-        return dict(vars(self))
 
 
 def aircraft() -> Aircraft:

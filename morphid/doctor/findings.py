@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 
 
@@ -34,10 +34,6 @@ class Finding:
     state: State
     message: str
     remedy: str = ""
-
-    def to_document(self) -> dict[str, str]:
-        """Give the finding as ``--json`` prints it."""
-        return {**asdict(self), "state": self.state.value}
 
 
 Check = Callable[[], Iterator[Finding]]

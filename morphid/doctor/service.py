@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import stat
 import time
 from collections.abc import Iterator
@@ -267,22 +266,18 @@ def keys(settings: Any) -> Iterator[Finding]:
 
 def port(host: str, number: int) -> Iterator[Finding]:
     """Is the port free, or ours."""
+    from morphid.broker import bound_port, in_url
     from morphid.connections import client_for
     from morphid.doctor.remote import TIMEOUT_S, served_version
 
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, number))
-        except OSError as error:
-            reason = os.strerror(error.errno or 0)
-        else:
-            yield ok("port", f"{host}:{number} is free")
-            return
-    there = "127.0.0.1" if host in {"0.0.0.0", "::"} else host  # noqa: S104 - recognised, not bound
-    url = f"http://{f'[{there}]' if ':' in there else there}:{number}"
-    with client_for(url, direct=True, timeout=TIMEOUT_S) as client:
+    try:
+        bound_port(host, number)
+    except OSError as error:
+        reason = os.strerror(error.errno or 0)
+    else:
+        yield ok("port", f"{host}:{number} is free")
+        return
+    with client_for(f"http://{in_url(host)}:{number}", direct=True, timeout=TIMEOUT_S) as client:
         version = served_version(client)
     if version is None:
         yield fail(
