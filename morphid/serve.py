@@ -50,10 +50,6 @@ def serve(settings: Settings, *, json_events: bool) -> None:
     ----------
     settings : where the API listens (port 0 takes a free one), jobs at once, data directory and all else.
     json_events : one JSON object per line instead of sentences.
-
-    Raises
-    ------
-    CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
     """
     from app.database import upgrade
 

@@ -6,6 +6,7 @@ import os
 import stat
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def database(settings: Any) -> Iterator[Finding]:
     """Can it be reached, is it migrated, sound, durable, and does its clock agree with ours."""
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time, schema_revision
+    from app.database import database_time, schema_revision
     from app.observability.logs import masked
     from migrations import HEAD
 
@@ -55,9 +56,8 @@ def database(settings: Any) -> Iterator[Finding]:
         yield warn("database", f"{url} is not there yet", "`morphid serve` or `morphid db upgrade` makes it")
         return
     exposed = settings.uses_sqlite and _sqlite_file(settings.database_url).stat().st_mode & OTHERS_MAY
-    store = Database(settings.database_url)
     try:
-        with store.read() as session:
+        with _reading(settings) as session:
             revision = schema_revision(session)
             skew_s = float(session.scalar(database_time().select()) or 0.0) - time.time()
             sound = list(_sqlite(session, settings) if settings.uses_sqlite else _postgres(session))
@@ -66,8 +66,6 @@ def database(settings: Any) -> Iterator[Finding]:
         remedy = "start it, or correct MORPHID_DATABASE_URL; a damaged file: `morphid db restore`"
         yield fail("database", f"{url}: {masked(sentence)}", remedy)
         return
-    finally:
-        store.dispose()
     if revision != HEAD:
         remedy = "morphid db upgrade" if revision is None or revision < HEAD else "run the newer MorphID"
         yield fail("database", f"{url} is at revision {revision}, this version needs {HEAD}", remedy)
@@ -84,6 +82,19 @@ def database(settings: Any) -> Iterator[Finding]:
         yield ok("clock", "the database's and this machine's agree")
 
 
+@contextmanager
+def _reading(settings: Any) -> Iterator[Any]:
+    """Open a session on the service's database."""
+    from app.database import Database
+
+    store = Database(settings.database_url)
+    try:
+        with store.read() as session:
+            yield session
+    finally:
+        store.dispose()
+
+
 def _sqlite_file(url: str) -> Path:
     from sqlalchemy import make_url
 
@@ -94,11 +105,13 @@ def _sqlite(session: Any, settings: Any) -> Iterator[Finding]:
     file = _sqlite_file(settings.database_url)
     small = file.stat().st_size < LARGE_DATABASE
     pragma = "PRAGMA integrity_check(5)" if small else "PRAGMA quick_check(5)"
-    told = [row[0] for row in session.exec_driver_sql(pragma)]
-    if told == ["ok"]:
+    faults = [row[0] for row in session.exec_driver_sql(pragma)]
+    if faults == ["ok"]:
         yield ok("integrity", f"{pragma.removeprefix('PRAGMA ').partition('(')[0]} finds nothing wrong")
     else:
-        yield fail("integrity", "; ".join(map(str, told)), "stop the service; `morphid db restore` a backup")
+        yield fail(
+            "integrity", "; ".join(map(str, faults)), "stop the service; `morphid db restore` a backup"
+        )
     mode = session.exec_driver_sql("PRAGMA journal_mode").scalar()
     if mode != "wal":
         yield fail(
@@ -147,13 +160,13 @@ def broker(url: str) -> Iterator[Finding]:
             "broker", f"{where}: {state}", "start it, or correct MORPHID_BROKER_URL (with its password)"
         )
         return
-    told: dict[str, Any] = broker_client(url).info()
-    version = str(told.get("valkey_version") or told.get("redis_version"))
+    info: dict[str, Any] = broker_client(url).info()
+    version = str(info.get("valkey_version") or info.get("redis_version"))
     if tuple(int(part) for part in version.split(".")[:2]) < LEAST_BROKER:
         yield warn("broker", f"{where}: version {version} is old", "Valkey, or Redis 6.2 or newer")
     else:
-        yield ok("broker", f"{where}: {told.get('server_name', 'redis')} {version}")
-    if not int(told.get("aof_enabled", 0)):
+        yield ok("broker", f"{where}: {info.get('server_name', 'redis')} {version}")
+    if not int(info.get("aof_enabled", 0)):
         yield warn(
             "broker journal",
             "messages do not survive its restart: jobs then begin a second later",
@@ -161,7 +174,7 @@ def broker(url: str) -> Iterator[Finding]:
         )
     else:
         yield ok("broker journal", "appendonly")
-    policy = str(told.get("maxmemory_policy", "noeviction"))
+    policy = str(info.get("maxmemory_policy", "noeviction"))
     if policy != "noeviction":
         yield fail(
             "broker memory", f"maxmemory-policy {policy} throws messages away", "maxmemory-policy noeviction"
@@ -175,32 +188,23 @@ def work(settings: Any) -> Iterator[Finding]:
     from sqlalchemy import func, select
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time
+    from app.database import database_time
     from app.health.repository import snapshot
     from app.jobs.records import HELD
     from app.tables import jobs, webhook_deliveries
 
     if settings.uses_sqlite and not _sqlite_file(settings.database_url).exists():
         return
-    store = Database(settings.database_url)
+    lost = jobs.c.status.in_(HELD), jobs.c.lease_until < database_time() - ORPHANED_S
+    deliveries = webhook_deliveries.c
+    overdue = deliveries.status == "waiting", deliveries.next_at < database_time() - DELIVERY_LATE_S
     try:
-        with store.read() as session:
+        with _reading(settings) as session:
             seen = snapshot(session, settings.worker_seen_every_s)
-            orphaned = session.scalar(
-                select(func.count()).where(
-                    jobs.c.status.in_(HELD), jobs.c.lease_until < database_time() - ORPHANED_S
-                )
-            )
-            late = session.scalar(
-                select(func.count()).where(
-                    webhook_deliveries.c.status == "waiting",
-                    webhook_deliveries.c.next_at < database_time() - DELIVERY_LATE_S,
-                )
-            )
+            orphaned = session.scalar(select(func.count()).where(*lost))
+            late = session.scalar(select(func.count()).where(*overdue))
     except SQLAlchemyError:
         return  # the database has its own line
-    finally:
-        store.dispose()
     workers = seen.workers
     if workers.stalled:
         yield fail(
@@ -238,24 +242,18 @@ def keys(settings: Any) -> Iterator[Finding]:
     from sqlalchemy import func, or_, select
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time
+    from app.database import database_time
     from app.tables import api_keys
 
     if not settings.demands_keys:
         return
-    store = Database(settings.database_url)
+    expires_at = api_keys.c.expires_at
+    usable = api_keys.c.revoked_at.is_(None), or_(expires_at.is_(None), expires_at > database_time())
     try:
-        with store.read() as session:
-            valid = session.scalar(
-                select(func.count()).where(
-                    api_keys.c.revoked_at.is_(None),
-                    or_(api_keys.c.expires_at.is_(None), api_keys.c.expires_at > database_time()),
-                )
-            )
+        with _reading(settings) as session:
+            valid = session.scalar(select(func.count()).where(*usable))
     except SQLAlchemyError:
         return
-    finally:
-        store.dispose()
     if not valid:
         yield warn(
             "keys", "keys are required but none exist: no one has access", "morphid keys create --help"
