@@ -22,7 +22,7 @@ LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Broker:
-    """How to run the broker, its TCP port on loopback, and the password that this service's children share."""
+    """How to run the broker, its port on loopback, and the password that this service's children share."""
 
     spec: ChildSpec
     port: int
