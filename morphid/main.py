@@ -41,7 +41,7 @@ class Morphid(TyperGroup):
 
 
 def print_version(wanted: bool) -> None:
-    """Print the version and end, where it is asked for."""
+    """Print the version and end, where it is requested."""
     if wanted:
         from morphdata.version import VERSION
 

@@ -1,4 +1,4 @@
-"""The request that a command line asks for, and which option stands behind each part of it."""
+"""The request that a command line makes, and the option behind each part of it."""
 
 from __future__ import annotations
 

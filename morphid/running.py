@@ -1,7 +1,7 @@
 """Run an operation in this process or at a service, and hand over what comes out.
 
 ``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
-progress is shown, the first Ctrl-C asks for the best so far, a result and its files come out.
+progress is shown, the first Ctrl-C requests the best so far, a result and its files come out.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def attitude_figure(sample: Document) -> Figure:
     time_s = series(sample["time_s"])
     measured = {key: np.unwrap(series(sample["measured"][key])) for key, _ in ANGLES}
     flown = {
-        model: {key: measured[key] + _error(sample, model, key) for key, _ in ANGLES}
+        model: {key: measured[key] + angle_error(sample, model, key) for key, _ in ANGLES}
         for model in ("rigid", "initial", "identified")
         if sample.get(model)
     }
@@ -116,7 +116,7 @@ def residual_figure(sample: Document) -> Figure:
     figure = Figure(figsize=(9.0, 6.2))
     grid = figure.add_gridspec(3, 2, hspace=0.22, wspace=0.2, left=0.085, right=0.985, top=0.85, bottom=0.085)
     for row, (key, label) in enumerate(ANGLES):
-        errors = {model: _error(sample, model, key) for model in models}
+        errors = {model: angle_error(sample, model, key) for model in models}
         for column, shown in enumerate((models, ["identified"])):
             axes = figure.add_subplot(grid[row, column])
             label_axis(axes, f"{label} error, mrad" if column == 0 else "")
@@ -204,7 +204,7 @@ def _title(sample: Document, subject: str) -> str:
 # numbers
 
 
-def _error(sample: Document, model: str, key: str) -> Array:
+def angle_error(sample: Document, model: str, key: str) -> Array:
     """Wrapped difference of a model's angle to the sample's, rad."""
     return wrap_angle(series(sample[model][key]) - series(sample["measured"][key]))
 

@@ -21,7 +21,7 @@ EXIT_CODES = (
     "6 machine not ready, 130 Ctrl-C."
 )
 KNOWN_MODEL = frozenset({"--parameters", "--model-id"})  # see `put_known_model`
-HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters of an identified model
+HOW_IDENTIFIED = ("lattice", "step_s", "start")  # next to the parameters of an identified model
 
 # groups of options, as a command's help shows them
 model_option = partial(typer.Option, rich_help_panel=MODEL)

@@ -1,4 +1,4 @@
-"""What an examination says."""
+"""What an examination finds."""
 
 from __future__ import annotations
 

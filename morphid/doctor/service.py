@@ -16,7 +16,7 @@ SKEW_S = 2.0  # leases are the database's own; this only makes times in logs har
 STUCK_S = 600.0  # a job that waits so long while a slot is free
 ORPHANED_S = 120.0  # a lease that ran out so long ago was reaped by nobody
 DELIVERY_LATE_S = 3600.0
-LEAST_BROKER = (6, 2)
+MIN_BROKER = (6, 2)
 OTHERS_MAY = stat.S_IROTH | stat.S_IWOTH
 LARGE_DATABASE = 2 * 2**30  # bytes; its pages are not read one by one
 
@@ -162,7 +162,7 @@ def broker(url: str) -> Iterator[Finding]:
         return
     info: dict[str, Any] = broker_client(url).info()
     version = str(info.get("valkey_version") or info.get("redis_version"))
-    if tuple(int(part) for part in version.split(".")[:2]) < LEAST_BROKER:
+    if tuple(int(part) for part in version.split(".")[:2]) < MIN_BROKER:
         yield warn("broker", f"{where}: version {version} is old", "Valkey, or Redis 6.2 or newer")
     else:
         yield ok("broker", f"{where}: {info.get('server_name', 'redis')} {version}")
