@@ -89,16 +89,6 @@ class Finished:
     reused: bool = False
 
 
-@dataclass(frozen=True)
-class StageStep:
-    """What one step of the runner leaves; ``fraction`` is of all stages, by their expected times."""
-
-    stage: str
-    title: str
-    fraction: float
-    message: str
-
-
 class StageRunner:
     """Works stages off in their order.
 
@@ -139,8 +129,11 @@ class StageRunner:
         """The key of a stage."""
         return self._keys[name]
 
-    def steps(self) -> Generator[StageStep]:
-        """Do what is not done yet. A step that is interrupted leaves its last checkpoint behind."""
+    def steps(self) -> Generator[tuple[Stage, Progress]]:
+        """Do what is not done yet; yields the stage at work, and the progress of all by their expected times.
+
+        A step that is interrupted leaves its last checkpoint behind.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
         total = sum(stage.expected_s for stage in self.stages)
         before = 0.0
@@ -149,12 +142,12 @@ class StageRunner:
             if known is None:
                 for progress in self._work(stage):
                     share = (before + progress.fraction * stage.expected_s) / total
-                    yield StageStep(stage.name, stage.title, share, progress.message)
+                    yield stage, Progress(share, progress.message)
             else:
                 self.finished[stage.name] = known
             before += stage.expected_s
             how = "done" if known is None else "was there"
-            yield StageStep(stage.name, stage.title, before / total, how)
+            yield stage, Progress(before / total, how)
 
     # one stage
 

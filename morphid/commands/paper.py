@@ -68,8 +68,8 @@ def _work_off(runner: StageRunner) -> None:
     """Run all stages under a progress bar; Ctrl-C leaves what is done."""
     try:
         with meter() as bar, first_interrupt() as interrupted, closing(runner.steps()) as steps:
-            for step in steps:
-                bar.show({"fraction": step.fraction, "phase": step.title, "message": step.message})
+            for stage, progress in steps:
+                bar.show({"fraction": progress.fraction, "phase": stage.title, "message": progress.message})
                 if interrupted():
                     break
             else:
