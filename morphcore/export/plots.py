@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from morphcore.export.curves import file_stems
 from morphcore.export.figure import (
     ANGLES,
     BLUE,
@@ -37,7 +38,6 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
-from morphcore.export.tables import file_stems
 from morphcore.frames import wrap_angle
 
 STYLES: dict[str, dict[str, Any]] = {

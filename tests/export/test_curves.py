@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from morphcore.export.tables import curve_tables, file_stems
+from morphcore.export.curves import curve_tables, file_stems
 from tests.export.flown_samples import flown_sample
 
 PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,139}")

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
-from morphcore.export.tables import curve_tables
 from morphcore.identify import Identification, IdentifyResult, identification_from_request
 from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphdata.identify import IdentifyRequest

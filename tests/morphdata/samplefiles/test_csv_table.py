@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from morphcore.export.tables import curve_table, schedule_tables
+from morphcore.export.curves import curve_table, schedule_tables
 from morphcore.simulate.flight import write_trajectory_csv
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphdata.samplefiles.csv_table import CONTROL, FORMULA_STARTS, neutral, write_table
