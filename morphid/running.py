@@ -1,7 +1,7 @@
 """Run an operation in this process or at a service, and hand over what comes out.
 
 ``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
-progress is shown, the first Ctrl-C asks for the best so far, a result and its files come out.
+progress is shown, the first Ctrl-C requests the best so far, a result and its files come out.
 """
 
 from __future__ import annotations
@@ -47,9 +47,7 @@ class Answer:
 def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
     """Run the operation, at the service of this address or in this process; print what went wrong on the way.
 
-    Raises
-    ------
-    CommandError : the request is refused; the error names the option at fault.
+    An error names the option at fault.
     """
     if at_service_of_environment(url):
         stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
@@ -107,12 +105,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
 
 
 def require_valid(operation: str, body: Document) -> None:
-    """Refuse a request that the operation's document refuses.
-
-    Raises
-    ------
-    CommandError : with the first fault as its own, and a line for each of the others.
-    """
+    """Refuse a request that the operation's document refuses: the first fault, and a line for each other."""
     try:
         operation_named(operation).request.parse(body)
     except InvalidInput as error:

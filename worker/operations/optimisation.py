@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from morphcore.export.curves import schedule_tables
 from morphcore.export.schedule_plots import schedule_plots
-from morphcore.export.schedule_tables import schedule_tables
 from morphcore.optimise import ScheduleResult, optimisation_from_request
 from morphdata.optimize import OptimizeRequest
 from worker.operations import Document

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from morphcore.export.study_plots import study_plots, study_table
+from morphcore.export.curves import study_table
+from morphcore.export.study_plots import study_plots
 from morphcore.identify.study import study_from_request
 from morphcore.identify.study_result import StudyResult
 from morphdata.study import StudyRequest
