@@ -194,6 +194,5 @@ TimeSeries = Annotated[
 ]
 AngleSeries = Annotated[
     list[Annotated[float, Field(ge=-1e6, le=1e6)]],  # what is no angle, `samplefiles.flight` says with a hint
-    FailFast(),
-    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+    Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
 ]

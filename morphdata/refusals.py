@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 
@@ -156,10 +156,13 @@ def _models_at(path: Sequence[str | int], model: type[BaseModel]) -> list[type[B
     models = [model]
     for part in path:
         fields = [each.model_fields[part] for each in models if part in each.model_fields]
+        tagged = [each for each in models if part in _tags(each)]
         if fields:
             models = [inner for field in fields for inner in _models_in(field.annotation)]
-        elif isinstance(part, str):  # the tag of a union
-            models = [each for each in models if part in _tags(each)] or models
+        elif tagged:  # the tag of a union
+            models = tagged
+        elif isinstance(part, str):  # a key of a mapping
+            models = [inner for each in models for inner in _models_in(_further(each))] or models
     return models
 
 
@@ -167,6 +170,14 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and get_origin(annotation) is None:
         return [annotation] if issubclass(annotation, BaseModel) else []
     return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+@cache
+def _further(model: type[BaseModel]) -> Any:
+    """Annotation of what a model takes beside its fields; None where it takes nothing, or no models."""
+    if model.model_config.get("extra") != "allow":
+        return None
+    return get_type_hints(model, include_extras=True)["__pydantic_extra__"]
 
 
 @cache

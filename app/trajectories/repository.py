@@ -16,7 +16,7 @@ from app.pages import read_page
 from app.tables import trajectories
 from app.trajectories.schemas import TrajectoryPage, TrajectorySummary, TrajectoryUpload
 
-Columns = dict[str, list[float]]
+Columns = dict[str, Any]  # lists of numbers, and reasons why some could not be read
 
 SUMMARY_COLUMNS = (
     trajectories.c.id,

@@ -13,7 +13,7 @@ from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.aircraft import Material, Section
 from morphdata.drives import Hinge
-from morphdata.vehicle import ANGLE_TOLERANCE_RAD
+from morphdata.drives import ANGLE_TOLERANCE_RAD
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]

@@ -324,8 +324,15 @@ def _per_surface(aircraft: Aircraft, schedules: Schedules) -> tuple[list[Schedul
     if isinstance(schedules, Trajectory):
         return [Tabulated(schedules.time_s, schedules.sweep(side)) for side in sides], list(sides)
     if isinstance(schedules, documents.Schedules):
-        given = [schedules.of_side(side) or ("", documents.Hold(kind="hold")) for side in sides]
-        return [scheduled(schedule) for _, schedule in given], [name for name, _ in given]
+        drives = {f"sweep_{s.side}": s for s in aircraft.surfaces if s.hinge}
+        given_ = {
+            side: schedules.given.get(side)
+            or schedules.given.get("both")
+            or schedules.given.get(f"sweep_{side}")
+            or documents.Hold(kind="hold")
+            for side in sides
+        }
+        return [scheduled(given_[side]) for side in sides], list(sides)
     if isinstance(schedules, Mapping):
         missing = set(sides) - set(schedules)
         if missing:

@@ -42,8 +42,8 @@ class Trajectory(Shown):
         return cls(
             name=sample.name,
             time_s=_column(sample.time_s),
-            sweep_left=_column(sample.sweep_left_rad),
-            sweep_right=_column(sample.sweep_right_rad),
+            sweep_left=_column(sample.drives["sweep_left"]),
+            sweep_right=_column(sample.drives["sweep_right"]),
             phi=_column(sample.phi_rad),
             theta=_column(sample.theta_rad),
             psi=_column(sample.psi_rad),
