@@ -383,6 +383,7 @@ class OptimizeResult(Result):
     schedule: FoundSchedule | None = Field(
         description="null in a partial result whose best schedule never flew to its end."
     )
+    drives: list[str] = Field(default=[], description="Names of the drives that follow the schedule.")
     limits: KeptLimits
     variation: Variations
     reduction_percent: float | None = Field(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -14,6 +15,7 @@ from morphdata.faults import Fault
 MAX_FAULTS = 20
 MAX_POINTER = 300  # characters: a field's name may be a megabyte
 SHOWN_CHARACTERS = 60  # of an offending value
+HALF_TURN_RAD = math.pi + 1e-9  # an angle written in degrees is rounded
 FAULTS = "faults"  # type of the errors that carry what `Document.faults` found
 
 HINTS = {
@@ -31,6 +33,7 @@ HINTS = {
     "too_short": "Give more items.",
     "too_long": "Give fewer items: leave out rows (10 ms steps are enough) or split the flight.",
 }
+HALF_TURNS = (HALF_TURN_RAD, -HALF_TURN_RAD)  # bounds of angles
 BOUNDS = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
 
 
@@ -125,7 +128,8 @@ def _sentence(error: Mapping[str, Any], pointer: str) -> str:
 def _hint(kind: str, context: Mapping[str, Any]) -> str:
     for key, words in BOUNDS.items():
         if key in context and kind.startswith(("greater", "less")):
-            return f"It must be {words} {context[key]:g}."
+            degrees = " Is it in degrees?" if context[key] in HALF_TURNS else ""
+            return f"It must be {words} {context[key]:g}.{degrees}"
     if kind.startswith("union_tag"):
         tags = context.get("expected_tags")
         return f"Give {context.get('discriminator', 'a kind')}: {tags or 'one of the documented kinds'}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -52,12 +53,17 @@ CHANNEL_UNITS = {
 CHANNEL_FIELDS = frozenset(f"{name}_{unit}" for name, unit in CHANNEL_UNITS.items())
 
 
+ATTITUDE_FIELDS = ("phi_rad", "theta_rad", "psi_rad")
+MISSPELT = 0.9  # so near to one of them no column is that of a drive
+
+
 def _column(name: str) -> str:
     """Take the name of a further column: of a drive with its unit, or of a channel."""
     if name in CHANNEL_FIELDS:
         return name
     key = drive_key(name)
-    if key is None or not DRIVE.fullmatch(key) or key in RESERVED:
+    misspelt = difflib.get_close_matches(name, ATTITUDE_FIELDS, n=1, cutoff=MISSPELT)
+    if key is None or not DRIVE.fullmatch(key) or key in RESERVED or misspelt:
         raise PydanticKnownError("extra_forbidden")
     return name
 

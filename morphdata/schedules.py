@@ -7,12 +7,13 @@ from itertools import islice, pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, FailFast, Field, PrivateAttr
+from pydantic import ConfigDict, FailFast, Field, PrivateAttr, model_validator
+from pydantic_core import PydanticCustomError
 
-from morphdata.base import HALF_TURN_RAD, MAX_ROWS, MIN_ROWS, Angle, Document
+from morphdata.base import MAX_ROWS, MIN_ROWS, Angle, Document
 from morphdata.drives import SWEEPS, Drive, resolved
 from morphdata.faults import Fault, InvalidInput, refuse
-from morphdata.refusals import escaped
+from morphdata.refusals import FAULTS, HALF_TURN_RAD, escaped
 from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
 from morphdata.samplefiles.reading import place_in, read_file
@@ -187,6 +188,20 @@ class Schedules(Document):
     left: Schedule | None = Field(default=None, description="Of the only kind of hinge on the left.")
     right: Schedule | None = Field(default=None, description="Of the only kind of hinge on the right.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _by_drive(cls, given: Any) -> Any:
+        """Refuse a schedule that stands where its drive should be named, in words for this case."""
+        if isinstance(given, dict) and isinstance(given.get("kind"), str):
+            fault = Fault(
+                "missing",
+                "This is one schedule, without the drive that follows it.",
+                "",
+                f'Name the drive: {{"sweep": {{"kind": "{given["kind"][:20]}", ...}}}}.',
+            )
+            raise PydanticCustomError(FAULTS, "the drive is missing", {FAULTS: (fault,)})
+        return given
+
     @property
     def given(self) -> dict[str, AnySchedule]:
         """Every schedule by its key."""
@@ -265,10 +280,11 @@ class TabulatedSchedules(Schedules):
         unreadable : dict of str to str
             Columns that could be drives as well, and what is wrong with them.
         """
-        return cls.parse(histories)._read_from(str(path), unreadable)
+        return cls.parse(histories).read_from(path, unreadable)
 
-    def _read_from(self, path: str, unreadable: dict[str, str]) -> Self:
-        self._path, self._unreadable = path, unreadable
+    def read_from(self, path: Path, unreadable: dict[str, str]) -> Self:
+        """Keep where the schedules are from, and return them."""
+        self._path, self._unreadable = str(path), unreadable
         return self
 
     def keys_by_drive(self, drives: Mapping[str, Drive]) -> dict[str, str]:

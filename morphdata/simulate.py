@@ -187,6 +187,9 @@ class SimulateResult(Result):
     model: FlownModel
     trim: TrimState
     trajectory: SimulatedTrajectory
+    drives: list[str] = Field(
+        default=[], description="Names of the aircraft's drives, whose columns the trajectory has."
+    )
     summary: FlightSummary
     warnings: Warnings = Field(default=[])
     cost: dict[str, Any]

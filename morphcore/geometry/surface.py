@@ -12,8 +12,7 @@ from morphcore.geometry.section import SectionProperties, given_section, solid_b
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.aircraft import Material, Section
-from morphdata.drives import Hinge
-from morphdata.drives import ANGLE_TOLERANCE_RAD
+from morphdata.drives import ANGLE_TOLERANCE_RAD, Hinge
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
