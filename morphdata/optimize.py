@@ -41,8 +41,13 @@ class SearchedModel(KnownModel):
 
 
 class Morph(Document):
-    """The change of shape that is wanted; all hinges follow one schedule."""
+    """The change of shape that is wanted; all hinges of the drive that morphs follow one schedule."""
 
+    drive: Annotated[Annotated[str, Field(max_length=64)] | None, Option("--drive", MORPH)] = Field(
+        default=None,
+        description="What morphs: the word of a drive (`sweep`, both sides), or the name of one "
+        "(`sweep_left`). Left out: the only word of the aircraft.",
+    )
     initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
         default=0.0, description="Sweep before the morph, rad."
     )

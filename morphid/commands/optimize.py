@@ -46,7 +46,7 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
-        write_schedule_csv({"left": spline, "right": spline}, times, path)
+        write_schedule_csv(dict.fromkeys(sorted(result["drives"]), spline), times, path)
     wrote(path)
 
 
