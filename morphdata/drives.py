@@ -64,11 +64,6 @@ class Hinge(Document):
         """Name without the side; None of a skew hinge that has none."""
         return self.name or (WORDS[self.axis] if isinstance(self.axis, str) else None)
 
-    @property
-    def axis_index(self) -> int:
-        """0, 1 or 2 for x, y, z."""
-        return "xyz".index(str(self.axis))
-
     def axis_B(self, side: str) -> Vector:
         """Unit vector in body axes about which a positive angle turns a surface of a side."""
         if isinstance(self.axis, str):

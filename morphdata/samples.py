@@ -153,12 +153,7 @@ class TrajectoryColumns(Document):
         if not faults:
             yield from (_at_field(fault, fields) for fault in unmeasured_sides(followed, drives))
         if drives and not fields:
-            yield Fault(
-                "no_drive",
-                "No column says how the aircraft's drives moved.",
-                "",
-                f"Add {next(iter(drives))}_rad; its drives are {shown_names(drives)}.",
-            )
+            yield no_drive(drives)
         angles = {key: self._angles(field) for key, field in fields.items() if key in followed.values()}
         reported = set()
         for name, key in followed.items():
@@ -166,6 +161,16 @@ class TrajectoryColumns(Document):
             if fault is not None and key not in reported:
                 reported.add(key)
                 yield fault
+
+
+def no_drive(drives: Mapping[str, Drive]) -> Fault:
+    """Return the fault of a sample without any angle of a drive."""
+    return Fault(
+        "no_drive",
+        "No column says how the aircraft's drives moved.",
+        "",
+        f"Add {next(iter(drives))}_rad; its drives are {shown_names(drives)}.",
+    )
 
 
 def _at_field(fault: Fault, fields: Mapping[str, str]) -> Fault:

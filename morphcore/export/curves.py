@@ -13,7 +13,7 @@ from morphdata.samplefiles.csv_table import write_table
 Document = dict[str, Any]
 
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SWEEPS = ("sweep_left_rad", "sweep_right_rad")
+SWEEPS = ("sweep_left", "sweep_right")  # of samples that do not name their drives
 MODELS = ("measured", "rigid", "initial", "identified")
 LONGEST_STEM = 100  # characters: with prefix and ending a file name stays below the limits of file systems
 DEFAULT_STEM = "sample"
@@ -41,12 +41,13 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    curves : ``{"samples": [{"name", "time_s", "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad",
-        "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...}, "identified": {...}}]}``.
+    curves : ``{"samples": [{"name", "time_s", "drives": ["sweep_left", "sweep_right"], "sweep_left_rad",
+        "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...},
+        "identified": {...}}]}``; the drives' columns bear their names.
 
     Returns
     -------
-    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, sweep_*_rad, then ``<model>_<angle>_rad``. Where
+    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, the drives, then ``<model>_<angle>_rad``. Where
     a flight diverged its cells are empty.
     """
     samples = curves["samples"]
@@ -60,7 +61,7 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 def curve_table(sample: Document) -> str:
     """One sample's time histories as CSV text; see `curve_tables`."""
     columns: dict[str, Sequence[float | None]] = {"time_s": sample["time_s"]}
-    columns |= {name: sample[name] for name in SWEEPS if name in sample}
+    columns |= {name: sample[name] for name in drive_columns(sample)}
     columns |= {
         f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
     }
@@ -69,6 +70,12 @@ def curve_table(sample: Document) -> str:
         text, columns, ([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
     )
     return text.getvalue()
+
+
+def drive_columns(document: Document) -> list[str]:
+    """Names of the columns of a sample's or a flight's drives, those of which there are any."""
+    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
+    return [name for name in names if name in document]
 
 
 def _cell(value: float | None) -> str:

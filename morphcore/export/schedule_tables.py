@@ -6,12 +6,11 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from morphcore.export.figure import Document
+from morphcore.export.curves import SWEEPS, Document
 from morphdata.samplefiles.csv_table import write_table
 
 Column = Sequence[float | None]
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SIDES = ("sweep_left", "sweep_right")  # both wings follow one schedule
 
 
 def schedule_tables(curves: Document) -> dict[str, bytes]:
@@ -19,14 +18,15 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    curves : ``{"time_s", "schedules": {name: {"sweep_rad", "rate_rad_s", "acceleration_rad_s2"}}, "flights":
-        {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``, the angles as departures from the start.
+    curves : ``{"time_s", "drives": [names], "schedules": {name: {"sweep_rad", "rate_rad_s",
+        "acceleration_rad_s2"}}, "flights": {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``, these
+        as departures from the start.
 
     Returns
     -------
-    File name -> UTF-8 text: ``schedule.csv``, the optimum with the columns of a schedule file (t, sweep_left,
-    sweep_right; s, rad), which the simulation flies; ``schedules.csv``, sweep, rate and acceleration of all;
-    ``departures.csv``, ``<schedule>_in_<model>_<angle>`` of all flights.
+    File name -> UTF-8 text: ``schedule.csv``, the optimum with the columns of a schedule file (t and the
+    drives that move; s, rad), which the simulation flies; ``schedules.csv``, angle, rate and acceleration of
+    all; ``departures.csv``, ``<schedule>_in_<model>_<angle>`` of all flights.
     """
     time_s, schedules = curves["time_s"], curves["schedules"]
     all_schedules = {
@@ -40,7 +40,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
         for name, flown in flights.items()
         for angle in ANGLES
     }
-    optimum = dict.fromkeys(SIDES, schedules["optimum"]["sweep_rad"])
+    optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
     return {
         "schedule.csv": _table({"t": time_s, **optimum}),
         "schedules.csv": _table({"time_s": time_s, **all_schedules}),

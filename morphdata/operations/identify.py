@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from morphdata.aircraft import Surface
-from morphdata.drives import Hinge, drive_name
+from morphdata.drives import SIDES, Hinge, drive_name
 from morphdata.identifiable import corrections
 from morphdata.identify import (
     CostEstimate,
@@ -113,13 +113,20 @@ def _across(position_m: list[float] | None) -> list[float] | None:
 
 
 def _asymmetric(sample: InlineSample) -> bool:
-    drives, apart = sample.drives, 0.0
-    for key, angles in drives.items():
-        others = drives.get(f"{key.removesuffix('_left')}_right") if key.endswith("_left") else None
-        if others is not None:
-            apart = max(apart, *(abs(a - b) for a, b in zip(angles, others, strict=True)))
+    drives = sample.drives
+    apart = max((_apart(drives, key) for key in drives), default=0.0)
     turned = max(max(angle) - min(angle) for angle in (sample.phi_rad, sample.psi_rad))
     return max(apart, turned) > ASYMMETRIC_RAD
+
+
+def _apart(drives: Mapping[str, Sequence[float]], key: str) -> float:
+    """Largest difference of a drive to that of the other side, rad; to rest where there is none."""
+    for side, other in (SIDES, SIDES[::-1]):
+        if key.endswith(f"_{side}"):
+            angles = drives[key]
+            opposite = drives.get(f"{key.removesuffix(side)}{other}", [angles[0]] * len(angles))
+            return max(abs(a - b) for a, b in zip(angles, opposite, strict=True))
+    return 0.0  # a word moves both sides
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:

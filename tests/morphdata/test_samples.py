@@ -72,6 +72,9 @@ def test_what_is_no_column_of_a_drive_is_refused(columns: Any, code: str, pointe
     assert hint in found[2]
 
 
+TWICE = [("ambiguous_drive", "/sweep_left_rad"), ("ambiguous_drive", "/sweep_right_rad")]
+
+
 @pytest.mark.parametrize(
     ("axes", "columns", "found"),
     [
@@ -79,7 +82,7 @@ def test_what_is_no_column_of_a_drive_is_refused(columns: Any, code: str, pointe
         ("x", {"sweep_left_rad": MOVED, "sweep_right_rad": MOVED}, []),
         ("zx", {"sweep_left_rad": MOVED, "sweep_right_rad": MOVED}, []),
         ("zx", {"sweep_rad": MOVED, "fold_left_deg": MOVED, "fold_right_rad": MOVED}, []),
-        ("xy", {"sweep_left_rad": MOVED, "sweep_right_rad": MOVED}, [("ambiguous_drive", "/sweep_left_rad"), ("ambiguous_drive", "/sweep_right_rad")]),
+        ("xy", {"sweep_left_rad": MOVED, "sweep_right_rad": MOVED}, TWICE),
         ("z", {"sweep_rad": MOVED, "fold_rad": MOVED}, [("unknown_drive", "/fold_rad")]),
         ("z", {"sweep_left_rad": MOVED}, [("missing", "/sweep_right_rad")]),
         ("x", {"sweep_left_rad": MOVED}, [("missing", "/sweep_right_rad")]),

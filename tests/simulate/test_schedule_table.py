@@ -28,7 +28,7 @@ def test_a_sample_flight_is_a_schedule(examples: Path) -> None:
     schedule, flight = read(path), load_trajectory(path)
     for side in ("left", "right"):
         np.testing.assert_array_equal(schedule[side].time_s, flight.time_s)
-        np.testing.assert_array_equal(schedule[side].angle_rad, flight.sweep(side))
+        np.testing.assert_array_equal(schedule[side].angle_rad, flight.drives[f"sweep_{side}"])
 
 
 def test_units_stand_in_the_names(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     """
     spline = Spline(np.array([0.0, 0.7, 1.4, 2.0]), np.array([0.0, 0.2, 0.9, 1.0]))
     path = tmp_path / "s.csv"
-    write_schedule_csv({"left": Hold(0.1), "right": spline}, 0.01 * np.arange(251), path)
+    write_schedule_csv({"sweep_left": Hold(0.1), "sweep_right": spline}, 0.01 * np.arange(251), path)
     schedule = read(path)
     times = np.linspace(0.0, 2.5, 1717)
     np.testing.assert_allclose(
