@@ -64,9 +64,9 @@ def airless_model(bench: Bench, links: int = TREE_LINKS) -> ChainModel:
 
 
 def schedules(model: ChainModel) -> list[Swung]:
-    """One for each surface."""
+    """One for each hinge."""
     right, left = SWEEPS_RAD
-    return [Swung(left if surface.side == "left" else right) for surface in model.aircraft.surfaces]
+    return [Swung(left if hinge.drive.endswith("left") else right) for hinge in model.aircraft.hinges]
 
 
 def plan_in_steps(model: ChainModel, step_s: float) -> FlightPlan:

@@ -60,11 +60,9 @@ def stretched(sample: Trajectory, longer: int, more_rows: int) -> Trajectory:
     rows = more_rows * (sample.time_s.size - 1) + 1
     at = np.linspace(sample.time_s[0], sample.time_s[-1], rows)
     begin = sample.time_s[0]
-    columns = {
-        name: np.interp(at, sample.time_s, getattr(sample, name))
-        for name in ("sweep_left", "sweep_right", "phi", "theta", "psi")
-    }
-    return replace(sample, time_s=begin + longer * (at - begin), extra={}, **columns)
+    columns = {name: np.interp(at, sample.time_s, getattr(sample, name)) for name in ("phi", "theta", "psi")}
+    drives = {name: np.interp(at, sample.time_s, values) for name, values in sample.drives.items()}
+    return replace(sample, time_s=begin + longer * (at - begin), drives=drives, extra={}, **columns)
 
 
 def _status(name: str) -> float:

@@ -107,7 +107,8 @@ def flight_meter(bench: Bench, links: int, sweep: str) -> Meter:
     model = chain_model(bench.aircraft, bench.flight, links)
     time_s, (left, right) = np.array(ROWS_S), SWEEPS[sweep]
     level = np.zeros_like(time_s)
-    sample = Trajectory("counted", time_s, left * time_s, right * time_s, level, level, level)
+    drives = {"sweep_left": left * time_s, "sweep_right": right * time_s}
+    sample = Trajectory("counted", time_s, drives, level, level, level)
     guess, cases = physical_guess(model), sample_cases(model, [sample])
     case, found = next(iter(shared_trims(model, guess, cases, "trim")))
     fly_attitudes(model, guess, case, found)  # compiles, which must not meet the Python kernels

@@ -32,7 +32,7 @@ from morphcore.models.kernels.layout import (
 from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
-from morphcore.simulate.plan import FlightPlan, OperatorTable, hinge_rows
+from morphcore.simulate.plan import FlightPlan, OperatorTable, surface_accelerations, surface_rows
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import Trim, trimmed_state
 
@@ -87,17 +87,19 @@ class Course:
         time = np.array([time_s])
         position = np.interp(time, grid.times_s, table.position)
         operators, strips = OperatorTable(table.matrices, table.strips, position).between(0, 1)
-        rows = []
-        for surface, schedule in zip(self.model.aircraft.surfaces, self.schedules, strict=True):
-            motion = schedule.motion(time)
-            rows.append(hinge_rows(surface, motion.angle, motion.rate)[0])
+        motions = [schedule.motion(time) for schedule in self.schedules]
+        angles, rates = (np.stack([getattr(m, name) for m in motions], axis=1) for name in ("angle", "rate"))
+        rows = surface_rows(self.model.aircraft, angles, rates)[0]
         wind = self.fine.wind_N[0] if self.air is None else self.air(time)[0]
-        return Moment(operators[0], strips[0], np.stack(rows), np.asarray(wind))
+        return Moment(operators[0], strips[0], rows, np.asarray(wind))
 
     def mean_acceleration(self, begin_s: float, end_s: float) -> Array:
-        """(s,) mean acceleration of the hinges between two times, rad/s^2."""
-        rates = [schedule.motion(np.array([begin_s, end_s])).rate for schedule in self.schedules]
-        return np.array([(rate[1] - rate[0]) / (end_s - begin_s) for rate in rates])
+        """(s, 6) mean acceleration of the surfaces between two times, as `FlightPlan.mean_accelerations`."""
+        times = np.array([begin_s, 0.5 * (begin_s + end_s), end_s])
+        motions = [schedule.motion(times) for schedule in self.schedules]
+        angles, rates = (np.stack([getattr(m, name) for m in motions], axis=1) for name in ("angle", "rate"))
+        mean = (rates[2:] - rates[:1]) / (end_s - begin_s)
+        return np.asarray(surface_accelerations(self.model.aircraft, angles[1:2], rates[1:2], mean)[0])
 
 
 @dataclass(frozen=True)

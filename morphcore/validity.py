@@ -47,7 +47,7 @@ class ResultWarning:
 class AirMotion:
     """How an aircraft meets the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
-    The incidence is the angle of attack of the body, or of the surface whose hinge inclines it furthest.
+    The incidence is the angle of attack of the body, or of the surface whose hinges incline it furthest.
     """
 
     time_s: Array
@@ -58,15 +58,19 @@ class AirMotion:
 def air_motion(
     aircraft: Aircraft, time_s: Array, euler: Array, velocity_N: Array, wind_N: Array, angles: Array
 ) -> AirMotion:
-    """The motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, s)."""
+    """The motion through the air from attitudes, velocities and wind (k, 3) and angles (k, h) of all hinges.
+
+    A hinge inclines its surface by as much of its angle as its axis points across the stream.
+    """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
     air_B = np.einsum("kij,ki->kj", R_NB, air_N)
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
+    across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
     inclined = [
-        angles[:, number]
-        for number, surface in enumerate(aircraft.surfaces)
-        if surface.hinge is not None and surface.hinge.axis == "y"
+        sum(angles[:, k] * across[k] for k in range(own.start, own.stop))
+        for own in aircraft.hinge_columns
+        if across[own].any()
     ]
     incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
@@ -112,14 +116,15 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
 
 
 def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
-    """Surfaces that lie in each other at any of some hinge angles (k, s), rad."""
+    """Surfaces that lie in each other at any of some angles (k, h) of all hinges, rad."""
     found = []
     for first, second, row in overlapping_surfaces(aircraft, angles):
         names = [aircraft.surfaces[number].name for number in (first, second)]
         turned = ", ".join(
-            f"{aircraft.surfaces[number].name} at {angles[row, number]:.3g} rad"
+            f"{aircraft.surfaces[number].name} at "
+            f"{', '.join(f'{angle:.3g}' for angle in angles[row, aircraft.hinge_columns[number]])} rad"
             for number in (first, second)
-            if aircraft.surfaces[number].hinge is not None
+            if aircraft.surfaces[number].hinges
         )
         found.append(
             ResultWarning(

@@ -39,7 +39,7 @@ def warm_up_further() -> None:
     aircraft, flight = tiny_aircraft()
     sample = _tiny_sample()
     model = chain_model(aircraft, flight, 2, SMALL)
-    held = flight_plan(model, [Hold()] * len(aircraft.surfaces), time_grid(sample.time_s))
+    held = flight_plan(model, [Hold()] * len(aircraft.hinges), time_grid(sample.time_s))
     states = np.zeros((held.grid.steps + 1, model.state_rows))
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
@@ -55,4 +55,4 @@ def _tiny_sample() -> Trajectory:
     """A flight of four rows in which both wings turn."""
     time_s = np.linspace(0.0, 0.03, 4)
     rest = np.zeros(4)
-    return Trajectory("warm-up", time_s, rest + time_s, rest + time_s, rest, rest, rest)
+    return Trajectory("warm-up", time_s, {"sweep": rest + time_s}, rest, rest, rest)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from morphdata.aircraft import Aircraft
+from morphdata.drives import Drive
+from morphdata.faults import InvalidInput
 from morphdata.samples import Role
 from morphid.exits import CommandError, Exit
 
@@ -57,6 +60,14 @@ class Request:
             if option:
                 return option
         return ""
+
+
+def aircraft_drives(request: Request) -> Mapping[str, Drive] | None:
+    """Return the drives of the request's aircraft; None where it is none, which its own faults say."""
+    try:
+        return Aircraft.parse(request.document.get("aircraft")).drives
+    except InvalidInput:
+        return None
 
 
 def changed(document: Document, changes: Iterable[str]) -> Document:

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import typer
 
+from morphdata.drives import Drive
 from morphdata.faults import InvalidInput, MorphError
 from morphdata.operations import operation_named
 from morphdata.samples import Role, load_sample
@@ -21,7 +22,7 @@ from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
 from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
 from morphid.interrupt import first_interrupt
-from morphid.request import Document, Request
+from morphid.request import Document, Request, aircraft_drives
 from morphid.screen import Meter, exit_for, meter, print_job_error, print_json, print_warnings, stderr
 from morphid.service import Service
 
@@ -70,7 +71,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
-    body = request.body(sample_document)
+    drives = aircraft_drives(request)
+    body = request.body(lambda path, role: sample_document(path, role, drives))
     require_valid(request.operation, body)  # before the library is loaded, which takes seconds
     bar.note("loading the library")
     threads = numerics.usable_cores()
@@ -179,10 +181,15 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: Role) -> Document:
-    """Read a sample file and give it as it stands inline in a request."""
+def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None) -> Document:
+    """Read a sample file and give it as it stands inline in a request.
+
+    Parameters
+    ----------
+    drives : of the aircraft, where it is one.
+    """
     require_file(path)
     try:
-        return load_sample(path, role).model_dump(exclude_defaults=True) | {"role": role}
+        return load_sample(path, role, drives).model_dump(exclude_defaults=True) | {"role": role}
     except InvalidInput as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None

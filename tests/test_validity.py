@@ -19,6 +19,7 @@ from morphcore.validity import (
     steep_warning,
 )
 from morphdata.lattice import Lattice
+from tests.geometry.rehinged import rehinged
 from tests.identify.flights import example
 from tests.models.chains import example_aircraft, example_flight
 from tests.simulate.flights import fly
@@ -74,7 +75,7 @@ def test_incidence_by_hand() -> None:
 def test_a_hinge_of_incidence_counts() -> None:
     """A wing turned nose up by its hinge meets the air at the body's angle and its own."""
     aircraft = example_aircraft()
-    turning = tuple(replace(s, hinge=s.hinge.model_copy(update={"axis": "y"})) for s in aircraft.surfaces)  # type: ignore[type-var]
+    turning = tuple(rehinged(surface, "y") for surface in aircraft.surfaces)
     found = air_motion(
         replace(aircraft, surfaces=turning), np.zeros(1), np.array([[0.0, 0.05, 0.0]]),
         np.array([[50.0, 0.0, 0.0]]), np.zeros((1, 3)), np.array([[0.0, 0.3]]),
@@ -131,11 +132,11 @@ def test_a_sweep_into_the_tail_warns() -> None:
     """The angles that are flown decide, not those at the start."""
     aircraft = example_aircraft()
     tail = replace(
-        aircraft.surfaces[0], name="tail", position_m=(-1.9, 1.0, 0.0), hinge=None, span_m=1.0, flexible=False
+        aircraft.surfaces[0], name="tail", position_m=(-1.9, 1.0, 0.0), hinges=(), span_m=1.0, flexible=False
     )
     whole = replace(aircraft, surfaces=(*aircraft.surfaces, tail))
     quiet = replace(example_flight(), mach=0.0)
     for final, expected in ((0.02, []), (1.0, ["surfaces_overlap"])):
         sweep = ConstantRate(0.0, final, 0.4)
-        found = fly(whole, quiet, [sweep] * 3, duration_s=0.4, lattice=COARSE)
+        found = fly(whole, quiet, {"both": sweep}, duration_s=0.4, lattice=COARSE)
         assert codes(found.warnings) == expected

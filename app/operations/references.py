@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel
@@ -19,10 +20,14 @@ from app.jobs.rows import get_job
 from app.models import repository as models
 from app.models.extraction import extracted_model
 from app.trajectories import repository as trajectories
+from morphdata.aircraft import Aircraft
+from morphdata.drives import unmeasured_sides
 from morphdata.execution import Request
-from morphdata.faults import Fault, InvalidInput
-from morphdata.identify import total_rows_faults
+from morphdata.faults import Fault, InvalidInput, refuse
+from morphdata.identify import SamplesRequest, total_rows_faults
 from morphdata.parameters import Parameters
+from morphdata.samplefiles.titles import CHANNELS
+from morphdata.samples import columns_of_aircraft, drive_key
 
 AnyRequest = TypeVar("AnyRequest", bound=Request)
 
@@ -53,7 +58,10 @@ def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
     faults: list[Fault] = []
     for item in found:
         try:
-            _put(document, item, RESOLVERS[item.field](session, owner, item))
+            named = RESOLVERS[item.field](session, owner, item)
+            if item.field == "trajectory_id" and isinstance(request, SamplesRequest):
+                named = _of_aircraft(named, request.aircraft, item.pointer)
+            _put(document, item, named)
         except InvalidInput as error:
             faults += error.faults
         except NotFound as error:
@@ -124,6 +132,23 @@ def _require_rows(session: Session, owner: str, uploads: list[Reference], reques
 def _flight(session: Session, owner: str, reference: Reference) -> Document:
     stored, columns = trajectories.get_trajectory(session, owner, reference.id)
     return {"name": stored.name, **json.loads(columns)}
+
+
+def _of_aircraft(flight: Document, aircraft: Aircraft, pointer: str) -> Document:
+    """Leave out of a file's columns those that are no drives of the aircraft."""
+    columns = dict(flight)
+    unreadable = columns.pop("unreadable", {})
+    fields = {
+        key: field for field in columns if (key := drive_key(field)) is not None and key not in CHANNELS
+    }
+    drives = aircraft.drives
+    try:
+        followed = columns_of_aircraft(list(fields), unreadable, drives)
+        refuse(unmeasured_sides(followed, drives))
+    except InvalidInput as error:
+        raise InvalidInput.of(replace(fault, pointer=pointer) for fault in error.faults) from None
+    left_out = {field for key, field in fields.items() if key not in followed.values()}
+    return {field: values for field, values in columns.items() if field not in left_out}
 
 
 def _model(session: Session, owner: str, reference: Reference) -> Document:

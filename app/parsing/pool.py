@@ -25,6 +25,7 @@ from app.parsing.frame import BadFrame, unpack
 from app.parsing.json_text import token
 from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
+from morphdata.samplefiles.columns import FlightColumns
 from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -61,8 +62,8 @@ class ParserPool:
             raise MalformedBody(*answer["malformed"])
         return answer["document"]
 
-    async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> dict[str, list[float]]:
-        """Read the columns of a flight, in SI units, by their standard names.
+    async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> FlightColumns:
+        """Read the columns of a flight and those that could be drives, SI units, by their standard names.
 
         Parameters
         ----------
@@ -76,14 +77,14 @@ class ParserPool:
         try:
             answer = await self._read(owner, kind, file)
         except _Unanswered as why:
-            hint = "Send a plain file of six columns of numbers; leave out everything else."
+            hint = "Send a plain file of time, drives and attitude; leave out everything else."
             raise InvalidRequest.of(
                 [Fault("unreadable_file", f"The file cannot be read: {why}.", pointer, hint)]
             ) from None
         if "fault" in answer:
             raise refusal(FileFault(*answer["fault"]), pointer)
-        columns: dict[str, list[float]] = answer["columns"]
-        return columns
+        unreadable = {name: FileFault(*words) for name, words in answer["unreadable"].items()}
+        return FlightColumns(answer["columns"], candidates=answer["candidates"], unreadable=unreadable)
 
     async def _read(self, owner: str, kind: str, file: BinaryIO) -> dict[str, Any]:
         try:

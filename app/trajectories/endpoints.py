@@ -46,7 +46,8 @@ FORM_SCHEMA: dict[str, Any] = {
             "type": "string",
             "format": "binary",
             "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), recognised by the ending "
-            "of its name: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
+            "of its name: t, phi, theta, psi, and a column for each drive that moves, by its name: "
+            "sweep_left, sweep_right, fold_left, ...; or with units: `theta_deg`.",
         },
         "name": {
             "type": "string",

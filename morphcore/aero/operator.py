@@ -109,9 +109,14 @@ def lattice_operator(
     mach: float = 0.0,
     wake_direction_B: Sequence[float] = BODY_AFT,
 ) -> LatticeOperator:
-    """The reduced operator for given hinge angles (one per surface, rad; ignored where there is no hinge)."""
-    surfaces = lattice.aircraft.surfaces
-    poses = [surface_pose(s, angle) for s, angle in zip(surfaces, hinge_rad, strict=True)]
+    """The reduced operator for given angles (h,) of all hinges, rad."""
+    aircraft, angles = lattice.aircraft, np.asarray(hinge_rad, dtype=np.float64)
+    if angles.shape != (len(aircraft.hinges),):
+        raise ValueError(f"{angles.size} angles for {len(aircraft.hinges)} hinges")
+    poses = [
+        surface_pose(surface, angles[own])
+        for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
+    ]
     corners, controls, fronts, sides, normals = [], [], [], [], []
     for (R_BW, r_B), part in zip(poses, lattice.lattices, strict=True):
         ring = part.ring_corners_W @ R_BW.T + r_B

@@ -13,8 +13,7 @@ from morphdata.samplefiles.csv_table import write_table
 Document = dict[str, Any]
 
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SWEEPS = ("sweep_left_rad", "sweep_right_rad")
-SCHEDULE_SIDES = ("sweep_left", "sweep_right")  # both wings follow one schedule
+SWEEPS = ("sweep_left", "sweep_right")  # of samples that do not name their drives
 MODELS = ("measured", "rigid", "initial", "identified")
 LONGEST_STEM = 100  # characters: with prefix and ending a file name stays below the limits of file systems
 DEFAULT_STEM = "sample"
@@ -54,12 +53,14 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    curves : ``{"samples": [{"name", "time_s", "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad",
-        "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...}, "identified": {...}}]}``.
+    curves : ``{"samples": [{"name", "time_s", "drives": ["sweep_left", "sweep_right"], "sweep_left_rad",
+        "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...},
+        "identified": {...}}]}``; the drives' columns bear their names.
 
     Returns
     -------
-    Columns time_s, sweep_*_rad, then ``<model>_<angle>_rad``. Where a flight diverged its cells are empty.
+    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, the drives, then ``<model>_<angle>_rad``. Where
+    a flight diverged its cells are empty.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)
@@ -68,7 +69,8 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
 def curve_table(sample: Document) -> bytes:
     """Write one sample's time histories; see `curve_tables`."""
-    columns = {name: sample[name] for name in ("time_s", *SWEEPS) if name in sample}
+    columns: dict[str, Sequence[float | None]] = {"time_s": sample["time_s"]}
+    columns |= {name: sample[name] for name in drive_columns(sample)}
     columns |= {
         f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
     }
@@ -80,13 +82,14 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    curves : ``{"time_s", "schedules": {name: {"sweep_rad", "rate_rad_s", "acceleration_rad_s2"}}, "flights":
-        {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``, the angles as departures from the start.
+    curves : ``{"time_s", "drives": [names], "schedules": {name: {"sweep_rad", "rate_rad_s",
+        "acceleration_rad_s2"}}, "flights": {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``, these
+        as departures from the start.
 
     Returns
     -------
-    ``schedule.csv``, the optimum with the columns of a schedule file (t, sweep_left, sweep_right; s, rad),
-    which the simulation flies; ``schedules.csv``, sweep, rate and acceleration of all; ``departures.csv``,
+    ``schedule.csv``, the optimum with the columns of a schedule file (t and the drives that move; s, rad),
+    which the simulation flies; ``schedules.csv``, angle, rate and acceleration of all; ``departures.csv``,
     ``<schedule>_in_<model>_<angle>`` of all flights.
     """
     time_s, schedules = curves["time_s"], curves["schedules"]
@@ -101,7 +104,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
         for name, flown in flights.items()
         for angle in ANGLES
     }
-    optimum = dict.fromkeys(SCHEDULE_SIDES, schedules["optimum"]["sweep_rad"])
+    optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
     return {
         "schedule.csv": _table({"t": time_s, **optimum}, SCHEDULE_DIGITS),
         "schedules.csv": _table({"time_s": time_s, **all_schedules}, SCHEDULE_DIGITS),
@@ -129,3 +132,9 @@ def _table(columns: Mapping[str, Sequence[float | str | None]], digits: int) -> 
     text = io.StringIO()
     write_table(text, columns, (map(cell, row) for row in zip(*columns.values(), strict=True)))
     return text.getvalue().encode()
+
+
+def drive_columns(document: Document) -> list[str]:
+    """Names of the columns of a sample's or a flight's drives, those of which there are any."""
+    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
+    return [name for name in names if name in document]

@@ -20,7 +20,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from morphcore.export.curves import SWEEPS
 from morphcore.stopping import heed
+from morphdata.drives import SIDES
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -99,11 +101,31 @@ def draw(axes: Axes, time_s: Array, values: Array, **style: Any) -> None:
     axes.plot(time_s[::every], values[::every], **style)
 
 
-def draw_sweep(axes: Axes, time_s: Array, document: Document) -> None:
-    """Both wings' sweep in degrees, out of ``sweep_left_rad`` and ``sweep_right_rad``; one line if alike."""
-    left, right = (np.degrees(series(document[name])) for name in ("sweep_left_rad", "sweep_right_rad"))
-    draw_sides(axes, time_s, left, right, np.degrees(SILENT_RAD))
-    label_axis(axes, "sweep, deg")
+def drive_panels(columns: Document, drives: Sequence[str] = SWEEPS) -> list[tuple[str, Array, Array]]:
+    """What the panels of the drives show: of each word its label, and the left and the right angle, rad.
+
+    Columns are called ``<drive>_rad``; of a drive on one side alone both angles are its own, and its label
+    says which it is.
+    """
+    pairs: dict[str, dict[str, Array]] = {}
+    for name in drives:
+        if f"{name}_rad" in columns:
+            side = next((side for side in SIDES if name.endswith(f"_{side}")), "")
+            pairs.setdefault(name.removesuffix(f"_{side}"), {})[side] = series(columns[f"{name}_rad"])
+    panels = []
+    for word, of_sides in pairs.items():
+        angles = list(of_sides.values())
+        alone = f" {next(iter(of_sides))}".rstrip() if len(of_sides) == 1 else ""
+        label = f"{printable(word)}{alone}".replace("_", " ")
+        panels.append((label, of_sides.get("left", angles[0]), of_sides.get("right", angles[-1])))
+    return panels
+
+
+def draw_drive(axes: Axes, time_s: Array, panel: tuple[str, Array, Array]) -> None:
+    """A drive in degrees, of both sides; one line if they are alike."""
+    label, left, right = panel
+    draw_sides(axes, time_s, np.degrees(left), np.degrees(right), np.degrees(SILENT_RAD))
+    label_axis(axes, f"{label}, deg")
 
 
 def draw_sides(axes: Axes, time_s: Array, left: Array, right: Array, alike: float) -> None:

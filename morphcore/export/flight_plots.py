@@ -1,4 +1,4 @@
-"""The picture of one simulated flight: attitude, wing tips and sweep over time."""
+"""The picture of one simulated flight: attitude, wing tips and drives over time."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from morphcore.export.curves import SWEEPS
 from morphcore.export.figure import (
     ANGLES,
     BLUE,
@@ -16,8 +17,9 @@ from morphcore.export.figure import (
     Array,
     Document,
     draw,
+    draw_drive,
     draw_sides,
-    draw_sweep,
+    drive_panels,
     headline,
     is_silent,
     label_axis,
@@ -40,9 +42,9 @@ def flight_plots(document: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    document : the result; its ``trajectory`` holds the columns ``time_s``, ``sweep_left_rad``,
-        ``sweep_right_rad``, ``phi_rad``, ``theta_rad``, ``psi_rad`` and, where the wings' tips are known,
-        ``tip_left_z_m`` and ``tip_right_z_m``.
+    document : the result; its ``trajectory`` holds the columns ``time_s``, those of the drives that it names
+        in ``drives`` (``sweep_left_rad``), ``phi_rad``, ``theta_rad``, ``psi_rad`` and, where the wings' tips
+        are known, ``tip_left_z_m`` and ``tip_right_z_m``.
 
     Returns
     -------
@@ -52,14 +54,15 @@ def flight_plots(document: Document) -> dict[str, bytes]:
 
 
 def flight_figure(document: Document) -> Figure:
-    """Roll, pitch and yaw in degrees, the wing tips (up) in m, the sweep in degrees."""
+    """Roll, pitch and yaw in degrees, the wing tips (up) in m, the drives in degrees."""
     flown = document["trajectory"]
     time_s = series(flown["time_s"])
     angles = {key: np.unwrap(series(flown[key])) for key, _ in ANGLES}
     silent = {key: is_silent([values]) for key, values in angles.items()}
     tips_up = [-series(flown[name]) for name in TIPS if flown.get(name) is not None]  # body z points down
     heights = [SILENT_HEIGHT if silent[key] else ANGLE_HEIGHT for key, _ in ANGLES]
-    heights += [OTHER_HEIGHT] * (1 + bool(tips_up))
+    drives = drive_panels(flown, document.get("drives", SWEEPS))
+    heights += [OTHER_HEIGHT] * (len(drives) + bool(tips_up))
     figure = Figure(figsize=(7.2, 1.1 + 1.75 * sum(heights)))
     rows = stack(figure, heights, TITLE_HEAD_IN)
     for axes, (key, label) in zip(rows, ANGLES, strict=False):
@@ -70,7 +73,8 @@ def flight_figure(document: Document) -> Figure:
             quiet(axes, SILENT_SPAN_DEG)
     if tips_up:
         _draw_tips(rows[len(ANGLES)], time_s, tips_up)
-    draw_sweep(rows[-1], time_s, flown)
+    for axes, panel in zip(rows[len(rows) - len(drives) :], drives, strict=True):
+        draw_drive(axes, time_s, panel)
     time_axis(figure, rows, time_s)
     headline(figure, f"simulated flight, {printable(str(document['model']['kind']))} model")
     return figure

@@ -19,7 +19,8 @@ from morphcore.export.figure import (
     VERMILION,
     Document,
     draw,
-    draw_sweep,
+    draw_drive,
+    drive_panels,
     is_cost,
     is_silent,
     label_axis,
@@ -102,7 +103,8 @@ def verification_figure(curves: Document) -> Figure:
     label_axis(errors, "error, mrad")
     errors.axhline(0.0, color="0.5", linewidth=0.6)
     _widened(errors, LEAST_ERROR_MRAD)
-    draw_sweep(rows[-1], time_s, curves)
+    (panel,) = drive_panels(curves)
+    draw_drive(rows[-1], time_s, panel)
     time_axis(figure, rows, time_s)
     legend_above(figure, rows[0].get_lines(), below_top_in=0.0)
     return figure

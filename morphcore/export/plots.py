@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from morphcore.export.curves import file_stems
+from morphcore.export.curves import SWEEPS, file_stems
 from morphcore.export.figure import (
     ANGLES,
     BLUE,
@@ -22,7 +22,8 @@ from morphcore.export.figure import (
     Array,
     Document,
     draw,
-    draw_sweep,
+    draw_drive,
+    drive_panels,
     headline,
     is_cost,
     is_silent,
@@ -65,9 +66,10 @@ def identification_plots(document: Document, curves: Document) -> dict[str, byte
     Parameters
     ----------
     document : the result; its ``search.history`` gives the convergence.
-    curves : ``{"samples": [{"name", "role", "time_s", "sweep_left_rad", "sweep_right_rad", "measured":
-        {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...}, "initial": {...}, "identified": {...}}]}``; a
-        value that a diverged flight never reached is None.
+    curves : ``{"samples": [{"name", "role", "time_s", "drives": ["sweep_left", "sweep_right"],
+        "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...},
+        "initial": {...}, "identified": {...}}]}``; the drives' columns bear their names; a value that a
+        diverged flight never reached is None.
 
     Returns
     -------
@@ -83,7 +85,7 @@ def identification_plots(document: Document, curves: Document) -> dict[str, byte
 
 
 def attitude_figure(sample: Document) -> Figure:
-    """Roll, pitch and yaw over time in degrees, of the sample and of each model, above the sweep."""
+    """Roll, pitch and yaw over time in degrees, of the sample and of each model, above the drives."""
     time_s = series(sample["time_s"])
     measured = {key: np.unwrap(series(sample["measured"][key])) for key, _ in ANGLES}
     flown = {
@@ -92,8 +94,8 @@ def attitude_figure(sample: Document) -> Figure:
         if sample.get(model)
     }
     silent = {key: is_silent([measured[key], *(f[key] for f in flown.values())]) for key, _ in ANGLES}
-    has_sweep = "sweep_left_rad" in sample
-    heights = [0.45 if silent[key] else 1.0 for key, _ in ANGLES] + [0.45] * has_sweep
+    drives = drive_panels(sample, sample.get("drives", SWEEPS))
+    heights = [0.45 if silent[key] else 1.0 for key, _ in ANGLES] + [0.45] * len(drives)
     figure = Figure(figsize=(7.2, 1.3 + 1.75 * sum(heights)))
     rows = stack(figure, heights)
     for axes, (key, label) in zip(rows, ANGLES, strict=False):
@@ -102,8 +104,8 @@ def attitude_figure(sample: Document) -> Figure:
             draw(axes, time_s, np.degrees(values[key]), **_line(model))
         if silent[key]:
             quiet(axes, SILENT_SPAN_DEG)
-    if has_sweep:
-        draw_sweep(rows[-1], time_s, sample)
+    for axes, panel in zip(rows[len(ANGLES) :], drives, strict=True):
+        draw_drive(axes, time_s, panel)
     time_axis(figure, rows, time_s)
     _legend(figure, ["measured", *flown], _title(sample, "attitude"))
     return figure

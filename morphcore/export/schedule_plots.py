@@ -23,6 +23,7 @@ from morphcore.export.figure import (
     label_axis,
     legend_above,
     light_grid,
+    printable,
     quiet,
     rendered,
     series,
@@ -70,13 +71,13 @@ def schedule_plots(document: Document, curves: Document) -> dict[str, bytes]:
 
 
 def schedule_figure(document: Document, curves: Document) -> Figure:
-    """Sweep (deg), rate (deg/s) and acceleration (deg/s²) of all schedules over the morph, with limits."""
+    """Angle (deg), rate (deg/s) and acceleration (deg/s²) of all schedules over the morph, with limits."""
     shown = curves["schedules"]
     end_s = float(document["duration_s"])
     time_s = series(curves["time_s"])
     inside = time_s <= end_s * (1.0 + 1e-9)
     quantities = (
-        ("sweep_rad", "sweep, deg", None),
+        ("sweep_rad", f"{printable(str(curves.get('drive', 'sweep'))).replace('_', ' ')}, deg", None),
         ("rate_rad_s", "rate, deg/s", "max_rate_rad_s"),
         ("acceleration_rad_s2", "acceleration, deg/s²", "max_accel_rad_s2"),
     )

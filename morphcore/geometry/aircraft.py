@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.hinge import Hinge
 from morphcore.geometry.surface import Surface
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
+from morphdata.drives import Drive
 from morphdata.flight import Flight as FlightDocument
 
 Array = NDArray[np.float64]
@@ -52,6 +56,38 @@ class Aircraft(Shown):
         """Return the aircraft that a document describes."""
         surfaces = tuple(Surface.of(surface) for surface in document.surfaces)
         return cls(document.name, Fuselage.of(document.fuselage), surfaces)
+
+    @cached_property
+    def hinges(self) -> tuple[Hinge, ...]:
+        """The hinges of all surfaces, surface by surface from the fuselage outward: columns of motions."""
+        return tuple(hinge for surface in self.surfaces for hinge in surface.hinges)
+
+    @cached_property
+    def hinge_columns(self) -> tuple[slice, ...]:
+        """Which of ``hinges`` each surface has."""
+        ends = np.cumsum([0, *(len(surface.hinges) for surface in self.surfaces)]).tolist()
+        return tuple(slice(first, last) for first, last in pairwise(ends))
+
+    @cached_property
+    def drives(self) -> dict[str, Drive]:
+        """What can be moved, by name, in the order of the hinges."""
+        moved: dict[str, list[tuple[Surface, tuple[int, int], Hinge]]] = {}
+        for number, surface in enumerate(self.surfaces):
+            for place, hinge in enumerate(surface.hinges):
+                moved.setdefault(hinge.drive, []).append((surface, (number, place), hinge))
+        return {
+            name: Drive(
+                name,
+                name.removesuffix(f"_{turned[0][0].side}"),
+                turned[0][0].side,
+                tuple(surface.name for surface, _, _ in turned),
+                tuple(at for _, at, _ in turned),
+                max(hinge.min_rad for _, _, hinge in turned),
+                min(hinge.max_rad for _, _, hinge in turned),
+                turned[0][2].angle_rad,
+            )
+            for name, turned in moved.items()
+        }
 
     @property
     def flexible_surfaces(self) -> tuple[Surface, ...]:

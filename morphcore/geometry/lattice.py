@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from morphcore.frames import axis_rotation
+from morphcore.geometry.hinge import hinge_arms, hinged_pose
 from morphcore.geometry.surface import Surface
 from morphdata.lattice import DEFAULT_LATTICE
 
@@ -107,20 +107,18 @@ def surface_lattice(
     )
 
 
-def surface_pose(surface: Surface, hinge_rad: float = 0.0) -> tuple[Array, Array]:
-    """Place of an undeformed surface for a hinge coordinate.
+def surface_pose(surface: Surface, hinge_rad: ArrayLike | None = None) -> tuple[Array, Array]:
+    """Place of an undeformed surface for angles (m,) of its hinges, rad; None: no hinge has moved.
 
     Returns
     -------
     R_BW : (3, 3), wing components to body components.
     r_B : (3,) origin of W (root mid-chord) from the fuselage reference point, m.
     """
-    root_B = np.array(surface.position_m)
-    if surface.hinge is None:
-        return np.eye(3), root_B
-    hinge_B = np.array(surface.hinge.position_m)
-    R_BW = axis_rotation(surface.hinge.axis_index, surface.rotation_sign * hinge_rad)
-    return R_BW, hinge_B + R_BW @ (root_B - hinge_B)
+    angles = np.zeros(len(surface.hinges)) if hinge_rad is None else np.asarray(hinge_rad, dtype=np.float64)
+    arms = hinge_arms(surface.hinges, np.array(surface.position_m))
+    R_BW, r_B = hinged_pose(surface.hinges, arms, angles[None])
+    return R_BW[0], r_B[0]
 
 
 def _points(surface: Surface, chord_fraction: Array, distance_m: Array) -> Array:

@@ -21,16 +21,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mirror:
-    """Indices of an aircraft's surfaces: ``own`` of one half, ``image`` of their images in the same order."""
+    """Indices of an aircraft's surfaces: ``own`` of one half, ``image`` of their images in the same order.
+
+    ``own_hinges`` and ``image_hinges`` are those of their hinges among all the aircraft's.
+    """
 
     own: tuple[int, ...]
     image: tuple[int, ...]
+    own_hinges: tuple[int, ...]
+    image_hinges: tuple[int, ...]
 
     def spread(self, values: Array) -> Array:
         """Columns (k, s) of all surfaces from those of one half, (k, s / 2), where both sides are alike."""
-        out = np.empty((values.shape[0], 2 * values.shape[1]))
-        out[:, self.own] = out[:, self.image] = values
-        return out
+        return _spread(values, self.own, self.image)
+
+    def spread_hinges(self, values: Array) -> Array:
+        """Columns (k, h) of all hinges from those of one half, (k, h / 2), where both sides are alike."""
+        return _spread(values, self.own_hinges, self.image_hinges)
+
+
+def _spread(values: Array, own: tuple[int, ...], image: tuple[int, ...]) -> Array:
+    out = np.empty((values.shape[0], 2 * values.shape[1]))
+    out[:, own] = out[:, image] = values
+    return out
 
 
 def mirror_groups(surfaces: Sequence[Surface]) -> tuple[tuple[int, ...], ...]:
@@ -59,17 +72,26 @@ def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
     paired = all(len(group) > 1 for group in groups)
     if not (paired and _is_symmetric(aircraft.fuselage) and _starts_straight(flight)):
         return None
-    return Mirror(tuple(group[0] for group in groups), tuple(group[1] for group in groups))
+    own, image = (tuple(group[side] for group in groups) for side in (0, 1))
+    columns = aircraft.hinge_columns
+    return Mirror(
+        own,
+        image,
+        *(
+            tuple(k for number in side for k in range(columns[number].start, columns[number].stop))
+            for side in (own, image)
+        ),
+    )
 
 
 def _reflection(surface: Surface) -> Surface:
-    """The surface on the other side; hinge coordinates are alike on both sides."""
-    (x, y, z), hinge = surface.position_m, surface.hinge
-    if hinge is not None:
-        forward, right, down = hinge.position_m
-        hinge = hinge.model_copy(update={"position_m": [forward, -right, down]})
+    """The surface on the other side; the angles of hinges are alike on both sides."""
+    x, y, z = surface.position_m
     return replace(
-        surface, side="left" if surface.side == "right" else "right", position_m=(x, -y, z), hinge=hinge
+        surface,
+        side="left" if surface.side == "right" else "right",
+        position_m=(x, -y, z),
+        hinges=tuple(hinge.reflection for hinge in surface.hinges),
     )
 
 

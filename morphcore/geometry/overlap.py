@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
@@ -29,7 +29,7 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
 
     Parameters
     ----------
-    angles : (k, s) of all surfaces over a flight, rad; fixed surfaces' are not looked at. Of the rows
+    angles : (k, h) of all hinges over a flight, rad. Of the rows
         SHAPES are used, evenly spread with both ends, and those where each angle is least and greatest.
 
     Returns
@@ -41,8 +41,8 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
     found: dict[tuple[int, int], int] = {}
     for row in rows:
         outlines = [
-            outline_B(surface, float(angle))
-            for surface, angle in zip(aircraft.surfaces, angles[row], strict=True)
+            outline_B(surface, angles[row, own])
+            for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
         ]
         for first, second in itertools.combinations(range(len(outlines)), 2):
             pair = aircraft.surfaces[first], aircraft.surfaces[second]
@@ -51,8 +51,11 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
     return [(first, second, row) for (first, second), row in found.items()]
 
 
-def outline_B(surface: Surface, hinge_rad: float) -> Array:
-    """Corners (4, 3) of an undeformed surface's mid-plane in B, around it from the root's leading edge, m."""
+def outline_B(surface: Surface, hinge_rad: ArrayLike) -> Array:
+    """Corners (4, 3) of an undeformed surface's mid-plane in B, around it from the root's leading edge, m.
+
+    hinge_rad : (m,) of its hinges.
+    """
     tip_y = surface.span_sign * surface.span_m
     root, tip = 0.5 * surface.root_chord_m, 0.5 * surface.tip_chord_m
     corners_W = np.array([[root, 0.0, 0.0], [tip, tip_y, 0.0], [-tip, tip_y, 0.0], [-root, 0.0, 0.0]])

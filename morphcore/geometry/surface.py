@@ -8,12 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from morphcore.geometry.hinge import Hinge, hinge_arms
 from morphcore.geometry.section import SectionProperties, given_section, solid_box
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.aircraft import Material, Section
-from morphdata.drives import Hinge
-from morphdata.vehicle import ANGLE_TOLERANCE_RAD
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
@@ -21,20 +20,15 @@ Side = Literal["right", "left"]
 SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
 
 
-def beyond_range(hinge: Hinge, angle_rad: Array) -> NDArray[np.int64]:
-    """Rows of a history of angles (k,) that lie beyond the hinge's range."""
-    low, high = hinge.min_rad - ANGLE_TOLERANCE_RAD, hinge.max_rad + ANGLE_TOLERANCE_RAD
-    return np.flatnonzero((angle_rad < low) | (angle_rad > high))
-
-
 @dataclass(frozen=True, repr=False)
 class Surface(Shown):
-    """A flat lifting surface: straight mid-chord line along its own y, linear taper.
+    """A flat lifting surface on hinges: straight mid-chord line along its own y, linear taper.
 
     Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
     +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` say how far the elastic axis and
     the line of centres of mass lie aft of mid-chord (negative: forward of it), as documents have them; who
-    computes in W uses ``elastic_axis_x_m`` and ``mass_axis_x_m``.
+    computes in W uses ``elastic_axis_x_m`` and ``mass_axis_x_m``. ``hinges`` are those that carry it, from
+    the fuselage outward: none of a fixed surface.
     """
 
     name: str
@@ -44,7 +38,7 @@ class Surface(Shown):
     tip_chord_m: float
     thickness_m: float
     material: Material
-    hinge: Hinge | None
+    hinges: tuple[Hinge, ...]
     position_m: tuple[float, float, float]
     flexible: bool
     profile_drag: float
@@ -65,7 +59,7 @@ class Surface(Shown):
             tip_chord_m=tip,
             thickness_m=document.thickness_m,
             material=document.material,
-            hinge=document.hinge,
+            hinges=tuple(Hinge.of(hinge, document.side) for hinge in document.all_hinges),
             position_m=(x, y, z),
             flexible=document.flexible,
             profile_drag=document.profile_drag,
@@ -90,14 +84,9 @@ class Surface(Shown):
         return -self.mass_axis_offset_m
 
     @property
-    def rotation_sign(self) -> float:
-        """Sign of the right-handed rotation about the hinge axis for a positive hinge coordinate.
-
-        Sweep and fold mirror with the side, incidence does not: positive fold turns the right wing about -x.
-        """
-        if self.hinge is None or self.hinge.axis == "y":
-            return 1.0
-        return self.span_sign if self.hinge.axis == "z" else -self.span_sign
+    def root_arms_B(self) -> Array:
+        """From each hinge to the elastic axis at the root, (m, 3), m, at rest; see `hinge_arms`."""
+        return hinge_arms(self.hinges, np.array(self.position_m), np.array([self.elastic_axis_x_m, 0.0, 0.0]))
 
     @property
     def mean_chord_m(self) -> float:

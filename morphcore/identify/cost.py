@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.surface import beyond_range
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
-from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
@@ -63,20 +63,22 @@ class Evaluation:
 
 
 def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> list[Schedule]:
-    """Hinge motion of every surface out of a sample; refuses angles beyond a hinge's range."""
-    schedules: list[Schedule] = []
+    """Motion of every hinge out of a sample; refuses angles beyond a hinge's range."""
+    followed = followed_flight(aircraft, sample, pointer)
     for surface in aircraft.surfaces:
-        angle = sample.sweep(surface.side)
-        if surface.hinge is not None:
-            bad = beyond_range(surface.hinge, angle)
+        for hinge in surface.hinges:
+            if hinge.drive not in followed:
+                continue
+            key, schedule = followed[hinge.drive]
+            angle = schedule.motion(sample.time_s).angle
+            bad = hinge.beyond_range(angle)
             if bad.size:
                 raise InvalidInput(
-                    f"sweep {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
-                    pointer=f"{pointer}/sweep_{surface.side}_rad/{bad[0]}",
-                    hint=f"its range is {surface.hinge.min_rad:g}..{surface.hinge.max_rad:g} rad",
+                    f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
+                    pointer=f"{pointer}/{key}_rad/{bad[0]}",
+                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad",
                 )
-        schedules.append(Tabulated(sample.time_s, angle))
-    return schedules
+    return hinge_schedules(aircraft, followed)
 
 
 def sample_cases(

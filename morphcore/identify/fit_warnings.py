@@ -9,13 +9,14 @@ import numpy as np
 
 from morphcore.errors import NotFlyable
 from morphcore.frames import wrap_angle
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.obstacle import obstacle
-from morphcore.geometry.surface import Surface
 from morphcore.identify.cost import shared_trims
 from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.simulate.chain_motion import chain_motion
+from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
 from morphcore.simulate.trim import trimmed_state
 from morphcore.validity import (
     AirMotion,
@@ -83,7 +84,7 @@ def fit_warnings(
     found += _of_samples(fits)
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
-    found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft.surfaces) for fit in fits]))
+    found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft) for fit in fits]))
     return tuple(found)
 
 
@@ -98,7 +99,7 @@ def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
                 "diverged",
                 f"the model does not fly {name}, which was held out: the flight {fit.ending('identified')}",
                 "the model is good for flights like those it was fitted to: fit one like this too, or check "
-                "its sweep and conditions",
+                "its drives and conditions",
                 pointer,
             )
         for model, title in COMPARED.items():
@@ -135,9 +136,14 @@ def _of_bounds(
         )
 
 
-def _angles(fit: SampleFit, surfaces: Sequence[Surface]) -> np.ndarray:
-    """Hinge angles (k, s) of all surfaces along a sample."""
-    return np.stack([fit.case.sample.sweep(surface.side) for surface in surfaces], axis=1)
+def _angles(fit: SampleFit, aircraft: Aircraft) -> np.ndarray:
+    """Angles (k, h) of all hinges along a sample."""
+    sample = fit.case.sample
+    schedules = hinge_schedules(aircraft, followed_flight(aircraft, sample))
+    angles = np.empty((sample.time_s.size, len(schedules)))
+    for column, schedule in enumerate(schedules):
+        angles[:, column] = schedule.motion(sample.time_s).angle
+    return angles
 
 
 def _motions(run: Identification, best: ParameterBatch, fits: Sequence[SampleFit]) -> Motions:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from morphcore.models.parameters import Parameter
 from morphcore.simulate.trajectory import Trajectory
+from morphdata.drives import SIDES
+
+Array = NDArray[np.float64]
 
 # 0.6 degrees: above what the noise of an attitude sensor makes of a symmetric flight, and far below what a
 # flight shows that can tell a drag
@@ -15,10 +19,20 @@ ASYMMETRIC_RAD = 0.01
 
 
 def asymmetric(sample: Trajectory) -> bool:
-    """Whether the sweeps of both sides differ, or the flight rolls or yaws, by more than ASYMMETRIC_RAD."""
-    apart = np.abs(sample.sweep_left - sample.sweep_right).max()
+    """Whether drives of both sides differ, or the flight rolls or yaws, by more than ASYMMETRIC_RAD."""
+    apart = max((_apart(sample.drives, name) for name in sample.drives), default=0.0)
     turned = np.ptp(np.unwrap(np.stack([sample.phi, sample.psi]), axis=1), axis=1).max()
     return bool(max(apart, turned) > ASYMMETRIC_RAD)
+
+
+def _apart(drives: Mapping[str, Array], name: str) -> float:
+    """Largest difference of a drive to that of the other side, rad; to rest where that is not moved."""
+    for side, other in (SIDES, SIDES[::-1]):
+        if name.endswith(f"_{side}"):
+            rest = np.full_like(drives[name], drives[name][0])
+            opposite = drives.get(f"{name.removesuffix(side)}{other}", rest)
+            return float(np.abs(drives[name] - opposite).max())
+    return 0.0  # a word moves both sides
 
 
 def corrections_told(parameters: Sequence[Parameter], training: Sequence[Trajectory]) -> tuple[str, ...]:

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.simulate.schedule import Tabulated
+from morphcore.simulate.hinge_schedules import followed_flight
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Stop, heed
@@ -28,8 +29,8 @@ OUTPUT_STEP_S = 0.01
 ROUNDS = 7  # of which medians are taken
 
 
-def timed_flight(samples: Sequence[Trajectory]) -> Trajectory:
-    """A flight of two seconds along the measured sweep that moves most in its first two seconds.
+def timed_flight(aircraft: Aircraft, samples: Sequence[Trajectory]) -> Trajectory:
+    """A flight of two seconds along the measured drives that move most in their first two seconds.
 
     A shorter sample is held where it ends. The attitudes are not looked at.
     """
@@ -38,16 +39,16 @@ def timed_flight(samples: Sequence[Trajectory]) -> Trajectory:
     flights = []
     for sample in samples:
         start_s = sample.time_s[0]
-        left, right = (
-            Tabulated(sample.time_s, sample.sweep(side)).motion(start_s + times).angle
-            for side in ("left", "right")
-        )
-        flights.append(Trajectory("timed", times, left, right, rest, rest, rest))
+        drives = {
+            name: schedule.motion(start_s + times).angle
+            for name, (_, schedule) in followed_flight(aircraft, sample).items()
+        }
+        flights.append(Trajectory("timed", times, drives, rest, rest, rest))
     return max(flights, key=_travel)
 
 
 def _travel(flight: Trajectory) -> float:
-    return float(np.abs(np.diff([flight.sweep_left, flight.sweep_right], axis=1)).sum())
+    return float(sum(np.abs(np.diff(values)).sum() for values in flight.drives.values()))
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,8 @@ def flight_timing(
 
     models : the first is the rigid one; None stands for a size of which none flies. steps_s : each model's.
     """
-    flight = timed_flight(samples)
     first = next(flown for flown in models if flown is not None)[0]
+    flight = timed_flight(first.aircraft, samples)
     # a plan knows the lattice and the hinges, not the links: all models of one step fly the same one
     cases = {step_s: sample_cases(first, [flight], step_s)[0] for step_s in dict.fromkeys(steps_s)}
     timing = FlightTiming(tuple(cases[step_s] for step_s in steps_s), tuple(models), start, clock, 0.0)

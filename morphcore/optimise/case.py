@@ -12,11 +12,11 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.soft_joints import chain_obstacle, soft_joint
-from morphcore.optimise.feasible import constant_rate, morph_space
+from morphcore.optimise.feasible import constant_rate, morph_drives, morph_space, morph_word
 from morphcore.optimise.flights import MorphFlights, sample_times
 from morphcore.optimise.goals import ModelName
 from morphcore.optimise.limits import MorphSpace
-from morphcore.simulate.plan import CommonPath, common_path
+from morphcore.simulate.plan import CommonPath, common_path, path_schedules
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trim import StartMode
@@ -78,7 +78,17 @@ class MorphCase:
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
-        return common_path(self.chain("rigid")[0], *ends, may_halve=self.is_even)
+        return common_path(self.chain("rigid")[0], *ends, drives=self.drives, may_halve=self.is_even)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives that the morph moves, all alike; others hold their hinges' angles."""
+        return morph_drives(self.aircraft, self.morph)
+
+    @property
+    def word(self) -> str:
+        """What the morph moves, as its result names it."""
+        return morph_word(self.aircraft, self.morph)
 
     @cached_property
     def is_even(self) -> bool:
@@ -99,7 +109,8 @@ class MorphCase:
 
     def _found_step(self, stop: Stop | None) -> float:
         constant = self.constant(self.morph.duration_s)
-        flight = [constant] * len(self.aircraft.surfaces), busiest_part([constant], self.times_s)
+        schedules = path_schedules(self.aircraft, self.drives, constant)
+        flight = schedules, busiest_part([constant], self.times_s)
         chains = [self.chain(name) for name in ("rigid", "equivalent")]
         steps_s = []
         for model, batch in chains:

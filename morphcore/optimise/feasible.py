@@ -9,7 +9,6 @@ from scipy.interpolate import CubicSpline
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.surface import beyond_range
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.optimize import Limits, Morph
@@ -19,21 +18,18 @@ USUAL_RAMP_S = 0.1  # of a constant rate where the limits allow it, as the sampl
 
 
 def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: float) -> MorphSpace:
-    """The unknowns and limits of a morph on an aircraft's hinges.
+    """The unknowns and limits of a morph on the hinges that it moves.
 
     Raises
     ------
-    InvalidInput : there is no hinge, or a hinge does not reach the angles.
+    InvalidInput : there is no hinge, several drives could be meant, or a hinge does not reach the angles.
     """
-    hinges = [surface.hinge for surface in aircraft.surfaces if surface.hinge is not None]
-    if not hinges:
-        raise InvalidInput(
-            "no surface has a hinge", pointer="/aircraft/surfaces", hint="give the wings a hinge"
-        )
+    drives = morph_drives(aircraft, morph)
+    hinges = [hinge for hinge in aircraft.hinges if hinge.drive in drives]
     least, most = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
     for name in ("initial_rad", "final_rad"):
         angle = getattr(morph, name)
-        if any(beyond_range(hinge, np.array([angle])).size for hinge in hinges):
+        if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
             raise InvalidInput(
                 f"{name} {angle:g} is beyond the hinges' range {least:g}..{most:g} rad",
                 pointer=f"/morph/{name}",
@@ -47,6 +43,26 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
         max(min(stops[0], 0.0), -OVERSHOOT),
         min(max(stops[1], 1.0), 1.0 + OVERSHOOT),
     )
+
+
+def morph_drives(aircraft: Aircraft, morph: Morph) -> tuple[str, ...]:
+    """Names of the drives that a morph moves, all alike: those it names, or those of the only word.
+
+    Raises
+    ------
+    InvalidInput : there is none, or several could be meant.
+    """
+    drives = aircraft.drives
+    if not drives:
+        raise InvalidInput(
+            "no surface has a hinge", pointer="/aircraft/surfaces", hint="give the wings a hinge"
+        )
+    return morph.moved(drives)
+
+
+def morph_word(aircraft: Aircraft, morph: Morph) -> str:
+    """What a morph moves, for people and results: the word or name of its drive."""
+    return morph.named_drive(aircraft.drives)
 
 
 def require_schedules(space: MorphSpace) -> None:

@@ -40,8 +40,8 @@ class Flown:
     """Flights of p schedules over k rows.
 
     departure : (p, k, 3) of phi, theta, psi from their values at the start, wrapped, rad; finite, a diverged
-    flight is charged DIVERGED_ANGLE. torque : (p, n) of all hinges at all steps, N m; n is 0 where it was not
-    asked for. diverged : (p,).
+    flight is charged DIVERGED_ANGLE. torque : (p, n) of all moved hinges at all steps, N m; n is
+    0 where it was not asked for. diverged : (p,).
     """
 
     departure: Array
@@ -95,6 +95,8 @@ class MorphFlights:
         step_s: float,
     ) -> None:
         self.model, self.path = path.flown(model), path
+        # the hinges whose motors drive the morph: those that hold do no work, and have no limit
+        self.moved = np.array([path.moves(hinge) for hinge in self.model.aircraft.hinges], dtype=np.bool_)
         self.times_s = times_s
         self.grid = time_grid(times_s, step_s)
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
@@ -105,7 +107,7 @@ class MorphFlights:
         self.state = trimmed_state(self.model, batch, waiting, found)
 
     def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:
-        """Fly schedules of all hinges; with the torque of their motors if asked for.
+        """Fly schedules of the path's drives; with the torque of their motors if asked for.
 
         ``stop`` is asked between rounds of one flight for each thread, of long flights within them too, by
         one thread at a time; True raises Interrupted.
@@ -144,4 +146,4 @@ class MorphFlights:
         attitude = euler_from_quaternion(states[self.grid.at, :4])
         if not torque:
             return attitude, np.zeros(0)
-        return attitude, hinge_torques(self.model, plan, self.constants, states).ravel()
+        return attitude, hinge_torques(self.model, plan, self.constants, states)[:, self.moved].ravel()

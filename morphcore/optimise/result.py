@@ -47,6 +47,7 @@ class FrontPoint(Shown):
 class ScheduleResult(Shown):
     """An optimised morph with its comparison.
 
+    drive : word or name of what the morph moves; drives : names of all those drives.
     schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
     of each model, of each schedule; None where it was not flown. front : all durations
     that were looked at, rising. partial : the best so far of a run that did not end. warnings : documents.
@@ -56,6 +57,8 @@ class ScheduleResult(Shown):
     limits: Limits
     weights: Weights
     best: Found
+    drive: str
+    drives: tuple[str, ...]
     schedules: dict[str, Schedule | None]
     times_s: Array
     flights: dict[str, dict[str, ComparedFlight | None]]
@@ -99,7 +102,11 @@ class ScheduleResult(Shown):
         gain = "" if reduction is None else f", {reduction:.1f} % below constant rate ({model} model)"
         return Summary(
             f"ScheduleResult: {self.best.duration_s:g} s{gain}",
-            {"knot times, s": self.schedule.knot_time_s, "knot angles, rad": self.schedule.knot_angle_rad},
+            {
+                "drive": self.drive,
+                "knot times, s": self.schedule.knot_time_s,
+                "knot angles, rad": self.schedule.knot_angle_rad,
+            },
             ("variation, rad^2", *MODELS),
             [[name, *(self.variation(name, model) for model in MODELS)] for name in SCHEDULES],
             self.notes,
@@ -109,7 +116,7 @@ class ScheduleResult(Shown):
         """JSON form with the names that the API fixes, and more beside."""
         reduction, model = self.reduction()
         document: Document = {
-            "schedule": None if self.lost else _knots(self.schedule),
+            "schedule": None if self.lost else _knots(self.drive, self.schedule),
             "limits": self.limits.model_dump(),
             "reached": {name: self._reached(name) for name in SCHEDULES},
             "variation": {
@@ -123,6 +130,7 @@ class ScheduleResult(Shown):
                 name: {model: self._torque(name, model) for model in MODELS[:2]} for name in SCHEDULES
             },
             "morph": self.morph.model_dump(exclude_none=True),
+            "drives": list(self.drives),
             "duration_s": self.best.duration_s,
             "weights": self.weights.model_dump(),
             "search": self.search,
@@ -130,9 +138,11 @@ class ScheduleResult(Shown):
             "warnings": list(self.warnings),
         }
         if self.morph.goal == "pareto":
-            document["pareto"] = [_front_document(point) for point in self.front if not point.beaten]
+            document["pareto"] = [self._front_document(point) for point in self.front if not point.beaten]
         if self.morph.goal != "variation":
-            document["searched"] = [_front_document(point) | {"beaten": point.beaten} for point in self.front]
+            document["searched"] = [
+                self._front_document(point) | {"beaten": point.beaten} for point in self.front
+            ]
         if self.notes:
             document["notes"] = list(self.notes)
         return document
@@ -152,7 +162,21 @@ class ScheduleResult(Shown):
             model: {name: _attitude(flight) for name, flight in flown.items() if flight is not None}
             for model, flown in self.flights.items()
         }
-        return {"time_s": self.times_s.tolist(), "schedules": schedules, "flights": flights}
+        return {
+            "time_s": self.times_s.tolist(),
+            "drive": self.drive,
+            "drives": list(self.drives),
+            "schedules": schedules,
+            "flights": flights,
+        }
+
+    def _front_document(self, point: FrontPoint) -> Document:
+        return {
+            "duration_s": point.duration_s,
+            "variation_rad2": point.variation,
+            "constant_rad2": point.constant,
+            "schedule": _knots(self.drive, point.schedule),
+        }
 
     def _reached(self, name: str) -> Document | None:
         schedule = self.schedules[name]
@@ -191,6 +215,8 @@ def schedule_result(
         limits=case.limits,
         weights=weights,
         best=best,
+        drive=case.word,
+        drives=case.drives,
         schedules=schedules,
         times_s=benches["equivalent"].times_s,
         flights=flights,
@@ -256,10 +282,13 @@ def _attitude(flight: ComparedFlight) -> Document:
     return {name: column.tolist() for name, column in zip(ANGLES, flight.departure.T, strict=True)}
 
 
-def _knots(schedule: Spline) -> Document:
+def _knots(drive: str, schedule: Spline) -> Document:
+    angles = schedule.knot_angle_rad.tolist()
     return {
+        "drive": drive,
         "knot_time_s": schedule.knot_time_s.tolist(),
-        "knot_sweep_rad": schedule.knot_angle_rad.tolist(),
+        "knot_angle_rad": angles,
+        "knot_sweep_rad": angles,  # the name of old, whatever the drive
     }
 
 
@@ -274,15 +303,6 @@ def _schedule_document(schedule: Schedule | None) -> Document | None:
             "knot_angle_rad": schedule.knot_angle_rad.tolist(),
         }
     return None
-
-
-def _front_document(point: FrontPoint) -> Document:
-    return {
-        "duration_s": point.duration_s,
-        "variation_rad2": point.variation,
-        "constant_rad2": point.constant,
-        "schedule": _knots(point.schedule),
-    }
 
 
 def _number(value: float) -> float | None:

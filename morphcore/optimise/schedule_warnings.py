@@ -10,6 +10,7 @@ import numpy as np
 from morphcore.optimise.case import MorphCase
 from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.state import OptimisationState
+from morphcore.simulate.plan import path_angles
 from morphcore.simulate.schedule import Schedule
 from morphcore.validity import ResultWarning, air_warnings, documents, overlap_warnings
 
@@ -30,8 +31,8 @@ def schedule_warnings(
     if optimum is not None and flown is not None and flown.variation is not None:
         motion = case.flights("equivalent").motion(optimum)
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
-    angles = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)[:, None]
-    found += overlap_warnings(case.aircraft, np.tile(angles, len(case.aircraft.surfaces)))
+    path = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)
+    found += overlap_warnings(case.aircraft, path_angles(case.aircraft, case.drives, path))
     verified: list[dict[str, Any]] = []
     for item in state.verified:
         name = item.schedule.replace("_", " ")

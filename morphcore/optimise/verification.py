@@ -64,7 +64,7 @@ def verification(
             for step in flight_steps(
                 case.aircraft,
                 case.flight,
-                dict.fromkeys(("left", "right"), schedule),
+                dict.fromkeys(case.drives, schedule),
                 model="flexible",
                 duration_s=float(case.times_s[-1]),
                 output_step_s=SAMPLE_S,

@@ -109,7 +109,7 @@ def fly_batch(
     middle = np.zeros((groups, model.state_rows, width))
     scratch = np.zeros((groups, model.scratch_rows, width))
     inputs, outputs = np.zeros((groups, columns, width)), np.zeros((groups, rows, width))
-    shared = shared_numbers(model)
+    shared, mean_accelerations = shared_numbers(model), plan.mean_accelerations
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
     length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
     for first in range(0, plan.grid.steps, length):
@@ -117,7 +117,7 @@ def fly_batch(
         last = min(first + length, plan.grid.steps)
         operators, strips = plan.middle.table.between(first, last)
         hinges, wind_N = plan.middle.hinges[first:last], plan.middle.wind_N[first:last]
-        accelerations = plan.mean_accelerations[first:last]
+        accelerations = mean_accelerations[first:last]
         record = np.empty((last - first, record_rows, count, width))
         common = (
             model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, wind_N,
@@ -160,7 +160,7 @@ def state_rates(
     bounds = _groups(count, thread_count())
     common = (
         model.surfaces, constants.ranges, shared_numbers(model), strips, plan.hinges[row : row + 1],
-        plan.accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
+        plan.surface_accelerations[row], operators, plan.wind_N[row : row + 1], constants.rows,
         np.zeros((model.state_rows, width)), blocks,
     )  # fmt: skip
 

@@ -66,7 +66,7 @@ def chain_flight(
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
     if plan.halved and model.mirror is not None:  # the other half did the same
-        angles, tips_z = model.mirror.spread(angles), model.mirror.spread(tips_z)
+        angles, tips_z = model.mirror.spread_hinges(angles), model.mirror.spread(tips_z)
         found = replace(found, q_joint=whole_joints(model, found.q_joint))
     record = FlightRecord(
         euler=euler_from_quaternion(quaternion),
@@ -87,7 +87,7 @@ def _tips_z(
     surfaces = len(model.aircraft.surfaces)
     level = np.zeros((surfaces, HINGE_ROWS))
     level[:, :9] = np.eye(3).ravel()
-    # in wing axes all times are one batch; the hinge turns them afterwards
+    # in wing axes all times are one batch; the hinges turn them afterwards
     tips_W = tip_positions(model, batch.select(np.zeros(at.size, dtype=np.int64)), level, q_joint)
     down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
     return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))

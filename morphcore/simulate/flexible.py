@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from morphcore.aero.moving_lattice import MovingLattice, acting_circulation
 from morphcore.errors import FlightDiverged
+from morphcore.geometry.hinge import hinged_pose
+from morphcore.geometry.surface import Surface
 from morphcore.models.flexible import FlexibleModel
 from morphcore.multibody.beam import (
     GAUSS,
@@ -29,7 +31,7 @@ from morphcore.multibody.beam import (
     node_forces,
     reduce_right,
 )
-from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE
+from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
     INVERSE_WANTED,
@@ -50,7 +52,7 @@ from morphcore.simulate.kernels.roots import (
     gather_roots,
     spread_to_roots,
 )
-from morphcore.simulate.plan import TimeGrid, hinge_rows
+from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Schedule
 
 Array = NDArray[np.float64]
@@ -66,45 +68,51 @@ START_TOLERANCE = 1e-9  # of the accelerations at the start, relative
 class HingePath:
     """Prescribed motion of all hinges along a time grid (k times, s surfaces).
 
-    R_BW : (k, s, 3, 3); origin_B : (k, s, 3) root nodes, m; axis : (k, s, 6) twist in W for unit rate; angle,
-    rate, acceleration : (k, s).
+    R_BW : (k, s, 3, 3); origin_B : (k, s, 3) root nodes, m. The twist of a root against the fuselage is
+    ``axis rate`` in W: of one hinge its screw (k, s, 6) and its rate (k, s), of several their sum and 1;
+    acceleration : (k, s, 6) its time derivative. angle : (k, h) of all hinges, rad.
     """
 
     R_BW: Array
     origin_B: Array
     axis: Array
-    angle: Array
     rate: Array
     acceleration: Array
+    angle: Array
 
 
 def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGrid) -> HingePath:
-    """Hinge motion on a grid.
+    """Motion of all hinges on a grid, a schedule for each in the order of `Aircraft.hinges`.
 
     Accelerations are central differences of the rates over two steps: where a sampled rate has a corner, the
     impulse of the hinge stays right and in time.
     """
-    times, h = grid.times_s, grid.step_s
-    rows, angle, rate, acceleration = [], [], [], []
-    for surface, schedule in zip(model.aircraft.surfaces, schedules, strict=True):
+    times, h, aircraft = grid.times_s, grid.step_s, model.aircraft
+    angle, rate, acceleration = np.zeros((3, times.size, len(aircraft.hinges)))
+    for column, schedule in enumerate(schedules):
         motion = schedule.motion(times)
-        moves = 1.0 if surface.hinge is not None else 0.0
-        rows.append(hinge_rows(surface, motion.angle, motion.rate))
-        angle.append(motion.angle)
-        rate.append(moves * motion.rate)
         late, early = schedule.motion(times + h).rate, schedule.motion(times - h).rate
-        mean = (late - early) / (2.0 * h)
-        mean[0] = (late[0] - motion.rate[0]) / h  # what went before the flight is not in it
-        acceleration.append(moves * mean)
-    hinges = np.stack(rows, axis=1)
-    return HingePath(
-        R_BW=np.ascontiguousarray(hinges[..., :9]).reshape(*hinges.shape[:2], 3, 3),
-        origin_B=np.ascontiguousarray(hinges[..., H_ORIGIN : H_ORIGIN + 3]),
-        axis=np.ascontiguousarray(hinges[..., H_SUBSPACE:H_RATE]),
-        angle=np.stack(angle, axis=1),
-        rate=np.stack(rate, axis=1),
-        acceleration=np.stack(acceleration, axis=1),
-    )
+        angle[:, column], rate[:, column] = motion.angle, motion.rate
+        acceleration[:, column] = (late - early) / (2.0 * h)
+        acceleration[0, column] = (late[0] - motion.rate[0]) / h  # what went before the flight is not in it
+    parts = [
+        _root_path(surface, angle[:, own], rate[:, own], acceleration[:, own])
+        for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
+    ]
+    R_BW, origin_B, axis, rates, changes = (np.stack(column, axis=1) for column in zip(*parts, strict=True))
+    return HingePath(R_BW, origin_B, axis, rates, changes, angle)
+
+
+def _root_path(
+    surface: Surface, angles: Array, rates: Array, accelerations: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Pose, axis, rate and acceleration of one surface's root, see ``HingePath``, from its hinges (k, m)."""
+    arms = surface.root_arms_B
+    R_BW, origin_B = hinged_pose(surface.hinges, arms, angles)
+    twist, change = relative_motion(surface.hinges, arms, angles, rates, accelerations)
+    if len(surface.hinges) == 1:
+        return R_BW, origin_B, hinge_screws(surface.hinges, arms, angles)[:, 0], rates[:, 0], change
+    return R_BW, origin_B, twist, np.ones(angles.shape[0]), change
 
 
 @dataclass(frozen=True)
@@ -376,7 +384,7 @@ def set_in_motion(
 
     Accelerations are those that the forces then ask for. A path that begins at rest changes nothing.
     """
-    if not (path.rate[0].any() or path.acceleration[0].any()):
+    if not ((path.axis[0] * path.rate[0, :, None]).any() or path.acceleration[0].any()):
         return state
     model, poses = flight.model, state.poses
     V, A = state.V.copy(), np.zeros_like(state.A)

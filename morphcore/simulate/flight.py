@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,6 @@ from morphcore.aero.environment import air_velocity
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
-from morphcore.geometry.surface import beyond_range
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted, physical_guess
 from morphcore.models.flexible import flexible_model
 from morphcore.models.soft_joints import chain_obstacle
@@ -23,15 +22,20 @@ from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
+from morphcore.simulate.hinge_schedules import (
+    Schedules,
+    followed_schedules,
+    hinge_schedules,
+    require_ranges,
+)
 from morphcore.simulate.plan import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.record import FlightRecord, recorded_trajectory
-from morphcore.simulate.schedule import Schedule, Tabulated, scheduled
+from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
 from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
-from morphdata import schedules as documents
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
@@ -41,7 +45,6 @@ from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROW
 from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
 
 Array = NDArray[np.float64]
-Schedules = Sequence[Schedule] | Mapping[str, Schedule] | documents.Schedules | Trajectory
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 
 
@@ -49,7 +52,7 @@ ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 class Simulation(Shown):
     """A flown flight.
 
-    trajectory : attitude and sweep (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
+    trajectory : attitude and drives (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
     and x, y, z (m) of the reference point in N, tip_left_z and tip_right_z (m, below the wing's root along z
     of B).
     trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none
@@ -72,8 +75,7 @@ class Simulation(Shown):
             [
                 [f"{name}, rad", values.min(), values.max()]
                 for name, values in (
-                    ("sweep left", flown.sweep_left),
-                    ("sweep right", flown.sweep_right),
+                    *((name.replace("_", " "), flown.drives[name]) for name in flown.drive_order),
                     *zip(("phi", "theta", "psi"), flown.euler.T, strict=True),
                 )
             ],
@@ -104,14 +106,15 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     elements: int = DEFAULT_ELEMENTS,
     stop: Stop | None = None,
 ) -> Simulation:
-    """Fly one aircraft through prescribed hinge motions.
+    """Fly one aircraft through prescribed motions of its drives.
 
     Parameters
     ----------
     aircraft, flight : the aircraft and its flight condition.
-    schedules : one for each surface in the aircraft's order (of fixed ones it is not looked at), or one for
-        each side as ``{"left": ..., "right": ...}`` or as a document, or a sample flight whose measured sweep
-        is followed.
+    schedules : what the drives do, by their names (``{"sweep_left": ..., "fold": ...}``), where a word moves
+        both sides and ``both``, ``left`` and ``right`` are understood if no other drive could be meant; a
+        document of such; or a sample flight whose measured angles are followed. Other drives hold their
+        hinges' ``angle_rad``.
     model : "rigid", "flexible", or the parameters of one equivalent model (`parameters_from_document`,
         `physical_guess`).
     duration_s : s from time zero; of a sample flight, its own duration from its first time is the default.
@@ -126,7 +129,7 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
 
     Raises
     ------
-    InvalidInput : a schedule leaves its hinge's range, or an argument makes no sense.
+    InvalidInput : a schedule leaves its hinge's range or moves no drive, or an argument makes no sense.
     TrimNotFound : there is no steady level flight. FlightDiverged : the flight left the model's domain.
     """
     steps = flight_steps(
@@ -161,16 +164,16 @@ def flight_steps(  # noqa: PLR0913 - as above
     longest_s = flyer.step_s if step_s is None else step_s
     times = _output_times(schedules, duration_s, output_step_s, longest_s)
     grid = time_grid(times, longest_s)
-    each, names = _per_surface(aircraft, schedules)
-    _require_hinge_ranges(aircraft, each, grid.times_s, names)
+    followed = followed_schedules(aircraft, schedules)
+    require_ranges(aircraft, followed, grid.times_s, "/schedules")
+    each = hinge_schedules(aircraft, followed)
     gusts = None if environment is None else environment.model_copy(update={"turbulence": None})
     smooth = _air(gusts, flight, None)
     with naming_obstacles(flyer.obstacle):
         if step_s is None and flyer.chain is not None:
             chain, batch = flyer.chain
-            hinged = [own for surface, own in zip(aircraft.surfaces, each, strict=True) if surface.hinge]
             longest_s = choose_step(
-                chain, [(each, busiest_part(hinged, times))], batch, start=start,
+                chain, [(each, busiest_part(each, times))], batch, start=start,
                 air_velocity_N=smooth, may_halve=chain.is_even(batch), stop=stop,
             ).step_s  # fmt: skip
             grid = time_grid(times, longest_s)
@@ -209,8 +212,7 @@ def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
     """
     columns = {
         "t": trajectory.time_s,
-        "sweep_left": trajectory.sweep_left,
-        "sweep_right": trajectory.sweep_right,
+        **{name: trajectory.drives[name] for name in trajectory.drive_order},
         "phi": trajectory.phi,
         "theta": trajectory.theta,
         "psi": trajectory.psi,
@@ -316,47 +318,3 @@ def _output_times(
             hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
         )
     return begin + output_step_s * np.arange(rows, dtype=np.float64)
-
-
-def _per_surface(aircraft: Aircraft, schedules: Schedules) -> tuple[list[Schedule], list[str]]:
-    """Return the schedule of each surface, and what each is called among those that are given."""
-    sides = [surface.side for surface in aircraft.surfaces]
-    if isinstance(schedules, Trajectory):
-        return [Tabulated(schedules.time_s, schedules.sweep(side)) for side in sides], list(sides)
-    if isinstance(schedules, documents.Schedules):
-        given = [schedules.of_side(side) or ("", documents.Hold(kind="hold")) for side in sides]
-        return [scheduled(schedule) for _, schedule in given], [name for name, _ in given]
-    if isinstance(schedules, Mapping):
-        missing = set(sides) - set(schedules)
-        if missing:
-            raise InvalidInput(
-                f"no schedule for the {' and '.join(sorted(missing))} side",
-                pointer="/schedules",
-                hint='give {"left": ..., "right": ...}',
-            )
-        return [schedules[side] for side in sides], list(sides)
-    if len(schedules) != len(sides):
-        raise InvalidInput(
-            f"{len(schedules)} schedules for {len(sides)} surfaces",
-            pointer="/schedules",
-            hint="give one for each surface, in the aircraft's order",
-        )
-    return list(schedules), [str(number) for number in range(len(schedules))]
-
-
-def _require_hinge_ranges(
-    aircraft: Aircraft, schedules: Sequence[Schedule], times: Array, names: Sequence[str]
-) -> None:
-    for surface, schedule, name in zip(aircraft.surfaces, schedules, names, strict=True):
-        if surface.hinge is None:
-            continue
-        angle = schedule.motion(times).angle
-        low, high = surface.hinge.min_rad, surface.hinge.max_rad
-        outside = beyond_range(surface.hinge, angle)
-        if outside.size:
-            raise InvalidInput(
-                f"the hinge of {surface.name} is driven to {angle[outside[0]]:.4g} rad at "
-                f"t = {times[outside[0]]:.3f} s, beyond its range {low:g}..{high:g} rad",
-                pointer=f"/schedules/{name}",
-                hint="lower the angles, or widen the hinge's range; a spline can go beyond its knots",
-            )

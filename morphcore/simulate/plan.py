@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
-from morphcore.frames import skew
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.surface import Surface
+from morphcore.geometry.hinge import Hinge, hinged_pose
 from morphcore.models.equivalent import ChainModel
-from morphcore.multibody.kernels.hinge import H_ORIGIN, H_RATE, H_SUBSPACE, HINGE_ROWS
+from morphcore.multibody.hinges import relative_motion
+from morphcore.multibody.kernels.hinge import H_ORIGIN, H_ROTATION, H_TWIST, HINGE_ROWS
 from morphcore.shown import Shown
 from morphcore.simulate.kernels.interpolate import blend
-from morphcore.simulate.schedule import HingeMotion, Schedule
+from morphcore.simulate.schedule import Hold, Schedule
 
 Array = NDArray[np.float64]
 
@@ -107,10 +108,12 @@ class OperatorTable(Shown):
 class Middles(Shown):
     """What the stages of a flight read, in the middles of its steps.
 
-    hinges : (steps, s, HINGE_ROWS) for the kernels. wind_N : (steps, 3) m/s. table : the plan's own, at the
-    positions of the middles.
+    angles, rates : (steps, h) of all hinges, rad and rad/s. hinges : (steps, s, HINGE_ROWS) for the kernels.
+    wind_N : (steps, 3) m/s. table : the plan's own, at the positions of the middles.
     """
 
+    angles: Array
+    rates: Array
     hinges: Array
     wind_N: Array
     table: OperatorTable
@@ -120,12 +123,14 @@ class Middles(Shown):
 class FlightPlan(Shown):
     """Everything about a flight that does not depend on the parameters.
 
-    angles, rates, accelerations : (steps + 1, s), rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS)
-    for the kernels. wind_N : (steps + 1, 3) m/s. middle : hinges, wind and lattices between the grid times.
-    halved : the s surfaces are one half of a symmetric aircraft whose other half does the same.
+    aircraft : what flies, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
+    hinges, rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the kernels. wind_N : (steps + 1, 3)
+    m/s. middle : hinges, wind and lattices between the grid times. halved : the aircraft is one half of a
+    symmetric one whose other half does the same.
     """
 
     grid: TimeGrid
+    aircraft: Aircraft
     angles: Array
     rates: Array
     accelerations: Array
@@ -163,27 +168,33 @@ class FlightPlan(Shown):
             wind_N=np.ascontiguousarray(self.wind_N[own]),
             table=replace(self.table, position=position[own]),
             middle=Middles(
+                self.angles[between],
+                self.rates[between],
                 np.ascontiguousarray(self.hinges[between]),
                 np.ascontiguousarray(self.wind_N[between]),
                 replace(self.table, position=position[between]),
             ),
         )
 
-    @property
+    @cached_property
     def mean_accelerations(self) -> Array:
-        """(steps, s) mean acceleration of the hinges over each step, rad/s^2."""
-        return np.diff(self.rates, axis=0) / self.grid.step_s
+        """(steps, s, 6) of the surfaces against the fuselage over each step, in W, rad/s^2 and m/s^2.
+
+        Of the mean accelerations of the hinges, in the place that they have in the middle of the step.
+        """
+        mean = np.diff(self.rates, axis=0) / self.grid.step_s
+        return surface_accelerations(self.aircraft, self.middle.angles, self.middle.rates, mean)
+
+    @cached_property
+    def surface_accelerations(self) -> Array:
+        """(steps + 1, s, 6) of the surfaces against the fuselage at the grid times, in W."""
+        return surface_accelerations(self.aircraft, self.angles, self.rates, self.accelerations)
 
     def at_rest(self) -> FlightPlan:
         """The plan's first moment with its hinges held: where a flight is trimmed."""
-        hinges, accelerations = self.hinges[:1].copy(), self.accelerations[:1]
-        hinges[:, :, H_RATE] = 0.0
-        return replace(self, hinges=hinges, accelerations=np.zeros_like(accelerations))
-
-
-def _hinged(aircraft: Aircraft) -> NDArray[np.bool_]:
-    """(s,) which surfaces have a hinge."""
-    return np.array([surface.hinge is not None for surface in aircraft.surfaces])
+        hinges, still = self.hinges[:1].copy(), np.zeros_like(self.rates[:1])
+        hinges[:, :, H_TWIST : H_TWIST + 6] = 0.0
+        return replace(self, angles=self.angles[:1], rates=still, accelerations=still, hinges=hinges)
 
 
 def _blended(nodes: Array, weights: Array, base: NDArray[np.int64]) -> Array:
@@ -201,35 +212,58 @@ def flight_plan(
     node_spacing_rad: float = NODE_SPACING_RAD,
     may_halve: bool = False,
 ) -> FlightPlan:
-    """Prepare a flight: one schedule per surface (of fixed surfaces it is not looked at).
+    """Prepare a flight: one schedule for each of the aircraft's hinges.
 
     With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
     plan is one for half of it: ``plan.flown(model)`` is what flies it, if both wings have the same
     parameters.
     """
     times = grid.halves_s
-    motions = [schedule.motion(times) for schedule in schedules]
+    motion = _motion(schedules, times)
     if may_halve and air_velocity_N is None:
-        model, motions = _halved(model, motions)
-    angles = np.stack([motion.angle for motion in motions], axis=1)
+        model, motion = _halved(model, motion)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
-    table = _operator_table(model, angles * _hinged(model.aircraft), node_spacing_rad)
-    return _plan(model, grid, motions, table, wind_N)
+    table = _operator_table(model, motion.angles, node_spacing_rad)
+    return _plan(model, grid, motion, table, wind_N)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Angles, rates and accelerations (k, h) of all hinges, rad, rad/s, rad/s^2."""
+
+    angles: Array
+    rates: Array
+    accelerations: Array
+
+    def columns(self, chosen: Sequence[int]) -> _Motion:
+        """Of some of the hinges."""
+        kept = list(chosen)
+        return _Motion(self.angles[:, kept], self.rates[:, kept], self.accelerations[:, kept])
+
+
+def _motion(schedules: Sequence[Schedule], times: Array) -> _Motion:
+    of_hinges = np.zeros((3, times.size, len(schedules)))
+    for column, schedule in enumerate(schedules):
+        motion = schedule.motion(times)
+        of_hinges[:, :, column] = motion.angle, motion.rate, motion.acceleration
+    return _Motion(*of_hinges)
 
 
 @dataclass(frozen=True)
 class CommonPath:
-    """All hinges of an aircraft at one angle: the lattice over a range of it, for schedules within the range.
+    """Some drives of an aircraft at one angle: the lattice over a range of it, for schedules within it.
 
     Plans of different schedules share its nodes, so that another one costs no lattice; models that differ in
     their links alone may share them too.
 
-    low_rad, high_rad : the range. matrices, strips : as of ``OperatorTable``, at equal distances over it.
-    halved : as of ``FlightPlan``.
+    low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
+    hinges' own angles. matrices, strips : as of ``OperatorTable``, at equal distances over it. halved : as of
+    ``FlightPlan``.
     """
 
     low_rad: float
     high_rad: float
+    drives: tuple[str, ...] | None
     matrices: Array
     strips: Array
     halved: bool
@@ -238,8 +272,12 @@ class CommonPath:
         """What flies the plans: the model, or one half of it."""
         return _flown(model, halved=self.halved)
 
+    def moves(self, hinge: Hinge) -> bool:
+        """Whether a hinge is one of those that move."""
+        return _moves(hinge, self.drives)
+
     def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
-        """Prepare a flight in which all hinges follow one schedule.
+        """Prepare a flight in which the hinges of the path's drives follow one schedule.
 
         Raises
         ------
@@ -257,7 +295,8 @@ class CommonPath:
         position = share * (self.matrices.shape[0] - 1)
         table = OperatorTable(self.matrices, self.strips, position)
         flown = self.flown(model)
-        return _plan(flown, grid, [motion] * len(flown.aircraft.surfaces), table)
+        schedules = path_schedules(flown.aircraft, self.drives, schedule)
+        return _plan(flown, grid, _motion(schedules, grid.halves_s), table)
 
 
 def common_path(
@@ -266,22 +305,46 @@ def common_path(
     high_rad: float,
     node_spacing_rad: float = NODE_SPACING_RAD,
     *,
+    drives: Sequence[str] | None = None,
     may_halve: bool = False,
 ) -> CommonPath:
-    """Tabulate the lattice for all hinges alike between two angles; ``may_halve`` as of ``flight_plan``."""
-    if may_halve and model.half is not None:
-        model = model.half
+    """Tabulate the lattice for some drives alike between two angles, the others at their held angles.
+
+    drives : names; None: all. may_halve : as of ``flight_plan``.
+    """
+    chosen = None if drives is None else tuple(drives)
+    path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
+    angles = path_angles(model.aircraft, chosen, path)
+    motion = _Motion(angles, np.zeros_like(angles), np.zeros_like(angles))
+    if may_halve:
+        model, motion = _halved(model, motion)
     mach = model.flight.mach or 0.0
-    count = max(4, int(np.ceil((high_rad - low_rad) / node_spacing_rad)) + 1)
-    rows = np.outer(np.linspace(low_rad, high_rad, count), _hinged(model.aircraft))
-    operators = [lattice_operator(model.lattice, tuple(row), mach=mach) for row in rows]
+    operators = [lattice_operator(model.lattice, tuple(row), mach=mach) for row in motion.angles]
     return CommonPath(
         low_rad,
         high_rad,
+        chosen,
         np.stack([item.matrix for item in operators]),
         np.stack([item.strips for item in operators]),
         bool(model.lattice.images),
     )
+
+
+def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
+    """Angles (k, h) of all hinges where some drives (None: all) are at angles (k,), rad, and others hold."""
+    angles = np.empty((angle_rad.size, len(aircraft.hinges)))
+    for column, hinge in enumerate(aircraft.hinges):
+        angles[:, column] = angle_rad if _moves(hinge, drives) else hinge.angle_rad
+    return angles
+
+
+def path_schedules(aircraft: Aircraft, drives: Sequence[str] | None, schedule: Schedule) -> list[Schedule]:
+    """A schedule for each hinge: that of the drives which move (None: all), of others their held angle."""
+    return [schedule if _moves(hinge, drives) else Hold(hinge.angle_rad) for hinge in aircraft.hinges]
+
+
+def _moves(hinge: Hinge, drives: Sequence[str] | None) -> bool:
+    return drives is None or hinge.drive in drives
 
 
 def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
@@ -292,22 +355,12 @@ def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
 def _plan(
     model: ChainModel,
     grid: TimeGrid,
-    motions: Sequence[HingeMotion],
+    motion: _Motion,
     table: OperatorTable,
     wind_N: Array | None = None,
 ) -> FlightPlan:
-    """A plan of motions, table and wind at the grid's times and middles in turn."""
-    hinges = np.stack(
-        [
-            hinge_rows(surface, motion.angle, motion.rate)
-            for surface, motion in zip(model.aircraft.surfaces, motions, strict=True)
-        ],
-        axis=1,
-    )
-    angles, rates, accelerations = (
-        np.stack([getattr(motion, name)[::2] for motion in motions], axis=1)
-        for name in ("angle", "rate", "acceleration")
-    )
+    """A plan of a motion, table and wind at the grid's times and middles in turn."""
+    hinges = surface_rows(model.aircraft, motion.angles, motion.rates)
     if wind_N is None:
         wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
     own, between = (
@@ -315,61 +368,73 @@ def _plan(
     )
     return FlightPlan(
         grid,
-        angles,
-        rates,
-        accelerations,
+        model.aircraft,
+        motion.angles[::2],
+        motion.rates[::2],
+        motion.accelerations[::2],
         hinges[::2],
         wind_N[::2],
         own,
-        Middles(np.ascontiguousarray(hinges[1::2]), np.ascontiguousarray(wind_N[1::2]), between),
+        Middles(
+            motion.angles[1::2],
+            motion.rates[1::2],
+            np.ascontiguousarray(hinges[1::2]),
+            np.ascontiguousarray(wind_N[1::2]),
+            between,
+        ),
         halved=bool(model.lattice.images),
     )
 
 
-def _halved(model: ChainModel, motions: list[HingeMotion]) -> tuple[ChainModel, list[HingeMotion]]:
-    """The half of an aircraft that does what the other one does, and its motions; all if there is none."""
+def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
+    """The half of an aircraft that does what the other one does, and its motion; all if there is none."""
     mirror, half = model.mirror, model.half
     if mirror is None or half is None:
-        return model, motions
-    hinged = _hinged(model.aircraft)
-    differences = [
-        np.abs(motions[own].angle - motions[image].angle).max()
-        for own, image in zip(mirror.own, mirror.image, strict=True)
-        if hinged[own]
-    ]
-    if max(differences, default=0.0) > ALIKE_RAD:
-        return model, motions
-    return half, [motions[own] for own in mirror.own]
+        return model, motion
+    own, image = (motion.angles[:, list(side)] for side in (mirror.own_hinges, mirror.image_hinges))
+    if np.abs(own - image).max(initial=0.0) > ALIKE_RAD:
+        return model, motion
+    return half, motion.columns(mirror.own_hinges)
 
 
-def hinge_rows(surface: Surface, angle: Array, rate: Array) -> Array:
-    """Rows of the hinge's motion for the kernels, (k, HINGE_ROWS); see multibody/kernels/hinge.py."""
-    rows = np.zeros((angle.size, HINGE_ROWS))
-    axis_offset = np.array([surface.elastic_axis_x_m, 0.0, 0.0])
-    root = np.array(surface.position_m)
-    if surface.hinge is None:
-        rows[:, :9] = np.eye(3).ravel()
-        rows[:, H_ORIGIN:] = root + axis_offset
-        return rows
-    sign, axis = surface.rotation_sign, surface.hinge.axis_index
-    pivot = np.array(surface.hinge.position_m)
-    direction = np.eye(3)[axis]
-    along = np.outer(direction, direction)
-    cosine, sine = np.cos(angle)[:, None, None], (sign * np.sin(angle))[:, None, None]
-    R_BW = along + cosine * (np.eye(3) - along) + sine * skew(direction)  # Rodrigues' formula
-    arm_W = root - pivot + axis_offset  # from the hinge axis to the first link's origin, constant in W
-    direction = sign * direction
-    rows[:, :9] = R_BW.reshape(-1, 9)
-    rows[:, H_SUBSPACE : H_SUBSPACE + 3] = direction
-    rows[:, H_SUBSPACE + 3 : H_SUBSPACE + 6] = np.cross(direction, arm_W)
-    rows[:, H_RATE] = rate
-    rows[:, H_ORIGIN:] = pivot + R_BW @ arm_W
+def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
+    """Rows of the surfaces' motion for the kernels from that of all hinges (k, h), (k, s, HINGE_ROWS).
+
+    See multibody/kernels/hinge.py.
+    """
+    rows = np.empty((angles.shape[0], len(aircraft.surfaces), HINGE_ROWS))
+    for number, (surface, own) in enumerate(zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)):
+        arms = surface.root_arms_B
+        R_BW, origin_B = hinged_pose(surface.hinges, arms, angles[:, own])
+        twist, _ = relative_motion(surface.hinges, arms, angles[:, own], rates[:, own], 0.0 * rates[:, own])
+        rows[:, number, H_ROTATION:H_TWIST] = R_BW.reshape(-1, 9)
+        rows[:, number, H_TWIST:H_ORIGIN] = twist
+        rows[:, number, H_ORIGIN:] = origin_B
     return rows
+
+
+def surface_accelerations(aircraft: Aircraft, angles: Array, rates: Array, accelerations: Array) -> Array:
+    """Time derivative of the surfaces' twist against the fuselage from the hinges' motion, (k, s, 6)."""
+    return np.stack(
+        [
+            relative_motion(
+                surface.hinges, surface.root_arms_B, angles[:, own], rates[:, own], accelerations[:, own]
+            )[1]
+            for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
+        ],
+        axis=1,
+    )
+
+
+def _nodes(length_rad: float, spacing_rad: float) -> int:
+    """Nodes of a lattice table over a path: a cubic needs four."""
+    return max(4, int(np.ceil(length_rad / spacing_rad)) + 1)
 
 
 def _operator_table(model: ChainModel, angles: Array, spacing: float) -> OperatorTable:
     mach = model.flight.mach or 0.0
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angles, axis=0)).max(axis=1))])
+    moved = np.abs(np.diff(angles, axis=0)).max(axis=1, initial=0.0)
+    travelled = np.concatenate([[0.0], np.cumsum(moved)])
 
     def operator(row: Array) -> LatticeOperator:
         return lattice_operator(model.lattice, tuple(row), mach=mach)
@@ -378,7 +443,7 @@ def _operator_table(model: ChainModel, angles: Array, spacing: float) -> Operato
         operators = [operator(angles[0])]
         position = np.zeros(travelled.size)
     else:
-        count = max(4, int(np.ceil(travelled[-1] / spacing)) + 1)
+        count = _nodes(travelled[-1], spacing)
         nodes = np.linspace(0.0, travelled[-1], count)
         # strictly rising abscissae for the inverse: a held shape has the same path length for many times
         moving = np.concatenate([[True], np.diff(travelled) > 0])

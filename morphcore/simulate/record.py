@@ -11,6 +11,7 @@ from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import Trim
+from morphdata.drives import SIDES
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ class FlightRecord:
     """A flown flight at its output times (k times, s surfaces).
 
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
-    point; angles : (k, s) of the hinges, rad; tips_z : (k, s) tips below their roots along z of B, m.
+    point; angles : (k, h) of all hinges, rad; tips_z : (k, s) tips below their roots along z of B, m.
     trim : the start.
     """
 
@@ -56,28 +57,28 @@ def require_sound(
 
 
 def recorded_trajectory(aircraft: Aircraft, times: Array, record: FlightRecord) -> Trajectory:
-    """The trajectory, columns as the example flights; each side's wing is its first hinged surface."""
+    """The trajectory: the angles of all drives, and the tips of each side's first hinged surface."""
     columns = np.concatenate([record.omega_B, record.velocity_N, record.position_N], axis=1)
     names = ("p", "q", "r", "vx", "vy", "vz", "x", "y", "z")
     extra = {name: column.copy() for name, column in zip(names, columns.T, strict=True)}
-    sweeps = {"left": np.zeros(times.size), "right": np.zeros(times.size)}
-    for side in sweeps:
+    drives: dict[str, Array] = {}
+    for column, hinge in enumerate(aircraft.hinges):  # all hinges of a drive turn alike
+        drives.setdefault(hinge.drive, record.angles[:, column].copy())
+    for side in SIDES:
         for number, surface in enumerate(aircraft.surfaces):
-            if surface.side == side and surface.hinge is not None:
-                sweeps[side] = record.angles[:, number].copy()
+            if surface.side == side and surface.hinges:
                 extra[f"tip_{side}_z"] = record.tips_z[:, number].copy()
                 break
     phi, theta, psi = record.euler.T.copy()
     trajectory = Trajectory(
         name="simulated",
         time_s=times,
-        sweep_left=sweeps["left"],
-        sweep_right=sweeps["right"],
+        drives=drives,
         phi=phi,
         theta=theta,
         psi=psi,
         extra=extra,
     )
-    for column in (times, phi, theta, psi, *sweeps.values()):
-        column.setflags(write=False)
+    for values in (times, phi, theta, psi, *drives.values()):
+        values.setflags(write=False)
     return trajectory

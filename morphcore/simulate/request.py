@@ -75,6 +75,7 @@ class SimulationResult(Shown):
                 "tip_z_m": {side: None if z is None else float(z[0]) for side, z in tips.items()},
             },
             "trajectory": trajectory_document(flown),
+            "drives": list(flown.drive_order),
             "summary": {
                 "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
                 "variation_rad2": attitude_variation(flown),
@@ -211,6 +212,7 @@ def trajectory_document(trajectory: Trajectory) -> Document:
         "time_s": trajectory.time_s,
         "sweep_left_rad": trajectory.sweep_left,
         "sweep_right_rad": trajectory.sweep_right,
+        **{f"{name}_rad": trajectory.drives[name] for name in trajectory.drive_order},
         **{f"{angle}_rad": getattr(trajectory, angle) for angle in ANGLES},
         **{f"{name}_{UNITS[name]}" if name in UNITS else name: v for name, v in trajectory.extra.items()},
     }

@@ -1,4 +1,4 @@
-"""Schedules written as CSV files: the hinge angles of both sides over time."""
+"""Schedules written as CSV files: the angles of drives over time."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from morphdata.samplefiles.csv_table import write_table
 
 Array = NDArray[np.float64]
 
-SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
-
 
 def write_schedule_csv(schedules: Mapping[str, Schedule], time_s: Array, path: str | Path) -> None:
-    """Write the hinge angles of both sides at times (k,), s; `load_schedules` reads them back."""
-    angles = [schedules[side].motion(time_s).angle for side in ("left", "right")]
+    """Write the angles of drives at times (k,), s, by their names; `load_schedules` reads them back."""
+    angles = [schedule.motion(time_s).angle for schedule in schedules.values()]
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
         # twelve digits: second differences of rows 10 ms apart are right to 1e-7 rad/s^2
         rows = ([f"{value:.12g}" for value in row] for row in zip(time_s, *angles, strict=True))
-        write_table(stream, SCHEDULE_COLUMNS, rows)
+        write_table(stream, ("t", *schedules), rows)

@@ -59,7 +59,7 @@ def choose_step(
 
     Parameters
     ----------
-    flights : the schedules of all surfaces and the (k,) output times, s, of each flight.
+    flights : the schedules of all hinges and the (k,) output times, s, of each flight.
     batch : the one parameter set to fly; None: the physical guess.
     air_velocity_N : wind at some times; it must not depend on which times are asked for together.
     may_halve : as of ``flight_plan``; the parameter set must then be alike on both sides.

@@ -9,6 +9,7 @@ from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.models.kernels.layout import LINKS_C
+from morphcore.multibody.hinges import hinge_screws
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.kernels.torque import torques
@@ -21,11 +22,11 @@ CHUNK = 64  # instants: bounds the memory of the interpolated operators
 
 
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
-    """Torque of the hinge motors at every grid time, (steps + 1, s), N m along the positive coordinates.
+    """Torque of the hinge motors at every grid time, (steps + 1, h), N m along the positive angles.
 
     Inverse dynamics of the wings with their own accelerations and air loads at that instant; the hinges'
-    accelerations are the schedule's (at its ends those of the morph, not of the rest beside it). Zero for
-    surfaces without a hinge.
+    accelerations are the schedule's (at its ends those of the morph, not of the rest beside it). Columns are
+    those of ``plan.angles``: hinges of the model that the plan flies.
 
     Parameters
     ----------
@@ -33,7 +34,10 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
         rows of its state at the grid times.
     """
     rows, columns = model.lattice.operator_shape
-    out = np.empty((states.shape[0], len(model.aircraft.surfaces)))
+    surfaces, hinges_of = model.aircraft.surfaces, model.aircraft.hinge_columns
+    out = np.empty((states.shape[0], len(model.aircraft.hinges)))
+    first_hinges = np.array([0, *(own.stop for own in hinges_of)], dtype=np.int64)
+    accelerations = plan.surface_accelerations
     width = constants.rows.shape[-1]
     zero, block, rates = np.zeros((3, model.state_rows, width))
     scratch = np.zeros((model.scratch_rows, width))
@@ -43,11 +47,18 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
     for first in range(0, states.shape[0], CHUNK):
         part = slice(first, min(first + CHUNK, states.shape[0]))
         operators, strips = plan.table.between(part.start, part.stop)
+        screws = np.concatenate(
+            [
+                hinge_screws(surface.hinges, surface.root_arms_B, plan.angles[part, own])
+                for surface, own in zip(surfaces, hinges_of, strict=True)
+            ],
+            axis=1,
+        )
         torques(
             lane_type(width),
-            model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], plan.accelerations[part],
-            operators, plan.wind_N[part], laid, states[part], zero, block, scratch, inputs,
-            outputs, rates, out[part],
+            model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], accelerations[part],
+            first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
+            inputs, outputs, rates, out[part],
         )  # fmt: skip
     return out
 

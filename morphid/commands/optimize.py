@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
+from morphdata.drives import SWEEPS, label
 from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.files import writing
@@ -42,10 +43,11 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
 
     found = result["schedule"]
     spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
+    drives = sorted(result.get("drives", SWEEPS))  # results of earlier versions have no others
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
-        write_schedule_csv({"left": spline, "right": spline}, times, path)
+        write_schedule_csv(dict.fromkeys(drives, spline), times, path)
     wrote(path)
 
 
@@ -89,11 +91,12 @@ def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
-def knot_table(schedule: Mapping[str, Sequence[float]]) -> Table:
+def knot_table(schedule: Mapping[str, Any]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
-    table = new_table("time, s", "sweep, rad", title="Knots of the spline", left=0)
-    for time_s, sweep_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
-        table.add_row(f"{time_s:.4f}", f"{sweep_rad:.4f}")
+    angle = f"{label(schedule.get('drive') or 'sweep')}, rad"
+    table = new_table("time, s", angle, title="Knots of the spline", left=0)
+    for time_s, angle_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
+        table.add_row(f"{time_s:.4f}", f"{angle_rad:.4f}")
     return table
 
 

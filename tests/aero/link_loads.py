@@ -56,8 +56,10 @@ def edge_loads(model: ChainModel, angles: Array, twist_B: Array) -> Array:
     """
     surfaces, table = model.aircraft.surfaces, model.lattice.table
     corners, controls, poses = [], [], []
-    for surface, part, angle in zip(surfaces, model.lattice.lattices, angles, strict=True):
-        R_BW, r_B = surface_pose(surface, angle)
+    for surface, part, own in zip(
+        surfaces, model.lattice.lattices, model.aircraft.hinge_columns, strict=True
+    ):
+        R_BW, r_B = surface_pose(surface, angles[own])
         corners.append((part.ring_corners_W @ R_BW.T + r_B).reshape(-1, 3))
         controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
         poses.append((R_BW, r_B - R_BW[:, 0] * surface.elastic_axis_offset_m))

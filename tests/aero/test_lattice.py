@@ -39,7 +39,7 @@ def test_left_is_the_mirror_of_right():
     mirror = np.array([1.0, -1.0, 1.0])
     points = []
     for surface in (right, left):
-        R_BW, r_B = surface_pose(surface, 0.7)
+        R_BW, r_B = surface_pose(surface, [0.7])
         points.append(surface_lattice(surface).ring_corners_W @ R_BW.T + r_B)
     np.testing.assert_array_equal(points[0] * mirror, points[1])
 
@@ -47,7 +47,7 @@ def test_left_is_the_mirror_of_right():
 def test_positive_sweep_moves_the_tip_aft():
     """A swept tip lies sin(sweep) spans behind its root; the root stays on the hinge."""
     right, _ = Aircraft.of(load_aircraft(EXAMPLES / "aircraft.json")).surfaces
-    R_BW, r_B = surface_pose(right, 0.5)
+    R_BW, r_B = surface_pose(right, [0.5])
     np.testing.assert_array_equal(r_B, right.position_m)
     np.testing.assert_allclose(R_BW @ [0, 3, 0], (-3 * np.sin(0.5), 3 * np.cos(0.5), 0), rtol=1e-15)
 

@@ -29,6 +29,7 @@ from morphcore.simulate.plan import STEP_S, flight_plan
 from morphcore.simulate.schedule import Hold
 from morphdata.lattice import Lattice
 from tests.aero.link_loads import edge_loads, lane_loads
+from tests.geometry.rehinged import rehinged
 from tests.kernels import door
 from tests.models.chains import example_aircraft, example_flight, instant, odd_aircraft
 from tests.simulate.flights import example_model, fly_free, steps
@@ -110,10 +111,8 @@ def test_odd_surfaces():
 def flattened(surface):
     """The same surface in the plane z = 0, its hinge, if it has one, for sweep."""
     x, y, _ = surface.position_m
-    hinge = surface.hinge and surface.hinge.model_copy(
-        update={"axis": "z", "position_m": [*surface.hinge.position_m[:2], 0.0]}
-    )
-    return replace(surface, position_m=(x, y, 0.0), hinge=hinge)
+    flat = replace(surface, position_m=(x, y, 0.0))
+    return rehinged(flat, "z", [*flat.hinges[-1].position_m[:2], 0.0]) if flat.hinges else flat
 
 
 @pytest.mark.parametrize("links", [2, 3, 7])

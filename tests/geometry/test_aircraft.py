@@ -90,7 +90,7 @@ def test_a_fixed_tail_is_a_surface_without_hinge() -> None:
     """New surfaces are data, not code."""
     aircraft = aircraft_of({**AIRCRAFT, "surfaces": [*AIRCRAFT["surfaces"], TAIL]})
     tail = aircraft.surfaces[2]
-    assert tail.hinge is None
+    assert tail.hinges == ()
     assert not tail.flexible
     assert tail.mean_chord_m == pytest.approx(0.25)
     assert len(aircraft.flexible_surfaces) == 2

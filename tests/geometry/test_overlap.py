@@ -12,6 +12,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
 from morphcore.geometry.overlap import DEPTH_CHORDS, overlapping_surfaces
 from morphcore.geometry.surface import Surface
+from tests.geometry.rehinged import fixed, rehinged
 from tests.models.chains import example_aircraft
 
 POINTS = 61  # of the net, along each side
@@ -29,7 +30,7 @@ def overlap(aircraft: Aircraft, *angles: float) -> bool:
 
 def net(surface: Surface, angle: float) -> np.ndarray:
     """Points (n, 3) all over a surface's mid-plane in B."""
-    R_BW, r_B = surface_pose(surface, angle)
+    R_BW, r_B = surface_pose(surface, [angle])
     along, across = np.meshgrid(np.linspace(0, surface.span_m, POINTS), np.linspace(-0.5, 0.5, POINTS))
     points = [across * surface.chord_at(along), surface.span_sign * along, 0 * along]
     return np.stack([part.ravel() for part in points], axis=1) @ R_BW.T + r_B
@@ -37,7 +38,7 @@ def net(surface: Surface, angle: float) -> np.ndarray:
 
 def depth_seen(one: Surface, other: Surface, angles: tuple[float, float]) -> float:
     """How deep any point of the other surface's net lies within the first's outline and thickness, m."""
-    R_BW, r_B = surface_pose(one, angles[0])
+    R_BW, r_B = surface_pose(one, [angles[0]])
     x, y, z = ((net(other, angles[1]) - r_B) @ R_BW).T
     out = one.span_sign * y
     half = 0.5 * one.chord_at(out)
@@ -65,7 +66,7 @@ def test_surfaces_in_one_plane_against_a_net_of_points() -> None:
             wing,
             position_m=place,
             span_m=rng.uniform(0.5, 3.0),
-            hinge=wing.hinge.model_copy(update={"position_m": list(place)}),
+            hinges=rehinged(wing, "z", place).hinges,
         )
         one, other = aircraft.surfaces
         angles = (float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
@@ -93,27 +94,27 @@ def test_surfaces_in_one_plane_against_a_net_of_points() -> None:
 )
 def test_pairs_that_everybody_can_judge(changes: dict[str, Any], expected: bool) -> None:  # noqa: FBT001
     """Copies, neighbours, biplanes and two halves of one wing, all of them fixed."""
-    wing = replace(example_aircraft().surfaces[0], hinge=None)
-    assert overlap(pair(wing, **changes), 0.0, 0.0) is expected
+    wing = fixed(example_aircraft().surfaces[0])
+    assert overlap(pair(wing, **changes)) is expected
 
 
 def test_a_wing_folded_through_a_tail_crosses_it() -> None:
     """A surface folded up by 80 degrees cuts another one above it, and meets none at its own root."""
     wing = example_aircraft().surfaces[0]
-    folding = replace(wing, hinge=wing.hinge.model_copy(update={"axis": "x"}))
-    above = pair(folding, position_m=(0.0, 0.35, -1.0), hinge=None)
-    assert overlap(above, 1.4, 0.0)
-    assert not overlap(above, 0.0, 0.0)
-    side_by_side = pair(folding, position_m=(0.0, 0.35, 0.0), hinge=None, side="left")
-    assert not overlap(side_by_side, 1.4, 0.0)
+    folding = rehinged(wing, "x")
+    above = pair(folding, position_m=(0.0, 0.35, -1.0), hinges=())
+    assert overlap(above, 1.4)
+    assert not overlap(above, 0.0)
+    side_by_side = pair(folding, position_m=(0.0, 0.35, 0.0), hinges=(), side="left")
+    assert not overlap(side_by_side, 1.4)
 
 
 def test_the_row_of_a_sweep_is_told() -> None:
     """Of a sweep that runs into another surface, a row at which it has arrived there is given."""
     wing = example_aircraft().surfaces[0]
-    tail = {"position_m": (-1.5, 1.5, 0.0), "hinge": None, "span_m": 1.0}
-    angles = np.stack([np.linspace(0.0, 1.2, 50), np.zeros(50)], axis=1)
+    tail = {"position_m": (-1.5, 1.5, 0.0), "hinges": (), "span_m": 1.0}
+    angles = np.linspace(0.0, 1.2, 50)[:, None]
     ((first, second, row),) = overlapping_surfaces(pair(wing, **tail), angles)
     assert (first, second) == (0, 1)
-    assert not overlap(pair(wing, **tail), 0.0, 0.0)
-    assert overlap(pair(wing, **tail), float(angles[row, 0]), 0.0)
+    assert not overlap(pair(wing, **tail), 0.0)
+    assert overlap(pair(wing, **tail), float(angles[row, 0]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from morphcore.frames import axis_rotation
+from morphcore.geometry.lattice import surface_pose
 from morphcore.geometry.surface import Surface
 from morphdata.aircraft import Material
 from morphdata.aircraft import Surface as SurfaceDocument
@@ -36,8 +36,8 @@ def surface(side: Literal["right", "left"], axis: Literal["x", "y", "z"]) -> Sur
 
 def turned(wing: Surface, direction: np.ndarray) -> np.ndarray:
     """A direction of the wing's, in B, after a positive hinge motion."""
-    assert wing.hinge is not None
-    return axis_rotation(wing.hinge.axis_index, 0.3 * wing.rotation_sign) @ direction
+    R_BW, _ = surface_pose(wing, [0.3])
+    return np.asarray(R_BW @ direction)
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -60,9 +60,12 @@ def test_sides_are_mirror_images(axis: Literal["x", "y", "z"]) -> None:
     np.testing.assert_allclose(left, right * reflect, atol=1e-16)
 
 
-def test_a_fixed_surface_has_no_rotation() -> None:
-    """Without a hinge the sign is neutral."""
-    assert replace(surface("left", "z"), hinge=None).rotation_sign == 1.0
+def test_a_fixed_surface_stays_where_it_is() -> None:
+    """Without a hinge nothing turns."""
+    wing = replace(surface("left", "z"), hinges=())
+    R_BW, r_B = surface_pose(wing)
+    np.testing.assert_array_equal(R_BW, np.eye(3))
+    np.testing.assert_array_equal(r_B, wing.position_m)
 
 
 def test_area_is_the_integral_of_the_chord() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,14 @@ def example(name: str, role: str = "train") -> Trajectory:
 
 def shortened(sample: Trajectory, rows: int) -> Trajectory:
     """The first rows of a flight."""
-    names = ("time_s", "sweep_left", "sweep_right", "phi", "theta", "psi")
-    return replace(sample, **{name: getattr(sample, name)[:rows] for name in names}, extra={})
+    return chosen_rows(sample, slice(rows))
+
+
+def chosen_rows(sample: Trajectory, rows: Any) -> Trajectory:
+    """Some rows of a flight, without its other columns."""
+    columns = {name: getattr(sample, name)[rows] for name in ("time_s", "phi", "theta", "psi")}
+    drives = {name: values[rows] for name, values in sample.drives.items()}
+    return replace(sample, **columns, drives=drives, extra={})
 
 
 def synthetic(
@@ -67,7 +74,7 @@ def synthetic(
         ConstantRate(0.0, final, duration_s, start_s=0.1).motion(time_s).angle
         for final in (left_rad, right_rad)
     )
-    blank = Trajectory(name, time_s, left, right, rest, rest, rest)
+    blank = Trajectory(name, time_s, {"sweep_left": left, "sweep_right": right}, rest, rest, rest)
     model = chain_model(reference_aircraft(), reference_flight(), batch.links)
     ((case, found),) = shared_trims(model, batch, sample_cases(model, [blank]), "trim")
     euler = fly_attitudes(model, batch, case, found)[0]

@@ -33,6 +33,7 @@ from morphdata.identify import EquivalentModel, IdentifyRequest
 from tests.identification_request import identification
 from tests.identify.flights import (
     EXAMPLES,
+    chosen_rows,
     example,
     reference_aircraft,
     reference_flight,
@@ -205,8 +206,7 @@ def test_uneven_sample_times_give_the_same_errors() -> None:
     sample = synthetic(batch)
     kept = np.sort(np.random.default_rng(4).choice(np.arange(1, sample.time_s.size - 1), 60, replace=False))
     kept = np.concatenate([[0], kept, [sample.time_s.size - 1]])
-    columns = ("time_s", "phi", "theta", "psi", "sweep_left", "sweep_right")
-    thinned = replace(sample, **{name: getattr(sample, name)[kept] for name in columns})
+    thinned = chosen_rows(sample, kept)
     (whole,) = sample_cases(model, [sample])
     (uneven,) = sample_cases(model, [thinned])
     assert uneven.plan.grid.at is None

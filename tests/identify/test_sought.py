@@ -57,7 +57,10 @@ def test_what_makes_a_flight_asymmetric(column: str, sign: float) -> None:
     for size, expected in ((0.9, False), (1.1, True)):
         moved = getattr(flight, column).copy()
         moved[moved.size // 2] += sign * size * ASYMMETRIC_RAD
-        assert asymmetric(replace(flight, **{column: moved})) is expected
+        change = {column: moved}
+        if column in flight.drives:
+            change = {"drives": {**flight.drives, **change}}
+        assert asymmetric(replace(flight, **change)) is expected
 
 
 def test_a_heading_is_no_yaw() -> None:

@@ -172,7 +172,7 @@ def test_the_time_is_divided_by_unknowns() -> None:
 def test_the_timed_flight_lasts_two_seconds() -> None:
     """It follows the sweep that moves most, from its start, and is held where a shorter sample ends."""
     slow, fast = example("rate_0.2"), shortened(example("rate_0.8"), 101)
-    flight = timed_flight([slow, fast])
+    flight = timed_flight(reference_aircraft(), [slow, fast])
     assert flight.duration_s == pytest.approx(2.0)
     np.testing.assert_allclose(flight.sweep_left[:101], fast.sweep_left, atol=1e-12)
     np.testing.assert_array_equal(flight.sweep_left[101:], fast.sweep_left[-1])

@@ -20,6 +20,7 @@ from morphdata.aircraft import load_aircraft
 from morphdata.flight import Flight as FlightDocument
 from morphdata.flight import load_flight
 from morphdata.lattice import Lattice
+from tests.oracles.chain_tree import tree_hinges
 from tests.oracles.dynamics import Motion
 
 Array = NDArray[np.float64]
@@ -181,21 +182,20 @@ def random_state(rng: np.random.Generator, model: ChainModel, particles: int, *,
 
 
 def instant(model: ChainModel, hinges: ArrayLike, *, step_s: float = 0.005) -> FlightPlan:
-    """A plan of one step at whose start the hinges have given (angle, rate, acceleration), (s, 3)."""
+    """A plan of one step at whose start the hinges have given (angle, rate, acceleration), (h, 3)."""
     schedules = [Parabola(*row) for row in np.asarray(hinges, dtype=np.float64)]
     return flight_plan(model, schedules, TimeGrid(0.0, step_s, 1, None))
 
 
 def random_hinges(rng: np.random.Generator, model: ChainModel) -> Array:
-    """Angle, rate and acceleration (s, 3) of every surface's hinge; fixed surfaces do not look at theirs."""
-    return rng.normal(size=(len(model.aircraft.surfaces), 3)) * np.array([0.5, 1.0, 3.0])
+    """Angle, rate and acceleration (h, 3) of every hinge."""
+    return rng.normal(size=(len(model.aircraft.hinges), 3)) * np.array([0.5, 1.0, 3.0])
 
 
 def motion_of(model: ChainModel, hinges: Array, state: Array) -> Motion:
     """One state row in the terms of the textbook dynamics, for the tree of models/tree.py."""
     n = model.coordinates
-    hinged = [surface.hinge is not None for surface in model.aircraft.surfaces]
-    angle, rate, acceleration = hinges[hinged].T
+    angle, rate, acceleration = tree_hinges(model, hinges).T
     return Motion(
         state[:4],
         state[4:10],

@@ -198,7 +198,7 @@ def sample(names: tuple[str, ...], batch: ParameterBatch) -> Trajectory:
     time_s = np.linspace(0.0, 0.4, 41)
     rest = np.zeros_like(time_s)
     left, right = (ConstantRate(0.0, final, 0.3).motion(time_s).angle for final in (0.2, 0.3))
-    blank = Trajectory("known", time_s, left, right, rest, rest, rest)
+    blank = Trajectory("known", time_s, {"sweep_left": left, "sweep_right": right}, rest, rest, rest)
     model = chain(names)
     ((case, found),) = shared_trims(model, batch, sample_cases(model, [blank]), "trim")
     euler = fly_attitudes(model, batch, case, found)[0]
@@ -259,10 +259,9 @@ def test_half_an_aircraft_stands_for_pairs() -> None:
     """Wings and tail at half the cost, and to round-off what the whole aircraft does."""
     model = chain(ORDERS[2])
     batch = uneven(model, separate_wings=False)
-    sides = [ConstantRate(0.0, 0.3, 0.3)] * 4
     time_s = np.linspace(0.0, 0.4, 41)
-    angle, rest = sides[0].motion(time_s).angle, np.zeros_like(time_s)
-    blank = Trajectory("even", time_s, angle, angle, rest, rest, rest)
+    angle, rest = ConstantRate(0.0, 0.3, 0.3).motion(time_s).angle, np.zeros_like(time_s)
+    blank = Trajectory("even", time_s, {"sweep": angle}, rest, rest, rest)
     angles = []
     for separate in (False, True):
         (case,) = sample_cases(model, [blank], separate_wings=separate)

@@ -85,7 +85,7 @@ def test_a_morph_changes_the_angle():
 def test_an_aircraft_without_hinges_cannot_morph():
     """Somebody has to move."""
     aircraft = reference_aircraft()
-    fixed = replace(aircraft, surfaces=tuple(replace(s, hinge=None) for s in aircraft.surfaces))
+    fixed = replace(aircraft, surfaces=tuple(replace(s, hinges=()) for s in aircraft.surfaces))
     with pytest.raises(InvalidInput) as caught:
         morph_space(fixed, Morph(final_rad=1.0, duration_s=2.0), Limits(), 2.0)
     assert caught.value.pointer == "/aircraft/surfaces"

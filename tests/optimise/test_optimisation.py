@@ -428,7 +428,7 @@ def test_the_step_holds_for_both_models() -> None:
     """The step is the longest with which both models fly the constant rate well enough, or the given one."""
     jerk, limits = Morph(final_rad=1.0, duration_s=0.08, settle_s=0.2), Limits(max_rate_rad_s=40.0)
     run = optimisation(jerk, limits, links=2)
-    flight = [run.constant(jerk.duration_s)] * len(run.aircraft.surfaces), run.times_s
+    flight = [run.constant(jerk.duration_s)] * len(run.aircraft.hinges), run.times_s
     alone = {}
     for name in ("rigid", "equivalent"):
         model, batch = run.chain(name)

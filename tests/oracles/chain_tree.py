@@ -8,9 +8,12 @@ twice.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.hinge import Vector
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from tests.oracles.tree import FLAP, LAG, TORSION, Tree, spatial_inertia
@@ -24,9 +27,10 @@ SLICES = 12  # Gauss points a link: exact to degree 23 in the span, tapered soli
 def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> Tree:
     """The tree of one parameter set.
 
-    Bodies: the fuselage with all fixed first links; then surface by surface a hinged first link, its origin
-    on the hinge, and three bodies for each gimbal, of which the last is the link. Hinges are numbered over
-    the hinged surfaces, free coordinates as in the lanes' state.
+    Bodies: the fuselage with all fixed first links; then surface by surface a body for each turn of its
+    hinges, of which the last is the first link, its origin on the last hinge, and three bodies for each
+    gimbal, of which the last is the link. Prescribed coordinates are those of `tree_hinges`, free ones as in
+    the lanes' state.
     """
     fuselage = model.aircraft.fuselage
     base = spatial_inertia(fuselage.mass_kg, fuselage.centre_of_mass_B, fuselage.inertia_B)
@@ -49,12 +53,14 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
         ends = link_ends(model, batch, s, particle)
         root, pivot = _root(surface), _pivot(surface)
         first = slice_inertia(surface, ends[0], ends[1], root - pivot)
-        if surface.hinge is None:
+        if not surface.hinges:
             inertia[0] = inertia[0] + first
-            body = 0
-        else:
-            about, count = surface.hinge.axis_index, max(hinge) + 1
-            body = add(0, about, surface.rotation_sign, pivot, first, -1, count)
+        body, reached = 0, np.zeros(3)
+        turns = [(each, turn) for each in surface.hinges for turn in _turns(each.axis_B)]
+        for number, (each, turn) in enumerate(turns):
+            at, mass = np.array(each.position_m), first if number == len(turns) - 1 else np.zeros((6, 6))
+            body = add(body, turn.axis, turn.sign, at - reached, mass, -1, max(hinge) + 1)
+            reached = at
         where = root - pivot
         for k in range(1, ends.size - 1):
             where = where + np.array([0.0, surface.span_sign * (ends[k] - ends[k - 1]), 0.0])
@@ -78,6 +84,50 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
     )
 
 
+@dataclass(frozen=True)
+class _Turn:
+    """A prescribed turn about a coordinate axis: by the angle of a hinge (``held`` is None), or held."""
+
+    axis: int
+    sign: float
+    held: float | None = None
+
+
+def _turns(axis_B: Vector) -> list[_Turn]:
+    """Turns about coordinate axes that make up one about any axis.
+
+    About a skew axis it is Q R_z Q^T with Q = R_z(azimuth) R_y(tilt), which takes z to the axis.
+    """
+    about = int(np.argmax(np.abs(axis_B)))
+    if abs(axis_B[about]) == 1.0:
+        return [_Turn(about, axis_B[about])]
+    x, y, z = axis_B
+    azimuth, tilt = float(np.arctan2(y, x)), float(np.arctan2(np.hypot(x, y), z))
+    return [
+        _Turn(2, 1.0, azimuth),
+        _Turn(1, 1.0, tilt),
+        _Turn(2, 1.0),
+        _Turn(1, 1.0, -tilt),
+        _Turn(2, 1.0, -azimuth),
+    ]
+
+
+def tree_hinges(model: ChainModel, hinges: Array) -> Array:
+    """Angle, rate and acceleration (m, 3) of a tree's prescribed coordinates from those of hinges (h, 3)."""
+    rows = [
+        motion if turn.held is None else np.array([turn.held, 0.0, 0.0])
+        for hinge, motion in zip(model.aircraft.hinges, hinges, strict=True)
+        for turn in _turns(hinge.axis_B)
+    ]
+    return np.array(rows).reshape(-1, 3)
+
+
+def of_hinges(model: ChainModel, prescribed: Array) -> Array:
+    """Of values (m,) of a tree's prescribed coordinates, those of the hinges (h,)."""
+    turns = [turn for hinge in model.aircraft.hinges for turn in _turns(hinge.axis_B)]
+    return np.asarray(prescribed[[turn.held is None for turn in turns]])
+
+
 def link_bodies(model: ChainModel) -> tuple[IntArray, Array]:
     """Where the links are in the tree: body and origin of each.
 
@@ -86,11 +136,8 @@ def link_bodies(model: ChainModel) -> tuple[IntArray, Array]:
     """
     bodies, origins, body = [], [], 0
     for surface, row in zip(model.aircraft.surfaces, model.surfaces, strict=True):
-        if surface.hinge is None:
-            bodies.append(0)
-        else:
-            body += 1
-            bodies.append(body)
+        body += sum(len(_turns(hinge.axis_B)) for hinge in surface.hinges)
+        bodies.append(body if surface.hinges else 0)
         origins.append(_root(surface) - _pivot(surface))
         for _ in range(int(row[1]) - 1):
             body += 3
@@ -135,5 +182,5 @@ def _root(surface: Surface) -> Array:
 
 
 def _pivot(surface: Surface) -> Array:
-    """The origin of the first link's body: the hinge, or the fuselage reference point of a fixed surface."""
-    return np.zeros(3) if surface.hinge is None else np.array(surface.hinge.position_m)
+    """The origin of the first link's body: the last hinge, or the fuselage reference point."""
+    return np.array(surface.hinges[-1].position_m) if surface.hinges else np.zeros(3)

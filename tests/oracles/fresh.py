@@ -28,7 +28,7 @@ from morphcore.models.parameters import SHORTEST_LAG_S
 from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode
-from tests.oracles.chain_tree import chain_tree, link_bodies, link_ends
+from tests.oracles.chain_tree import chain_tree, link_bodies, link_ends, tree_hinges
 from tests.oracles.dynamics import Motion, bias, body_poses, body_twists, mass_matrix
 from tests.oracles.lattice import edge_forces, edge_midpoints, panel_normals, solve_circulation
 from tests.oracles.tree import Tree
@@ -84,7 +84,6 @@ class FreshModel:
         shift = np.array([value["centre_shift_m"][0] for value in values])
         self.centre_shift_L = np.outer(np.repeat(shift, model.surfaces[:, 1]), [1.0, 0.0, 0.0])
         self.bodies, self.origins = link_bodies(model)
-        self.hinged = np.array([surface.hinge is not None for surface in model.aircraft.surfaces])
         lag_s = np.array([value["lag_s"][0] for value in values])
         per_ring = lag_s[model.lattice.table.panel_surface] / JONES_MEAN_LAG
         self.lag_times = np.maximum(np.stack([per_ring / JONES_B1, per_ring / JONES_B2]), SHORTEST_LAG_S)
@@ -139,8 +138,8 @@ class FreshModel:
         self.drag_centre_L: Array = np.concatenate(centroids)
 
     def motion(self, state: FreshState, hinges: Array) -> Motion:
-        """The tree's motion with hinges (s, 3): angle, rate, acceleration of every surface."""
-        angle, rate, acceleration = hinges[self.hinged].T
+        """The tree's motion with angle, rate, acceleration (h, 3) of every hinge."""
+        angle, rate, acceleration = tree_hinges(self.model, hinges).T
         return Motion(
             state.quaternion,
             state.twist_B,

@@ -60,15 +60,15 @@ def steady_polar(
     Parameters
     ----------
     airspeed, density : m/s and kg/m^3.
-    hinge_rad : coordinate of each hinged surface in the aircraft's order; empty for all at zero.
+    hinge_rad : angle of each hinge in the aircraft's order; empty for all at zero.
     lattice : panels of every surface and core of their vortices. mach : as in ``influence``.
     """
-    hinges = iter(_hinge_angles(aircraft, hinge_rad))
+    angles = _hinge_angles(aircraft, hinge_rad)
     panels = (lattice.chordwise, lattice.spanwise)
     lattices = [surface_lattice(surface, *panels) for surface in aircraft.surfaces]
     corners, controls = [], []
-    for surface, part in zip(aircraft.surfaces, lattices, strict=True):
-        R_BW, r_B = surface_pose(surface, next(hinges) if surface.hinge else 0.0)
+    for surface, part, own in zip(aircraft.surfaces, lattices, aircraft.hinge_columns, strict=True):
+        R_BW, r_B = surface_pose(surface, angles[own])
         corners.append(part.ring_corners_W.reshape(-1, 3) @ R_BW.T + r_B)
         controls.append(part.control_points_W.reshape(-1, 3) @ R_BW.T + r_B)
     corners_B, controls_B = np.concatenate(corners), np.concatenate(controls)
@@ -131,10 +131,10 @@ def steady_edges(
 
 
 def _hinge_angles(aircraft: Aircraft, hinge_rad: Sequence[float]) -> Sequence[float]:
-    count = sum(surface.hinge is not None for surface in aircraft.surfaces)
+    count = len(aircraft.hinges)
     if len(hinge_rad) not in (0, count):
         raise InvalidInput(
             f"{len(hinge_rad)} hinge angles for {count} hinges",
-            hint="give one for each hinged surface, or none",
+            hint="give one for each hinge, or none",
         )
     return hinge_rad if len(hinge_rad) else [0.0] * count

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_quaternion
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import (
     ChainModel,
     ParameterBatch,
@@ -105,7 +106,12 @@ def plan_of(model: ChainModel, schedules: Sequence[Schedule], duration_s: float,
     return flight_plan(model, schedules, steps(duration_s, step_s))
 
 
-def fly(*conditions: Any, **options: Any) -> Simulation:
-    """`simulate` for a resolved aircraft and flight, which a test may change beyond a document's limits."""
-    steps = flight_steps(*conditions, **options)
+def fly(aircraft: Aircraft, flight: Flight, schedules: Any, **options: Any) -> Simulation:
+    """`simulate` for a resolved aircraft and flight, which a test may change beyond a document's limits.
+
+    A list of schedules is of the drives in the aircraft's order.
+    """
+    if isinstance(schedules, list):
+        schedules = dict(zip(aircraft.drives, schedules, strict=True))
+    steps = flight_steps(aircraft, flight, schedules, **options)
     return next(step.simulation for step in steps if step.simulation is not None)

@@ -158,8 +158,8 @@ def test_the_centre_of_mass_lies_aft(sweep_rad: float) -> None:
     wing_kg, fuselage = MASS_PER_LENGTH * SPAN_M, aircraft.fuselage
     total = fuselage.mass_kg * fuselage.centre_of_mass_B
     for surface in aircraft.surfaces:
-        assert surface.hinge is not None
-        pivot, root = np.array(surface.hinge.position_m), np.array(surface.position_m)
+        (hinge,) = surface.hinges
+        pivot, root = np.array(hinge.position_m), np.array(surface.position_m)
         side = 1.0 if surface.side == "right" else -1.0
         out = abs(root[1] - pivot[1]) + SPAN_M / 2.0  # from the hinge
         back = root[0] - pivot[0] - aft_m

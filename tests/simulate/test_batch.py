@@ -182,7 +182,7 @@ def test_uneven_samples_fly_as_even_ones():
     model, whole = example_model(2), sample("train_asymmetric")
     keep = np.sort(np.random.default_rng(0).permutation(whole.time_s.size)[: 9 * whole.time_s.size // 10])
     keep = np.union1d(keep, [0, whole.time_s.size - 1])
-    schedules = [Tabulated(whole.time_s, whole.sweep(side)) for side in ("right", "left")]
+    schedules = [Tabulated(whole.time_s, angle) for angle in (whole.sweep_right, whole.sweep_left)]
     plan = flight_plan(model, schedules, time_grid(whole.time_s[keep]))
     assert plan.grid.at is None
     uneven, even = (

@@ -59,8 +59,8 @@ def whole_and_half(model: ChainModel, angle: float) -> tuple[np.ndarray, np.ndar
     """The operator of one half folded out of the whole one's, and the half model's own."""
     assert model.half is not None
     assert model.mirror is not None
-    whole = lattice_operator(model.lattice, [angle] * len(model.aircraft.surfaces), mach=0.3).matrix
-    own = lattice_operator(model.half.lattice, [angle] * len(model.mirror.own), mach=0.3).matrix
+    whole = lattice_operator(model.lattice, [angle] * len(model.aircraft.hinges), mach=0.3).matrix
+    own = lattice_operator(model.half.lattice, [angle] * len(model.mirror.own_hinges), mach=0.3).matrix
     n = model.half.lattice.strips // len(model.mirror.own)
     blocks = [
         [
@@ -155,7 +155,7 @@ def test_unequal_sweeps_fly_whole() -> None:
     """The asymmetric sample, and one whose sides differ by a microradian."""
     model = example_model(2)
     even = sample("train_rate_0.8")
-    uneven = replace(even, sweep_left=even.sweep_left + 1e-6)
+    uneven = replace(even, drives={**even.drives, "sweep_left": even.sweep_left + 1e-6})
     for flown in (sample("train_asymmetric"), uneven):
         (case,) = sample_cases(model, [flown])
         assert not case.plan.halved
@@ -176,7 +176,7 @@ def test_the_joints_of_the_other_half() -> None:
     """A trim of the half, spread over both, is the trim of the whole: flap and lag turn the other way."""
     model = chain_model(tailed(), replace(example_flight(), airspeed_m_s=70.0, start=None), 3)
     assert model.half is not None
-    guess, schedules = physical_guess(model), [ConstantRate(0.2, 0.3, 0.5)] * 4
+    guess, schedules = physical_guess(model), [ConstantRate(0.2, 0.3, 0.5)] * len(model.aircraft.hinges)
     whole, half = (
         trim(plan.flown(model), guess, plan).require()
         for plan in (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +11,10 @@ from hypothesis import strategies as st
 
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
+from morphcore.multibody.kernels.hinge import H_ORIGIN, H_TWIST
 from morphcore.simulate.plan import STEP_S, common_path, flight_plan, time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold
+from tests.geometry.rehinged import fixed
 from tests.models.chains import Parabola, odd_aircraft, small_model
 from tests.simulate.flights import example_model, fly_trimmed, sample, sample_plan, sample_schedules
 
@@ -46,11 +50,10 @@ def test_uneven_samples_get_a_grid_of_their_own():
 def table_error(model, schedules, duration_s):
     """Largest error of the interpolated operators, relative to the largest element of each kind of row."""
     plan = flight_plan(model, schedules, time_grid(np.linspace(0.0, duration_s, 41), duration_s / 40))
-    hinged = np.array([s.hinge is not None for s in model.aircraft.surfaces])
     worst = 0.0
     for row in range(plan.grid.steps + 1):
         matrices, strips = plan.table.between(row, row + 1)
-        exact = lattice_operator(model.lattice, tuple(plan.angles[row] * hinged))
+        exact = lattice_operator(model.lattice, plan.angles[row])
         worst = max(worst, float(np.abs(strips[0] - exact.strips).max()))
         for kind in range(5):
             found, right = matrices[0, kind:-4:5], exact.matrix[kind:-4:5]
@@ -85,22 +88,21 @@ def test_the_tables_spacing_does_not_show_in_the_attitude():
 
 
 def test_hinge_rows_are_the_surfaces_motion():
-    """Pose, rate and origin of odd hinges: differences in time of the pose give the twist rows.
+    """Pose, twist and origin of odd hinges: differences in time of the pose give the twist rows.
 
-    R' = R [w x], p' = R v, with [w; v] = S rate in link axes.
+    R' = R [w x], p' = R v, with [w; v] the twist in link axes.
     """
     rng = np.random.default_rng(0)
     model = small_model(odd_aircraft(rng), example_model(1).flight, 2)
     probe = 1e-6
-    schedules = [Parabola(*row) for row in rng.normal(size=(5, 3)) * [0.4, 1.0, 2.0]]
+    schedules = [Parabola(*row) for row in rng.normal(size=(len(model.aircraft.hinges), 3)) * [0.4, 1.0, 2.0]]
     rows = flight_plan(model, schedules, time_grid(np.array([0.0, probe, 2 * probe]))).hinges
     for s, surface in enumerate(model.aircraft.surfaces):
-        R, p = (rows[:, s, :9].reshape(-1, 3, 3), rows[:, s, 16:])
-        twist = rows[1, s, 9:15] * rows[1, s, 15]
+        R, p, twist = rows[:, s, :9].reshape(-1, 3, 3), rows[:, s, H_ORIGIN:], rows[1, s, H_TWIST:H_ORIGIN]
         spin = R[1].T @ (R[2] - R[0]) / (2 * probe)
         np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], twist[:3], atol=1e-8)
         np.testing.assert_allclose(R[1].T @ (p[2] - p[0]) / (2 * probe), twist[3:], atol=1e-8)
-        if surface.hinge is None:
+        if not surface.hinges:
             np.testing.assert_array_equal(twist, 0.0)
 
 
@@ -108,8 +110,9 @@ def test_mean_accelerations_add_up_to_the_rates():
     """Over a whole sample the mean accelerations make the rates exactly, jumps of the schedule included."""
     model = example_model(1)
     plan = sample_plan(model, "train_rate_0.8", STEP_S)
-    summed = plan.rates[0] + plan.grid.step_s * np.cumsum(plan.mean_accelerations, axis=0)
-    np.testing.assert_allclose(summed, plan.rates[1:], atol=1e-12)
+    twists = plan.hinges[:, :, H_TWIST:H_ORIGIN]
+    summed = twists[0] + plan.grid.step_s * np.cumsum(plan.mean_accelerations, axis=0)
+    np.testing.assert_allclose(summed, twists[1:], atol=1e-12)
     assert plan.rates.max() == pytest.approx(1.0 / 1.15, rel=2e-3)  # a radian, ramps inside its 1.25 s
     assert sample("train_rate_0.8").time_s.size == plan.grid.at.size
 
@@ -130,18 +133,17 @@ def test_changing_wind_reaches_the_flight():
     assert moved[-1, 0, 12] < still[-1, 0, 12] - 0.03  # carried up
 
 
-def test_no_hinge_no_angle():
-    """Angles given for fixed surfaces are not looked at."""
-    rng = np.random.default_rng(1)
-    aircraft = odd_aircraft(rng)
-    model = small_model(aircraft, example_model(1).flight, 1)
-    fixed = [s.hinge is None for s in aircraft.surfaces]
-    plans = []
-    for angle in (0.0, 0.7):
-        schedules = [Hold(angle if f else 0.2) for f in fixed]
-        plans.append(flight_plan(model, schedules, time_grid(np.array([0.0, 0.01, 0.02]))))
-    np.testing.assert_array_equal(plans[0].table.matrices, plans[1].table.matrices)
-    np.testing.assert_array_equal(plans[0].hinges, plans[1].hinges)
+def test_an_aircraft_without_hinges_has_a_plan():
+    """Nothing moves: one lattice, and surfaces at rest where they are."""
+    aircraft = odd_aircraft(np.random.default_rng(1))
+    aircraft = replace(aircraft, surfaces=tuple(fixed(surface) for surface in aircraft.surfaces))
+    plan = flight_plan(
+        small_model(aircraft, example_model(1).flight, 1), [], time_grid(np.array([0.0, 0.01, 0.02]))
+    )
+    assert plan.angles.shape == (3, 0)
+    assert plan.table.matrices.shape[0] == 1
+    np.testing.assert_array_equal(plan.hinges[:, :, H_TWIST:H_ORIGIN], 0.0)
+    np.testing.assert_array_equal(plan.mean_accelerations, np.zeros((2, 5, 6)))
 
 
 def test_a_common_path_gives_the_plans_of_single_schedules():

@@ -106,7 +106,7 @@ def test_the_variation_does_not_hang_on_the_rows() -> None:
         psi = 3.0 + 0.2 * np.sin(0.5 * np.pi * time_s)  # passes pi, and ends where it began
         wrapped = (psi + np.pi) % (2.0 * np.pi) - np.pi
         zero = np.zeros_like(time_s)
-        values.append(attitude_variation(Trajectory("t", time_s, zero, zero, zero, zero, wrapped)))
+        values.append(attitude_variation(Trajectory("t", time_s, {}, zero, zero, wrapped)))
     assert values[0] == pytest.approx(values[1], rel=1e-4)
     assert values[0] == pytest.approx(
         100 * 0.2**2 * 0.5 * 2.0, rel=1e-3

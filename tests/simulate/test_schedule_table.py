@@ -18,8 +18,8 @@ from morphdata.schedules import load_schedules
 
 def read(path: Path) -> dict[str, Any]:
     """The motion of each side's hinge."""
-    given = load_schedules(path)
-    return {side: scheduled(found[1]) for side in SIDES if (found := given.of_side(side))}
+    found = load_schedules(path).given
+    return {side: scheduled(found[f"sweep_{side}"]) for side in SIDES if f"sweep_{side}" in found}
 
 
 def test_a_sample_flight_is_a_schedule(examples: Path) -> None:
@@ -28,7 +28,7 @@ def test_a_sample_flight_is_a_schedule(examples: Path) -> None:
     schedule, flight = read(path), load_trajectory(path)
     for side in ("left", "right"):
         np.testing.assert_array_equal(schedule[side].time_s, flight.time_s)
-        np.testing.assert_array_equal(schedule[side].angle_rad, flight.sweep(side))
+        np.testing.assert_array_equal(schedule[side].angle_rad, flight.drives[f"sweep_{side}"])
 
 
 def test_units_stand_in_the_names(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     """
     spline = Spline(np.array([0.0, 0.7, 1.4, 2.0]), np.array([0.0, 0.2, 0.9, 1.0]))
     path = tmp_path / "s.csv"
-    write_schedule_csv({"left": Hold(0.1), "right": spline}, 0.01 * np.arange(251), path)
+    write_schedule_csv({"sweep_left": Hold(0.1), "sweep_right": spline}, 0.01 * np.arange(251), path)
     schedule = read(path)
     times = np.linspace(0.0, 2.5, 1717)
     np.testing.assert_allclose(
@@ -66,7 +66,8 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     [
         ("", "the file is empty"),
         ("t,sweep_left,sweep_right\n", "holds no rows"),
-        ("t,sweep_left\n0,0\n1,0\n2,0\n", "no column sweep_right"),
+        ("t\n0\n1\n2\n", "no column sweep_left, sweep_right"),
+        ("t,theta,q\n0,0,0\n1,0,0\n2,0,0\n", "no column sweep_left, sweep_right"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,x\n2,0,0\n", "line 3: sweep_right is 'x'"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,nan\n2,0,0\n", "line 3: sweep_right is 'nan'"),
         ("t,sweep_left,sweep_right\n0,0,0\n\n2,0,0\n1,0,0\n", "line 5: time does not increase"),

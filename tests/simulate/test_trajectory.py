@@ -36,8 +36,8 @@ def test_examples_are_read():
     flown = load_trajectory(EXAMPLES / "train_asymmetric.csv")
     assert flown.name == "train_asymmetric"
     np.testing.assert_allclose(np.diff(flown.time_s), 0.01, atol=1e-9)
-    assert flown.sweep("right")[-1] == pytest.approx(0.6, abs=1e-6)
-    assert flown.sweep("left")[-1] == pytest.approx(0.5, abs=1e-6)
+    assert flown.sweep_right[-1] == pytest.approx(0.6, abs=1e-6)
+    assert flown.sweep_left[-1] == pytest.approx(0.5, abs=1e-6)
     assert flown.euler.shape == (flown.time_s.size, 3)
     assert {"p", "q", "r", "tip_left_z"} <= set(flown.extra)
     assert flown.duration_s == pytest.approx(flown.time_s[-1])

@@ -131,7 +131,7 @@ def accelerations(
 ):
     """Base and joint accelerations of a block for joint forces and added diagonal found in the scratch block.
 
-    ``hinge_accelerations`` (s,): accelerations of the hinges, rad/s^2.
+    ``hinges`` (s, HINGE_ROWS), ``hinge_accelerations`` (s, 6): motion of the surfaces against the fuselage.
 
     Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint
     accelerations and the links' twists in theirs.

@@ -1,4 +1,8 @@
-"""Hinges of prescribed motion in the articulated-body pass (Featherstone 2008, section 9.2)."""
+"""Surfaces of prescribed motion in the articulated-body pass (Featherstone 2008, section 9.2).
+
+A surface moves against the fuselage as its hinges say together, see `multibody.hinges`: their number costs
+nothing here.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,27 @@ from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.multibody.kernels.articulated import carry_lane
 
-# rotation W -> B (9), motion subspace S of the hinge in W (6), rate, origin of the first link in B (3)
-HINGE_ROWS = 19
-H_SUBSPACE, H_RATE, H_ORIGIN = 9, 15, 16
+# rotation W -> B (9), twist relative to the fuselage in W (6), origin of the first link in B (3)
+HINGE_ROWS = 18
+H_ROTATION, H_TWIST, H_ORIGIN = 0, 9, 15
 
 
 @kernel
 def hinge_twist(lanes, twist_base, hinge, acceleration, twist, bias):
-    """Twist of a surface's first link and its acceleration but for the base's: hinge motion is prescribed."""
+    """Twist of a surface's first link and its acceleration but for the base's.
+
+    acceleration : (6,) time derivative of the relative twist in W.
+    """
     if not_in_lanes(twist_base, lanes) or not_in_lanes(twist, lanes) or not_in_lanes(bias, lanes):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    rate = hinge[15]
-    jx, jy, jz = hinge[9] * rate, hinge[10] * rate, hinge[11] * rate
-    kx, ky, kz = hinge[12] * rate, hinge[13] * rate, hinge[14] * rate
-    ex, ey, ez = hinge[9] * acceleration, hinge[10] * acceleration, hinge[11] * acceleration
-    fx, fy, fz = hinge[12] * acceleration, hinge[13] * acceleration, hinge[14] * acceleration
-    px, py, pz = hinge[16], hinge[17], hinge[18]
+    jx, jy, jz = hinge[H_TWIST], hinge[H_TWIST + 1], hinge[H_TWIST + 2]
+    kx, ky, kz = hinge[H_TWIST + 3], hinge[H_TWIST + 4], hinge[H_TWIST + 5]
+    ex, ey, ez = acceleration[0], acceleration[1], acceleration[2]
+    fx, fy, fz = acceleration[3], acceleration[4], acceleration[5]
+    px, py, pz = hinge[H_ORIGIN], hinge[H_ORIGIN + 1], hinge[H_ORIGIN + 2]
     for l in range(len(lanes)):
         ax, ay, az = twist_base[0, l], twist_base[1, l], twist_base[2, l]
         bx = twist_base[3, l] + ay * pz - az * py
@@ -54,7 +60,7 @@ def carry_through_hinge(lanes, hinge, inertia, force):
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    px, py, pz = hinge[16], hinge[17], hinge[18]
+    px, py, pz = hinge[H_ORIGIN], hinge[H_ORIGIN + 1], hinge[H_ORIGIN + 2]
     for l in range(len(lanes)):
         carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l)
 
@@ -67,7 +73,7 @@ def hinge_acceleration(lanes, base, hinge, bias, acceleration):
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]
     r10, r11, r12 = hinge[3], hinge[4], hinge[5]
     r20, r21, r22 = hinge[6], hinge[7], hinge[8]
-    px, py, pz = hinge[16], hinge[17], hinge[18]
+    px, py, pz = hinge[H_ORIGIN], hinge[H_ORIGIN + 1], hinge[H_ORIGIN + 2]
     for l in range(len(lanes)):
         ax, ay, az = base[0, l], base[1, l], base[2, l]
         bx = base[3, l] + ay * pz - az * py

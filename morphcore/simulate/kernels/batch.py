@@ -19,11 +19,11 @@ def fly(
     Parameters (b blocks, t steps, s surfaces, n links, j strips)
     ----------
     surfaces : (s, 6); ranges : (b, n, 2); shared : (23,). In the middles of the steps: strips : (t, j, 3);
-    hinges : (t, s, HINGE_ROWS); operators : (t, rows, columns); wind : (t, 3). hinge_accelerations : (t, s).
-    constants : (b, rows, width). step : s. number : steps made before. state : (b, rows, width), advanced in
-    place. slopes : (b, SLOPES, mechanical rows, width), the blocks' memory. middle : (rows, width); scratch,
-    inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r rows of the
-    state after each step.
+    hinges : (t, s, HINGE_ROWS); hinge_accelerations : (t, s, 6); operators : (t, rows, columns); wind : (t,
+    3). constants : (b, rows, width). step : s. number : steps made before. state : (b, rows, width), advanced
+    in place. slopes : (b, SLOPES, mechanical rows, width), the blocks' memory. middle : (rows, width);
+    scratch, inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r rows of
+    the state after each step.
     """
     for n in range(record.shape[0]):
         for b in range(first, last):

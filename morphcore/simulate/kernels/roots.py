@@ -10,19 +10,20 @@ from morphcore.multibody.kernels.se3 import ad, add_from_body, composed_pose, to
 def follow_fuselage(roots, R_BW, origin_B, axis, rate, acceleration, R, x, V, A, v):
     """Poses, twists and twist rates of the roots (s,) from node 0, the fuselage.
 
-    R_BW (s, 3, 3), origin_B (s, 3) m: the root seen from the fuselage; axis (s, 6) its twist in W for a unit
-    rate of the hinge; rate, acceleration (s,) rad/s, rad/s^2. R, x, V, A of all nodes; v (3, 6) is scratch.
+    R_BW (s, 3, 3), origin_B (s, 3) m: the root seen from the fuselage; its twist against that is axis rate in
+    W, axis (s, 6) and rate (s,); acceleration (s, 6) the twist's time derivative. R, x, V, A of all nodes; v
+    (3, 6) is scratch.
     """
     for s in range(roots.size):
         node = roots[s]
         composed_pose(R[0], x[0], R_BW[s], origin_B[s], R[node], x[node])
         to_body(R_BW[s], origin_B[s], V[0], v[0])
         to_body(R_BW[s], origin_B[s], A[0], v[1])
-        # H_root = H_B H_hinge: A_root = Ad A_B - ad(axis rate) Ad V_B + axis acceleration
+        # H_root = H_B H_hinges: A_root = Ad A_B - ad(axis rate) Ad V_B + acceleration
         ad(axis[s], v[0], v[2])
         for i in range(6):
             V[node, i] = v[0, i] + axis[s, i] * rate[s]
-            A[node, i] = v[1, i] - rate[s] * v[2, i] + axis[s, i] * acceleration[s]
+            A[node, i] = v[1, i] - rate[s] * v[2, i] + acceleration[s, i]
 
 
 @entry_kernel

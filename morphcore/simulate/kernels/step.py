@@ -296,9 +296,9 @@ def step_block(
     """Advance a block by one step; ``strips``, ``hinges``, ``operator``, ``wind`` in its middle.
 
     ``number``: how many steps the flight has made. ``slopes`` (SLOPES, mechanical rows, width): the block's
-    memory, filled here at the first step. ``hinge_accelerations`` (s,) is the change of the hinges' rates
-    over the step, divided by its length: where a schedule's acceleration jumps, the momentum that the wings
-    exchange with the fuselage is then still exact.
+    memory, filled here at the first step. ``hinge_accelerations`` (s, 6) hold the change of the hinges'
+    rates over the step, divided by its length: where a schedule's acceleration jumps, the momentum that the
+    wings exchange with the fuselage is then still exact.
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])

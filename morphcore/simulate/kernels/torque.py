@@ -13,27 +13,28 @@ from morphcore.models.kernels.layout import (
 )
 from morphcore.multibody.kernels.articulated import LINK_ROWS, add_bias, add_link
 from morphcore.multibody.kernels.gimbal import JOINT_ROWS, carry_through_gimbal
-from morphcore.multibody.kernels.hinge import H_SUBSPACE
 from morphcore.simulate.kernels.step import instant_rates
 
 
 @entry_kernel
 def torques(
     lanes,
-    surfaces, ranges, shared, strips, hinges, hinge_accelerations, operators, wind, constants, states, zero,
-    block, scratch, inputs, outputs, rates, out,
+    surfaces, ranges, shared, strips, hinges, hinge_accelerations, columns, screws, operators, wind,
+    constants, states, zero, block, scratch, inputs, outputs, rates, out,
 ):  # fmt: skip
     """Inverse dynamics of every wing at each of some instants of one flight.
 
     Leaves the accelerations of all links in the scratch block by the forward pass, then sums over each wing,
-    from its tip to its hinge, what each link takes: I a + v x* I v - air load (recursive Newton-Euler,
-    Featherstone (2008), table 5.1). Gravity is in the accelerations.
+    from its tip to its root, what each link takes: I a + v x* I v - air load (recursive Newton-Euler,
+    Featherstone (2008), table 5.1). Gravity is in the accelerations. What lies between hinges has no mass:
+    all of a surface's bear the same wrench, each what its screw takes of it.
 
-    Parameters (t instants, s surfaces)
+    Parameters (t instants, s surfaces, h hinges)
     ----------
+    columns : (s + 1,) first hinge of each surface, and h. screws : (t, h, 6) `multibody.hinges.hinge_screws`.
     states : (t, rows) of one flight; the others as in ``rates_of_blocks``, with a leading axis t.
-    block : (rows, width) and the rest of the scratch: the caller's own. out : (t, s) N m, along the positive
-    hinge coordinates; zero without a hinge.
+    block : (rows, width) and the rest of the scratch: the caller's own. out : (t, h) N m, along the positive
+    angles.
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
@@ -74,7 +75,8 @@ def torques(
                         w_joint + JOINT_ROWS * last_joint : w_joint + JOINT_ROWS * (last_joint + 1)
                     ]
                     carry_through_gimbal(lanes, rows, joint, inertia, force)
-            torque = 0.0
-            for i in range(6):
-                torque += hinges[n, s, H_SUBSPACE + i] * force[i, 0]
-            out[n, s] = torque
+            for h in range(columns[s], columns[s + 1]):
+                torque = 0.0
+                for i in range(6):
+                    torque += screws[n, h, i] * force[i, 0]
+                out[n, h] = torque

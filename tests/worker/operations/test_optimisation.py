@@ -38,7 +38,7 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
     assert undeclared(files, "optimize") == []
     path = tmp_path / "schedule.csv"
     path.write_bytes(files["schedule.csv"])
-    given = load_schedules(path).left
+    given = load_schedules(path).given.get("sweep_left")
     assert given is not None
     left = scheduled(given)
     assert np.allclose(left.motion([0.0, 0.8, 1.0]).angle, [0.0, 0.5, 0.5])

@@ -1,0 +1,109 @@
+"""Hinges as the numerics take them: an axis at a place on the fuselage, and the turns that several compose.
+
+A surface on hinges 1..m, counted from the fuselage outward, stands at ``E_1 E_2 .. E_m`` applied to where it
+is at rest, each ``E_i`` a turn about the axis of hinge i where no hinge has moved (the product of
+exponentials; Murray, Li & Sastry 1994, section 3.2). So each hinge turns those after it and the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.frames import skew
+from morphdata import drives as documents
+from morphdata.drives import ANGLE_TOLERANCE_RAD, drive_name
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A revolute joint of prescribed motion; two are equal that turn alike, whatever drives them.
+
+    Attributes
+    ----------
+    drive : str
+        Name of the drive that turns it.
+    position_m : tuple of float
+        A point of its axis where no hinge has moved, from the fuselage reference point, in B.
+    axis_B : tuple of float
+        Unit vector of its axis where no hinge has moved; a positive angle is a right-handed turn about it.
+    min_rad, max_rad : float
+        Range of its angle.
+    angle_rad : float
+        Angle that is held where no history is given.
+    """
+
+    drive: str = field(compare=False)
+    position_m: Vector
+    axis_B: Vector
+    min_rad: float
+    max_rad: float
+    angle_rad: float = field(compare=False)
+
+    @classmethod
+    def of(cls, document: documents.Hinge, side: str) -> Hinge:
+        """Return the hinge that a document describes, of a surface of a side."""
+        x, y, z = document.position_m
+        return cls(
+            drive=drive_name(document, side),
+            position_m=(x, y, z),
+            axis_B=document.axis_B(side),
+            min_rad=document.min_rad,
+            max_rad=document.max_rad,
+            angle_rad=document.angle_rad,
+        )
+
+    def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
+        """Rows of a history of angles (k,) that lie beyond the range."""
+        low, high = self.min_rad - ANGLE_TOLERANCE_RAD, self.max_rad + ANGLE_TOLERANCE_RAD
+        return np.flatnonzero((angle_rad < low) | (angle_rad > high))
+
+    def rotation(self, angle_rad: Array) -> Array:
+        """Turns about the axis by angles (k,), (k, 3, 3): Rodrigues' formula."""
+        along = np.outer(self.axis_B, self.axis_B)
+        cosine, sine = np.cos(angle_rad)[:, None, None], np.sin(angle_rad)[:, None, None]
+        return np.asarray(along + cosine * (np.eye(3) - along) + sine * skew(self.axis_B))
+
+    @property
+    def reflection(self) -> Hinge:
+        """Its image on the other side of the x-z plane, which the same angle turns to the mirrored place."""
+        (x, y, z), (ax, ay, az) = self.position_m, self.axis_B
+        return Hinge(self.drive, (x, -y, z), (-ax, ay, -az), self.min_rad, self.max_rad, self.angle_rad)
+
+
+def hinge_arms(hinges: Sequence[Hinge], root_B: Array, offset: Array | None = None) -> Array:
+    """From each hinge (of a fixed surface: from the fuselage reference point) to a point at rest, (m, 3), m.
+
+    The point is ``root_B`` (3,), moved by ``offset`` (3,) if there is one.
+    """
+    pivots = np.array([hinge.position_m for hinge in hinges] or [(0.0, 0.0, 0.0)])
+    arms = root_B - pivots
+    return np.asarray(arms if offset is None else arms + offset)
+
+
+def hinged_pose(hinges: Sequence[Hinge], arms: Array, angles: Array) -> tuple[Array, Array]:
+    """Place of a surface for angles (k, m) of its m hinges; ``arms`` as of `hinge_arms`.
+
+    Returns
+    -------
+    R_BW : (k, 3, 3), wing components to body components.
+    r_B : (k, 3) where the point of the arms is, m.
+    """
+    count = angles.shape[0]
+    if not hinges:
+        return np.tile(np.eye(3), (count, 1, 1)), np.tile(arms[0], (count, 1))
+    # surface -> fuselage: each hinge turns what those after it have placed
+    pivot = np.array(hinges[-1].position_m)
+    R_BW = hinges[-1].rotation(angles[:, -1])
+    r_B = pivot + R_BW @ arms[-1]
+    for place in range(len(hinges) - 2, -1, -1):
+        pivot, turn = np.array(hinges[place].position_m), hinges[place].rotation(angles[:, place])
+        R_BW = turn @ R_BW
+        r_B = pivot + np.einsum("kij,kj->ki", turn, r_B - pivot)
+    return R_BW, r_B

@@ -1,0 +1,88 @@
+"""Relative motion across the hinges of a surface: their screws, twists and accelerations composed.
+
+Motion vectors have the angular part first, in W at a point of the surface. What lies between two hinges has
+no mass, so that a surface needs nothing of its hinges but their sum (Featherstone 2008, section 9.2): the
+batch pays for one joint whatever their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.geometry.hinge import Hinge
+
+Array = NDArray[np.float64]
+
+
+def relative_motion(
+    hinges: Sequence[Hinge], arms: Array, angles: Array, rates: Array, accelerations: Array
+) -> tuple[Array, Array]:
+    """Twist of a surface relative to the fuselage, and its time derivative in W.
+
+    Outward from hinge to hinge: ``v_i = X v_(i-1) + S qd``, ``a_i = X a_(i-1) + (X v_(i-1)) x S qd + S qdd``
+    (Featherstone 2008, table 5.1, of a base at rest); the middle term is Coriolis' between the hinges.
+
+    Parameters
+    ----------
+    hinges : sequence of Hinge
+        m hinges from the fuselage outward.
+    arms : ndarray, shape (m, 3)
+        From each to the point of the surface, at rest, m; see `hinge_arms`.
+    angles, rates, accelerations : ndarray, shape (k, m)
+        rad, rad/s, rad/s^2.
+
+    Returns
+    -------
+    twist, acceleration : ndarray, shape (k, 6)
+        Angular and linear part, rad/s and m/s, rad/s^2 and m/s^2.
+    """
+    twist, acceleration = np.zeros((2, angles.shape[0], 6))
+    for place, (hinge, arm) in enumerate(zip(hinges, arms, strict=False)):
+        screw = _screw(hinge, arm)
+        own = screw * rates[:, place, None]
+        change = screw * accelerations[:, place, None]
+        if place == 0:
+            twist, acceleration = own, change
+            continue
+        turn = hinge.rotation(angles[:, place])
+        twist = _carried(turn, arm, twist)
+        acceleration = _carried(turn, arm, acceleration) + _cross(twist, own) + change
+        twist = twist + own
+    return twist, acceleration
+
+
+def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array) -> Array:
+    """Twist of a surface for a unit rate of each of its hinges, (k, m, 6), in W at a point of it."""
+    out = np.empty((angles.shape[0], len(hinges), 6))
+    for place, (hinge, arm) in enumerate(zip(hinges, arms, strict=False)):
+        turn = hinge.rotation(angles[:, place])
+        for inner in range(place):
+            out[:, inner] = _carried(turn, arm, out[:, inner])
+        out[:, place] = _screw(hinge, arm)
+    return out
+
+
+def _screw(hinge: Hinge, arm: Array) -> Array:
+    """Twist (6,) of what a hinge carries for its unit rate, at a point ``arm`` from its axis."""
+    return np.concatenate([hinge.axis_B, np.cross(hinge.axis_B, arm)])
+
+
+def _carried(turn: Array, arm: Array, motion: Array) -> Array:
+    """Motion vectors (k, 6) of what is inboard of a hinge, seen from outboard of it.
+
+    turn : (k, 3, 3) of the hinge. arm : (3,) from its axis to the point; both frames have their origins at
+    that point at rest, and the hinge has moved the outer one's by ``turn arm - arm``.
+    """
+    angular, linear = motion[:, :3], motion[:, 3:]
+    moved = linear + np.cross(angular, turn @ arm - arm)
+    return np.concatenate([np.einsum("kji,kj->ki", turn, part) for part in (angular, moved)], axis=1)
+
+
+def _cross(first: Array, second: Array) -> Array:
+    """Motion cross product (k, 6); Featherstone (2008), equation 2.31."""
+    angular = np.cross(first[:, :3], second[:, :3])
+    linear = np.cross(first[:, :3], second[:, 3:]) + np.cross(first[:, 3:], second[:, :3])
+    return np.concatenate([angular, linear], axis=1)

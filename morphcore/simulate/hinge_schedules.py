@@ -1,0 +1,127 @@
+"""Who moves which hinge: schedules by drive, documents and measured flights as a schedule for every hinge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from morphcore.errors import InvalidInput
+from morphcore.geometry.aircraft import Aircraft
+from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
+from morphcore.simulate.trajectory import Trajectory
+from morphdata import schedules as documents
+from morphdata.drives import resolved, shown_names, unmeasured_sides
+from morphdata.faults import Fault, refuse
+from morphdata.samples import columns_of_aircraft, no_drive
+
+Schedules = Mapping[str, Schedule] | documents.Schedules | Trajectory
+Followed = dict[str, tuple[str, Schedule]]  # drive -> key of the history it follows, and that
+
+
+def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = "/schedules") -> Followed:
+    """Find out what each drive does.
+
+    Parameters
+    ----------
+    schedules : by the names of drives, their words (``sweep``, of both sides), ``both``, ``left`` or
+        ``right`` where no other drive could be meant; a document of such; or a flight whose measured angles
+        are followed.
+
+    Returns
+    -------
+    dict
+        Drive -> the key that moves it and its schedule; a drive that nothing moves is not in it.
+
+    Raises
+    ------
+    InvalidInput
+        A key names no drive of the aircraft, could mean several, or moves what another one moves.
+    """
+    if isinstance(schedules, Trajectory):
+        return followed_flight(aircraft, schedules, pointer)
+    if isinstance(schedules, documents.Schedules):
+        moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
+        keys = schedules.keys_by_drive(aircraft.drives)
+        return {name: (key, moved[key]) for name, key in keys.items()}
+    if not isinstance(schedules, Mapping):
+        raise InvalidInput(
+            "the schedules do not say what they move",
+            pointer=pointer,
+            hint=f"give them by drive: {shown_names(aircraft.drives) or 'the aircraft has none'}",
+        )
+    keys, faults = resolved(schedules, aircraft.drives)
+    refuse(fault.under(pointer) for fault in faults)
+    return {name: (key, schedules[key]) for name, key in keys.items()}
+
+
+def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Followed:
+    """Find out which measured angles each drive follows; one that was not measured is not in it.
+
+    Columns of a file that are no drives of the aircraft are left alone.
+
+    Raises
+    ------
+    InvalidInput
+        No angle moves a drive, one could mean several or none at all, or one side alone was measured.
+    """
+    drives = aircraft.drives
+    faults: list[Fault] = []
+    if flight.of_file:
+        try:
+            keys = columns_of_aircraft(list(flight.drives), flight.unreadable, drives)
+        except InvalidInput as error:
+            raise InvalidInput(f"{flight.name}: {error.message}", pointer=pointer, hint=error.hint) from None
+    else:
+        keys, faults = resolved(flight.drives, drives)
+        if drives and not flight.drives:
+            faults = [no_drive(drives)]
+    faults = faults or list(unmeasured_sides(keys, drives))
+    refuse(
+        replace(fault, pointer=f"{fault.pointer}_rad" if fault.pointer else "").under(pointer)
+        for fault in faults
+    )
+    return {name: (key, Tabulated(flight.time_s, flight.drives[key])) for name, key in keys.items()}
+
+
+def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Trajectory:
+    """Return a flight without those columns of its file that are no drives of the aircraft.
+
+    Raises
+    ------
+    InvalidInput
+        As of `followed_flight`.
+    """
+    keys = {key for key, _ in followed_flight(aircraft, flight, pointer).values()}
+    if keys == set(flight.drives):
+        return flight
+    drives = {name: angles for name, angles in flight.drives.items() if name in keys}
+    return replace(flight, drives=drives)
+
+
+def hinge_schedules(aircraft: Aircraft, followed: Followed) -> list[Schedule]:
+    """Return the schedule of every hinge, in the aircraft's order; where nothing moves it, its held angle."""
+    return [
+        followed[hinge.drive][1] if hinge.drive in followed else Hold(hinge.angle_rad)
+        for hinge in aircraft.hinges
+    ]
+
+
+def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, pointer: str) -> None:
+    """Raise InvalidInput where a drive is taken beyond the range of one of its hinges at times (k,), s."""
+    for surface in aircraft.surfaces:
+        for hinge in surface.hinges:
+            if hinge.drive not in followed:
+                continue
+            key, schedule = followed[hinge.drive]
+            angle = schedule.motion(times_s).angle
+            outside = hinge.beyond_range(angle)
+            if outside.size:
+                row = outside[0]
+                raise InvalidInput(
+                    f"the hinge {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} rad at "
+                    f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                    pointer=f"{pointer}/{key}",
+                    hint="lower the angles, or widen the hinge's range; a spline can go beyond its knots",
+                )
