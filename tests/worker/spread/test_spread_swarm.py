@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from app.database import Database, upgrade
+from app.database import Database
 from app.jobs.reaper import reap
 from app.tables import job_chunks
 from morphcore.lanes import TOGETHER
 from tests.identification_request import identification
+from tests.servers.stores import migrated_sqlite
 from tests.worker.spread.processes import Workers, spread
 from worker.attempt import Ending
 from worker.numerics import Kernels, warm_up_library
@@ -37,8 +38,7 @@ def test_a_spread_search_is_the_search(tmp_path: Path, search: dict[str, Any], l
     Wall times are left out: no two runs share them. What the kind of database could change is under test with
     flocks.
     """
-    url = f"sqlite:///{tmp_path / 'jobs.sqlite3'}"
-    upgrade(url)
+    url = migrated_sqlite(tmp_path / "jobs.sqlite3")
     database = Database(url)
     kernels = Kernels(warm_up_library, threads=1)
     kernels.wait(lambda: False, poll_s=0.01)
