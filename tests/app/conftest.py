@@ -34,12 +34,15 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 @pytest.fixture(params=["sqlite", "postgres"])
-def migrated_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+def migrated_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     """URL of a migrated database without rows, once per kind."""
     if request.param == "sqlite":
-        return migrated_sqlite(tmp_path / "store.sqlite3")
-    url: str = request.getfixturevalue("postgres_server").migrated_database()
-    return url
+        yield migrated_sqlite(tmp_path / "store.sqlite3")
+        return
+    server = request.getfixturevalue("postgres_server")
+    url = server.migrated_database()
+    yield url
+    server.take_back(url)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import httpx
 import uvicorn
 
 from app.database import Database
-from app.http.server import guarded_config
+from app.http.server import KEEP_ALIVE_S, guarded_config
 from app.jobs import store
 from app.jobs.records import Claim
 from app.main import create_app
@@ -26,6 +26,8 @@ NOTHING_IS_SENT = SenderSettings(
     TO_LOOPBACK, poll_s=3600.0
 )  # addresses are checked, as if loopback were public
 START_S = 20.0
+# a kept connection is used again well before the server may close it, or a request meets its end
+KEPT = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S / 5)
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def running_service(
     url = f"http://127.0.0.1:{port}"
     database = Database(settings.database_url)
     try:
-        with httpx.Client(base_url=url, timeout=30.0) as client:
+        with httpx.Client(base_url=url, timeout=30.0, limits=KEPT) as client:
             yield RunningService(url, client, database, settings)
     finally:
         server.should_exit = True
