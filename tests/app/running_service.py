@@ -20,6 +20,7 @@ from app.main import create_app
 from app.settings import Settings
 from app.webhooks.sender import SenderSettings
 from tests.app.webhooks.receiver import TO_LOOPBACK
+from tests.plain_http import CERTIFICATES
 
 DEAD_BROKER = "redis://127.0.0.1:1/0"  # nothing listens there: every test runs with the broker away
 NOTHING_IS_SENT = SenderSettings(
@@ -81,7 +82,7 @@ def running_service(
     url = f"http://127.0.0.1:{port}"
     database = Database(settings.database_url)
     try:
-        with httpx.Client(base_url=url, timeout=30.0, limits=KEPT) as client:
+        with httpx.Client(base_url=url, timeout=30.0, limits=KEPT, verify=CERTIFICATES) as client:
             yield RunningService(url, client, database, settings)
     finally:
         server.should_exit = True

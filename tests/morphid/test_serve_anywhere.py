@@ -94,7 +94,8 @@ def life(tmp_path_factory: pytest.TempPathFactory, dead_proxies: dict[str, str])
         processes = tree(service)
         os.kill(service.children["api"], signal.SIGKILL)
         announced = [service.next_event()["message"] for _ in range(2)]
-        until(lambda: answers(service.url), 60.0)
+        with httpx.Client(base_url=service.url, timeout=1.0, trust_env=False) as client:
+            until(lambda: answers(client), 60.0)
         processes += tree(service)
         ending = Watch(home)
         with ending:
@@ -146,10 +147,10 @@ def tree(service: LiveService) -> list[psutil.Process]:
     return [top, *top.children(recursive=True)]
 
 
-def answers(url: str) -> bool:
+def answers(client: httpx.Client) -> bool:
     """Whether the API answers."""
     try:
-        return httpx.get(f"{url}/livez", timeout=1.0, trust_env=False).is_success
+        return client.get("/livez").is_success
     except httpx.TransportError:
         return False
 
