@@ -94,7 +94,8 @@ faults: setup  ## kill, stop, fill and mislead every process, on both pairs of d
 	@$(SIDE_BY_SIDE) faults-postgres faults-others
 	@$(FAULT_TESTS) -m timed
 
-FAULT_TESTS := $(BIN)/pytest -q -s tests/faults --timeout 900
+SPREAD_KILL := tests/worker/spread/test_spread_swarm.py::test_a_killed_process_costs_its_chunk
+FAULT_TESTS := $(BIN)/pytest -q -s tests/faults $(SPREAD_KILL) --timeout 900
 
 faults-postgres: setup
 	@$(FAULT_TESTS) -m "not timed" -k postgres
