@@ -23,8 +23,8 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
 from morphcore.validity import documents
+from morphdata.drives import SIDES
 from morphdata.parameters import KnownModel, flown_with
-from morphdata.schedules import SIDES
 from morphdata.simulate import DEFAULT_ELEMENTS, FlexibleModel, FlightModel, SimulateRequest
 
 Array = NDArray[np.float64]
