@@ -51,10 +51,10 @@ demo: $(VENV)/.stamp-server  ## identify a model from the example flights throug
 serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 	@exec $(BIN)/morphid serve
 
-# three suites at a time on two cores: tests of services wait for processes, sockets and limits of time while
-# the library calculates. The longest begin first.
+# all suites at once, on two cores too: tests of services wait for processes, sockets and limits of time while
+# the library calculates, and no core is idle at the end
 test: setup  ## the tests (some five minutes on two cores)
-	@$(call timed,$(AT_ONCE) --jobs=3 test-library test-command test-services test-api)
+	@$(call timed,$(AT_ONCE) --jobs=4 test-api test-library test-command test-services)
 
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
