@@ -17,9 +17,11 @@ import pytest
 from app.jobs import store
 from tests.app.request_documents import identify_document
 from tests.app.running_service import DEAD_BROKER
+from tests.waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
 START_S = 2.0
+ALIVE_S = 120.0  # in vain: a busy machine writes byte code for long
 
 LOADED = """
 import asyncio, json, sys
@@ -78,15 +80,14 @@ def _serve(environment: dict[str, str], port: int) -> subprocess.Popen[bytes]:
 
 
 def _wait_until_alive(url: str) -> None:
+    def answers() -> bool:
+        try:
+            return client.get("/livez").is_success
+        except httpx.TransportError:
+            return False
+
     with httpx.Client(base_url=url) as client:
-        for _ in range(1000):
-            try:
-                client.get("/livez")
-            except httpx.TransportError:
-                time.sleep(0.02)
-            else:
-                return
-    raise TimeoutError
+        until(answers, ALIVE_S)
 
 
 def _free_port() -> int:
