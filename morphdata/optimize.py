@@ -32,6 +32,7 @@ DURATIONS_TRIED = 10  # on the way to the shortest
 
 Verify = Literal["flexible", "none"]
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
+DriveName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,45}$")]
 
 
 class SearchedModel(KnownModel):
@@ -41,12 +42,13 @@ class SearchedModel(KnownModel):
 
 
 class Morph(Document):
-    """The change of shape that is wanted; all hinges of the drive that morphs follow one schedule."""
+    """The change of shape that is wanted: one schedule for a kind of drive, or for a single one."""
 
-    drive: Annotated[Annotated[str, Field(max_length=64)] | None, Option("--drive", MORPH)] = Field(
+    drive: Annotated[DriveName | None, Option("--drive", MORPH)] = Field(
         default=None,
-        description="What morphs: the word of a drive (`sweep`, both sides), or the name of one "
-        "(`sweep_left`). Left out: the only word of the aircraft.",
+        description="What morphs: the word of a kind of drive, `fold`, of which both sides follow the "
+        "schedule, or the name of one, `fold_left`. Needed where the aircraft has several kinds; the others "
+        "hold their angles.",
     )
     initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
         default=0.0, description="Sweep before the morph, rad."
