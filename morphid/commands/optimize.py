@@ -41,12 +41,12 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
     from morphcore.simulate.schedule_table import write_schedule_csv
     from morphid.running import wrote
 
-    found = result["schedule"]
+    found, moved = result["schedule"], result.get("drives", ("sweep_left", "sweep_right"))
     spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
-        write_schedule_csv(dict.fromkeys(sorted(result["drives"]), spline), times, path)
+        write_schedule_csv(dict.fromkeys(sorted(moved), spline), times, path)
     wrote(path)
 
 
