@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import math
 import reprlib
 from collections.abc import Iterator
 from functools import cache
@@ -24,7 +23,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from morphdata.faults import Fault, InvalidInput
-from morphdata.refusals import FAULTS, faults_of
+from morphdata.refusals import FAULTS, HALF_TURN_RAD, faults_of
 from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
@@ -177,7 +176,6 @@ def _whole(value: Any) -> Any:
 
 
 Length = Annotated[float, Field(gt=0.0, le=1000.0)]
-HALF_TURN_RAD = math.pi + 1e-9  # an angle written in degrees is rounded
 Angle = Annotated[float, Field(ge=-HALF_TURN_RAD, le=HALF_TURN_RAD)]
 Vector3 = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
 Position = Annotated[list[Annotated[float, Field(ge=-1000.0, le=1000.0)]], Field(min_length=3, max_length=3)]
@@ -194,6 +192,5 @@ TimeSeries = Annotated[
 ]
 AngleSeries = Annotated[
     list[Annotated[float, Field(ge=-1e6, le=1e6)]],  # what is no angle, `samplefiles.flight` says with a hint
-    FailFast(),
-    Field(min_length=MIN_ROWS, max_length=MAX_ROWS),
+    Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,16 +12,21 @@ from pydantic import Field
 
 from morphdata.base import Angle, Document, Position
 from morphdata.faults import Fault
-from morphdata.refusals import escaped
+from morphdata.refusals import MAX_POINTER, escaped
+from morphdata.samplefiles.titles import CHANNELS
 
 HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
 MAX_HINGES = 4  # of one surface
 WORDS = {"x": "fold", "y": "incidence", "z": "sweep"}  # of a hinge that has no name
 SIDES = ("left", "right")
 BOTH = "both"
+SWEEPS = tuple(f"{WORDS['z']}_{side}" for side in SIDES)
 # columns of samples and keys of schedules that mean something else
-RESERVED = frozenset({"t", "time", "phi", "theta", "psi", BOTH, *SIDES})
+RESERVED = frozenset({"time", *CHANNELS, BOTH, *SIDES})
 SAME_AXIS = 1e-9  # distance of two unit vectors
+ANGLE_TOLERANCE_RAD = 1e-6  # measured angles are not exactly zero
+MAX_LISTED = 20  # columns of a file in an error
+SHOWN_KEY = 60  # characters of a key that a stranger wrote
 
 Side = Literal["right", "left"]
 Vector = tuple[float, float, float]
@@ -147,6 +153,23 @@ class Drive:
     high: float
     held: float
 
+    def fault(self, angle_rad: float, pointer: str) -> Fault | None:
+        """Return what is wrong with an angle that the drive is moved to; None where it is in range."""
+        if self.low - ANGLE_TOLERANCE_RAD <= angle_rad <= self.high + ANGLE_TOLERANCE_RAD:
+            return None
+        of = "Its hinge on" if len(self.surfaces) == 1 else "Its hinges on"
+        hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
+        hint += f"from {self.low:g} to {self.high:g} rad."
+        if abs(angle_rad) > math.pi:
+            hint += f" Is the angle in degrees? A column may say so in its name: {self.name}_deg."
+        return Fault(
+            # the code of old for sweep, of which clients know
+            "sweep_out_of_range" if self.word == WORDS["z"] else "angle_out_of_range",
+            f"{self.name} is {angle_rad:g} rad.",
+            pointer,
+            f"{hint} Correct the angle, or the hinge's min_rad and max_rad.",
+        )
+
 
 def drive_name(hinge: Hinge, side: str) -> str:
     """Return the name of the drive that moves a hinge of a surface of a side."""
@@ -253,6 +276,81 @@ def resolved(keys: Iterable[str], drives: Mapping[str, Drive]) -> tuple[dict[str
     return followed, faults
 
 
+def resolved_columns(
+    titles: Iterable[str], drives: Mapping[str, Drive]
+) -> tuple[dict[str, str], list[Fault]]:
+    """Find out which column of a file each drive follows, and leave the other columns alone.
+
+    A column that bears the name of a drive counts before one with the word of both sides, and that before
+    `sweep_left` and `sweep_right` in their old meaning, the hinge of that side whatever its kind.
+
+    Parameters
+    ----------
+    titles : iterable of str
+        Columns that could be drives, without their units.
+    drives : mapping of str to Drive
+        Of the aircraft.
+
+    Returns
+    -------
+    columns_of_drives : dict
+        Drive -> column; a drive that no column moves is not in it.
+    faults : list of Fault
+        Columns that could mean several drives, or move what another moves, and a file without any column
+        that moves a drive, at "".
+    """
+    titles = list(titles)
+    words = {drive.word for drive in drives.values() if drive.name not in titles}
+    named = [title for title in titles if title in drives or title in words]
+    followed, faults = resolved(named, drives)
+    others = [title for title in titles if title in SWEEPS and title not in named]
+    for title in others:
+        meant, fault = _meant(title, drives)
+        if fault is None:
+            followed.update({name: title for name in meant if name not in followed})
+        elif fault.code == "ambiguous_drive" and not named:
+            faults.append(fault)
+    if drives and not followed and not faults:
+        faults.append(
+            Fault(
+                "no_drive",
+                f"None of the columns {_listed(titles)} moves a drive of the aircraft."
+                if titles
+                else "No column moves a drive of the aircraft.",
+                "",
+                f"Call the columns after its drives: {shown_names(drives)}; the unit may follow "
+                f"({next(iter(drives))}_deg).",
+            )
+        )
+    return followed, faults
+
+
+def unmeasured_sides(followed: Mapping[str, str], drives: Mapping[str, Drive]) -> Iterator[Fault]:
+    """Check that a word which is measured on one side is measured on the other, too; faults at ``/drive``."""
+    for name, drive in drives.items():
+        other = next((side for side in SIDES if side != drive.side), "")
+        counterpart = f"{drive.word}_{other}"
+        if name not in followed and counterpart in followed:
+            key = followed[counterpart]
+            yield Fault(
+                "missing",
+                f"{key} is given, and {_named_like(key, drive)} is missing.",
+                f"/{escaped(_named_like(key, drive))}",
+                f"Add {_named_like(key, drive)}, or, where both sides moved alike, call the one column "
+                f"{drive.word}.",
+            )
+
+
+def _named_like(key: str, drive: Drive) -> str:
+    """Return what a drive's column is called beside one of the other side: as that is, the side exchanged."""
+    return f"{WORDS['z']}_{drive.side}" if key in SWEEPS else drive.name
+
+
+def _listed(titles: Sequence[str]) -> str:
+    shown = ", ".join(title[:SHOWN_KEY] for title in titles[:MAX_LISTED])
+    return f"{shown}, ..." if len(titles) > MAX_LISTED else shown
+
+
 def _meant(key: str, drives: Mapping[str, Drive]) -> tuple[list[str], Fault | None]:
     if key in drives:
         return [key], None
@@ -261,21 +359,28 @@ def _meant(key: str, drives: Mapping[str, Drive]) -> tuple[list[str], Fault | No
         return of_word, None
     side = key.removeprefix(f"{WORDS['z']}_")
     if key != BOTH and side not in SIDES:
-        return [], Fault(
-            "unknown_drive",
-            f"The aircraft has no drive {key!r}.",
-            f"/{escaped(key)}",
-            f"Its drives are {shown_names(drives)}." if drives else "None of its surfaces has a hinge.",
-        )
+        return [], _unknown(key, drives)
     candidates = [drive for drive in drives.values() if key == BOTH or drive.side == side]
     if len({drive.word for drive in candidates}) > 1:
         return [], Fault(
             "ambiguous_drive",
-            f"{key!r} could mean several drives.",
+            f"{key!r} could mean several drives: {', '.join(drive.name for drive in candidates)}.",
             f"/{escaped(key)}",
             f"Name them: {shown_names(drives)}.",
         )
     return [drive.name for drive in candidates], None
+
+
+def _unknown(key: str, drives: Mapping[str, Drive]) -> Fault:
+    words = dict.fromkeys(drive.word for drive in drives.values())
+    near = difflib.get_close_matches(key, [*drives, *words], n=1)
+    guess = f"Did you mean {near[0]!r}? " if near else ""
+    return Fault(
+        "unknown_drive",
+        f"The aircraft has no drive {key[:SHOWN_KEY]!r}.",
+        f"/{escaped(key)}"[:MAX_POINTER],
+        f"{guess}Its drives are {shown_names(drives)}." if drives else "None of its surfaces has a hinge.",
+    )
 
 
 def shown_names(drives: Mapping[str, Drive]) -> str:
@@ -284,3 +389,8 @@ def shown_names(drives: Mapping[str, Drive]) -> str:
     pairs = [word for word in words if all(f"{word}_{side}" in drives for side in SIDES)]
     both = f" (or {', '.join(pairs)} for both sides)" if pairs else ""
     return f"{', '.join(drives)}{both}"
+
+
+def label(name: str) -> str:
+    """Return the name of a drive for people: `fold left`."""
+    return name.replace("_", " ")

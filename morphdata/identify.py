@@ -19,7 +19,7 @@ from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
+from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
@@ -241,13 +241,9 @@ class SamplesRequest(Request):
         yield from samples_faults(self.samples)
         samples = self.inline_samples()
         yield from total_rows_faults(sum(len(sample.time_s) for sample in samples.values()))
-        hinges = hinge_ranges(self.aircraft)
+        drives = self.aircraft.drives
         for number, sample in samples.items():
-            for side, hinge in hinges.items():
-                column = sample.sweep_left_rad if side == "left" else sample.sweep_right_rad
-                pointer = f"/samples/{number}/sweep_{side}_rad"
-                faults = (hinge.fault(side, angle, f"{pointer}/{row}") for row, angle in enumerate(column))
-                yield from (fault for fault in (next(filter(None, faults), None),) if fault is not None)
+            yield from (fault.under(f"/samples/{number}") for fault in sample.drive_faults(drives))
 
 
 def total_rows_faults(total: int) -> Iterator[Fault]:

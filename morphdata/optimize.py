@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import islice
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Angle, Document, Result
+from morphdata.drives import Drive, resolved, shown_names
 from morphdata.execution import Request
-from morphdata.faults import Fault
+from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
 from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
+from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
@@ -51,10 +54,10 @@ class Morph(Document):
         "hold their angles.",
     )
     initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
-        default=0.0, description="Sweep before the morph, rad."
+        default=0.0, description="Angle of the drive before the morph, rad."
     )
     final_rad: Annotated[Angle, Option("--final", MORPH)] = Field(
-        description="Sweep at the end of the morph, rad."
+        description="Angle of the drive at the end of the morph, rad."
     )
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)] = Field(
         description="Time that the morph takes, s; of the goals `minimum_time` and `pareto` the longest that "
@@ -89,6 +92,34 @@ class Morph(Document):
     def change_rad(self) -> float:
         """By how much the angle changes, rad, with its sign."""
         return self.final_rad - self.initial_rad
+
+    def named_drive(self, drives: Mapping[str, Drive]) -> str:
+        """Return the drive that morphs, or its word: as given, else the only word of the aircraft."""
+        return self.drive or next(iter(drives.values())).word
+
+    def moved(self, drives: Mapping[str, Drive]) -> tuple[str, ...]:
+        """List the drives of an aircraft that follow the schedule.
+
+        Raises
+        ------
+        InvalidInput
+            The aircraft has no such drive, or several kinds of which none is named; at ``/morph/drive``.
+        """
+        words = list(dict.fromkeys(drive.word for drive in drives.values()))
+        if self.drive is None and len(words) > 1:
+            refuse(
+                [
+                    Fault(
+                        "missing",
+                        f"The aircraft has several kinds of drives: {', '.join(words)}.",
+                        "/morph/drive",
+                        f"Name the one that morphs: {shown_names(drives)}.",
+                    )
+                ]
+            )
+        keys, faults = resolved(words if self.drive is None else [self.drive], drives)
+        refuse(replace(fault, pointer="/morph/drive") for fault in faults)
+        return tuple(keys)
 
     def faults(self) -> Iterator[Fault]:
         """Check that the angle changes, and that the goal has what it needs."""
@@ -270,16 +301,20 @@ class OptimizeRequest(Request):
             )
 
     def _hinge_faults(self) -> Iterator[Fault]:
-        hinges = hinge_ranges(self.aircraft)
-        if not hinges:
+        drives = self.aircraft.drives
+        if not drives:
             yield Fault(
                 "nothing_to_morph", "No surface has a hinge.", "/aircraft/surfaces", "Give the wings hinges."
             )
+            return
+        try:
+            moved = self.morph.moved(drives)
+        except InvalidInput as error:
+            yield from error.faults
+            return
         for name in ("initial_rad", "final_rad"):
             angle, at = getattr(self.morph, name), f"/morph/{name}"
-            fault = next(filter(None, (hinge.fault(side, angle, at) for side, hinge in hinges.items())), None)
-            if fault is not None:
-                yield fault
+            yield from islice(filter(None, (drives[each].fault(angle, at) for each in moved)), 1)
 
     def _time_faults(self) -> Iterator[Fault]:
         morph, limits = self.morph, self.limits
@@ -306,8 +341,17 @@ class ScheduleCost(Result):
 class FoundSchedule(Result):
     """A clamped cubic spline: at rest at both ends."""
 
+    drive: str | None = Field(
+        default=None,
+        description="What follows it, as `morph.drive`; null in results of earlier versions, whose aircraft "
+        "had one kind of hinge.",
+    )
     knot_time_s: list[float]
-    knot_sweep_rad: list[float]
+    knot_angle_rad: list[float] | None = Field(
+        default=None,
+        description="Angles at the knots; results of earlier versions have `knot_sweep_rad` only.",
+    )
+    knot_sweep_rad: list[float] = Field(description="The same as `knot_angle_rad`, under its former name.")
 
 
 class KeptLimits(Result):
@@ -339,6 +383,7 @@ class OptimizeResult(Result):
     schedule: FoundSchedule | None = Field(
         description="null in a partial result whose best schedule never flew to its end."
     )
+    drives: list[str] = Field(default=[], description="Names of the drives that follow the schedule.")
     limits: KeptLimits
     variation: Variations
     reduction_percent: float | None = Field(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 
@@ -14,6 +15,7 @@ from morphdata.faults import Fault
 MAX_FAULTS = 20
 MAX_POINTER = 300  # characters: a field's name may be a megabyte
 SHOWN_CHARACTERS = 60  # of an offending value
+HALF_TURN_RAD = math.pi + 1e-9  # an angle written in degrees is rounded
 FAULTS = "faults"  # type of the errors that carry what `Document.faults` found
 
 HINTS = {
@@ -31,6 +33,7 @@ HINTS = {
     "too_short": "Give more items.",
     "too_long": "Give fewer items: leave out rows (10 ms steps are enough) or split the flight.",
 }
+HALF_TURNS = (HALF_TURN_RAD, -HALF_TURN_RAD)  # bounds of angles
 BOUNDS = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
 
 
@@ -125,7 +128,8 @@ def _sentence(error: Mapping[str, Any], pointer: str) -> str:
 def _hint(kind: str, context: Mapping[str, Any]) -> str:
     for key, words in BOUNDS.items():
         if key in context and kind.startswith(("greater", "less")):
-            return f"It must be {words} {context[key]:g}."
+            degrees = " Is it in degrees?" if context[key] in HALF_TURNS else ""
+            return f"It must be {words} {context[key]:g}.{degrees}"
     if kind.startswith("union_tag"):
         tags = context.get("expected_tags")
         return f"Give {context.get('discriminator', 'a kind')}: {tags or 'one of the documented kinds'}."
@@ -156,10 +160,13 @@ def _models_at(path: Sequence[str | int], model: type[BaseModel]) -> list[type[B
     models = [model]
     for part in path:
         fields = [each.model_fields[part] for each in models if part in each.model_fields]
+        tagged = [each for each in models if part in _tags(each)]
         if fields:
             models = [inner for field in fields for inner in _models_in(field.annotation)]
-        elif isinstance(part, str):  # the tag of a union
-            models = [each for each in models if part in _tags(each)] or models
+        elif tagged:  # the tag of a union
+            models = tagged
+        elif isinstance(part, str):  # a key of a mapping
+            models = [inner for each in models for inner in _models_in(_further(each))] or models
     return models
 
 
@@ -167,6 +174,14 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and get_origin(annotation) is None:
         return [annotation] if issubclass(annotation, BaseModel) else []
     return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+@cache
+def _further(model: type[BaseModel]) -> Any:
+    """Annotation of what a model takes beside its fields; None where it takes nothing, or no models."""
+    if model.model_config.get("extra") != "allow":
+        return None
+    return get_type_hints(model, include_extras=True)["__pydantic_extra__"]
 
 
 @cache

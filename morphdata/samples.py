@@ -1,18 +1,30 @@
-"""Sample flights: measured sweep and attitude over time, inline or by reference to an uploaded trajectory."""
+"""Sample flights: measured drives and attitude over time, inline or by reference to an uploaded flight."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic_core import PydanticKnownError
 
 from morphdata.base import AngleSeries, Document, Identifier, SampleName, TimeSeries
-from morphdata.faults import Fault
-from morphdata.samplefiles.fault import as_sentence
+from morphdata.drives import (
+    RESERVED,
+    SWEEPS,
+    Drive,
+    resolved,
+    resolved_columns,
+    shown_names,
+    unmeasured_sides,
+)
+from morphdata.faults import Fault, InvalidInput, refuse
+from morphdata.samplefiles.fault import as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import read_flight
+from morphdata.samplefiles.titles import DEGREE, DRIVE
 
 Role = Literal["train", "held_out"]
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
@@ -28,35 +40,157 @@ EXAMPLE_SAMPLE: dict[str, Any] = {
     "psi_rad": [0.0, 0.0, 0.0, 0.0],
     "weight": 1.0,
 }
+EXAMPLE_FOLD: dict[str, Any] = {
+    name: values for name, values in EXAMPLE_SAMPLE.items() if not name.startswith("sweep")
+} | {"name": "fold_30", "sweep_rad": [0.0, 0.0, 0.001, 0.003], "fold_left_deg": [0.0, 0.0, 0.1, 0.3]}
+UNITS = {"_rad": 1.0, "_deg": DEGREE}  # of the columns of drives inline
+# columns of a simulated trajectory, which can be a sample as it is; they are not used
+CHANNEL_UNITS = {
+    **dict.fromkeys(("p", "q", "r"), "rad_s"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m_s"),
+    **dict.fromkeys(("x", "y", "z", "tip_left_z", "tip_right_z"), "m"),
+}
+CHANNEL_FIELDS = frozenset(f"{name}_{unit}" for name, unit in CHANNEL_UNITS.items())
+
+
+ATTITUDE_FIELDS = ("phi_rad", "theta_rad", "psi_rad")
+MISSPELT = 0.9  # so near to one of them no column is that of a drive
+
+
+def _column(name: str) -> str:
+    """Take the name of a further column: of a drive with its unit, or of a channel."""
+    if name in CHANNEL_FIELDS:
+        return name
+    key = drive_key(name)
+    misspelt = difflib.get_close_matches(name, ATTITUDE_FIELDS, n=1, cutoff=MISSPELT)
+    if key is None or not DRIVE.fullmatch(key) or key in RESERVED or misspelt:
+        raise PydanticKnownError("extra_forbidden")
+    return name
+
+
+def drive_key(field: str) -> str | None:
+    """Return the drive, or the word of both sides, of a column inline; None of all other columns."""
+    key, unit = field[:-4], field[-4:]
+    return key if unit in UNITS and field not in CHANNEL_FIELDS else None
 
 
 class TrajectoryColumns(Document):
-    """Columns of one flight, equally long; time rises, steps may be uneven."""
+    """Columns of one flight, equally long; time rises, steps may be uneven.
+
+    Every drive of the aircraft may have its column, `fold_left_rad`, or both sides of a kind one,
+    `fold_rad`; with `_deg` for `_rad` in degrees.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    __pydantic_extra__: dict[Annotated[str, AfterValidator(_column)], AngleSeries] = Field(init=False)
 
     time_s: TimeSeries
-    sweep_left_rad: AngleSeries = Field(description="Hinge angle of the left surfaces, positive aft.")
-    sweep_right_rad: AngleSeries = Field(description="Hinge angle of the right surfaces, positive aft.")
+    sweep_left_rad: AngleSeries | None = Field(
+        default=None,
+        description="Angle of the drive `sweep_left`, positive aft; of an aircraft whose left side has only "
+        "another kind of hinge, the angle of that.",
+    )
+    sweep_right_rad: AngleSeries | None = Field(
+        default=None, description="The same of the right side, positive aft."
+    )
     phi_rad: AngleSeries = Field(description="Roll (z-y-x Euler angles, body FRD against earth NED).")
     theta_rad: AngleSeries = Field(description="Pitch.")
     psi_rad: AngleSeries = Field(description="Yaw.")
 
+    @property
+    def drive_fields(self) -> dict[str, str]:
+        """Field of each column of a drive, by the drive's name or the word of both sides."""
+        given = [field for field in (INLINE[name] for name in SWEEPS) if getattr(self, field) is not None]
+        given += self.model_extra or {}
+        return {key: field for field in given if (key := drive_key(field)) is not None}
+
+    @property
+    def drives(self) -> dict[str, list[float]]:
+        """Angles of each column of a drive, rad, by the drive's name or the word of both sides."""
+        return {key: self._angles(field) for key, field in self.drive_fields.items()}
+
+    def _angles(self, field: str) -> list[float]:
+        angles: list[float] = getattr(self, field)
+        factor = UNITS[field[-4:]]
+        return angles if factor == 1.0 else [factor * angle for angle in angles]
+
     def faults(self) -> Iterator[Fault]:
         """The columns are those of a flight."""
-        named = {name: getattr(self, field) for name, field in INLINE.items()}
-        for fault in flight_faults(named, INLINE):
+        fields = {**{name: INLINE[name] for name in ("t", "phi", "theta", "psi")}, **self.drive_fields}
+        yield from self._repeated_faults(fields)
+        named = {name: getattr(self, field) for name, field in fields.items()} | self.drives
+        for fault in flight_faults(named, fields):
             row = "" if fault.row is None else f"/{fault.row}"
             yield Fault(
                 fault.code,
                 as_sentence(fault.detail),
-                f"/{INLINE[fault.title or 't']}{row}",
+                f"/{fields[fault.title or 't']}{row}",
                 as_sentence(fault.hint),
             )
+
+    def _repeated_faults(self, fields: Mapping[str, str]) -> Iterator[Fault]:
+        """No drive is given in rad and in degrees."""
+        for field in (*map(INLINE.__getitem__, SWEEPS), *(self.model_extra or {})):
+            key = drive_key(field)
+            if key is not None and getattr(self, field) is not None and fields[key] != field:
+                detail = f"{field} and {fields[key]} are both given."
+                yield Fault("given_twice", detail, f"/{field}", "Give one of them.")
+
+    def drive_faults(self, drives: Mapping[str, Drive]) -> Iterator[Fault]:
+        """Check that the columns are drives of an aircraft, that no side is missing, and the ranges.
+
+        A drive that has no column holds its angle.
+
+        Parameters
+        ----------
+        drives : mapping of str to Drive
+            Of the aircraft.
+        """
+        fields = self.drive_fields
+        followed, faults = resolved(fields, drives)
+        yield from (_at_field(fault, fields) for fault in faults)
+        if not faults:
+            yield from (_at_field(fault, fields) for fault in unmeasured_sides(followed, drives))
+        if drives and not fields:
+            yield no_drive(drives)
+        angles = {key: self._angles(field) for key, field in fields.items() if key in followed.values()}
+        reported = set()
+        for name, key in followed.items():
+            fault = _range_fault(drives[name], angles[key], f"/{fields[key]}")
+            if fault is not None and key not in reported:
+                reported.add(key)
+                yield fault
+
+
+def no_drive(drives: Mapping[str, Drive]) -> Fault:
+    """Return the fault of a sample without any angle of a drive."""
+    return Fault(
+        "no_drive",
+        "No column says how the aircraft's drives moved.",
+        "",
+        f"Add {next(iter(drives))}_rad; its drives are {shown_names(drives)}.",
+    )
+
+
+def _at_field(fault: Fault, fields: Mapping[str, str]) -> Fault:
+    """Return a fault at ``/key`` at the field of that key instead."""
+    key = fault.pointer.removeprefix("/")
+    return Fault(fault.code, fault.detail, f"/{fields.get(key, f'{key}_rad')}", fault.hint)
+
+
+def _range_fault(drive: Drive, angles: Sequence[float], pointer: str) -> Fault | None:
+    """Return the first angle that is out of a drive's range as a fault; None where all are in it."""
+    if drive.fault(min(angles), "") is None and drive.fault(max(angles), "") is None:
+        return None
+    faults = (drive.fault(angle, f"{pointer}/{row}") for row, angle in enumerate(angles))
+    return next(fault for fault in faults if fault is not None)
 
 
 class InlineSample(TrajectoryColumns):
     """A sample with its rows."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SAMPLE]})
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SAMPLE, EXAMPLE_FOLD]})
 
     name: SampleName
     role: Role = Field(
@@ -82,21 +216,82 @@ def sample_name(stem: str) -> str:
     return plain.lstrip("._-") or "trajectory"
 
 
-def load_sample(path: str | Path, role: Role = "train") -> InlineSample:
-    """Read a sample flight from its CSV, JSON, Parquet or MATLAB file, as it stands inline in a request.
+def columns_of_aircraft(
+    measured: Sequence[str], unreadable: Mapping[str, str], drives: Mapping[str, Drive]
+) -> dict[str, str]:
+    """Choose the columns of a file that move an aircraft; a file may hold others.
+
+    Parameters
+    ----------
+    measured : sequence of str
+        Columns of the file that could be drives, without their units.
+    unreadable : mapping of str to str
+        Columns that could be drives as well but could not be read, and why.
+    drives : mapping of str to Drive
+        Of the aircraft.
+
+    Returns
+    -------
+    dict
+        Drive -> column; a drive that was not measured is not in it.
 
     Raises
     ------
     InvalidInput
-        The file cannot be read, or holds no flight; the sentence names the file and the line.
+        No column moves a drive, one could mean several, or that of a drive is among the unreadable.
+    """
+    followed, faults = resolved_columns([*measured, *unreadable], drives)
+    broken = dict.fromkeys(key for key in followed.values() if key in unreadable)
+    faults += [
+        Fault("unreadable_column", as_sentence(unreadable[key]), "", "Repair the column of the drive.")
+        for key in broken
+    ]
+    if faults:
+        raise InvalidInput.of(Fault(fault.code, fault.detail, "", fault.hint) for fault in faults)
+    return followed
+
+
+def load_sample(
+    path: str | Path, role: Role = "train", drives: Mapping[str, Drive] | None = None
+) -> InlineSample:
+    """Read a sample flight from its CSV, JSON, Parquet or MATLAB file, as it stands inline in a request.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the file.
+    role : str
+        ``train`` or ``held_out``.
+    drives : mapping of str to Drive, optional
+        Of the aircraft that flew (`Aircraft.drives`): columns that move none of them are left out. By default
+        every column that could be a drive is kept.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read, holds no flight, or moves no drive; the sentence names the file and the line.
     """
     path = Path(path)
-    columns = read_flight(path).values
+    columns = read_flight(path)
+    names = list(columns.drives)
+    if drives is not None:
+        unreadable = {name: said_of(fault) for name, fault in columns.unreadable.items()}
+        try:
+            followed = columns_of_aircraft(names, unreadable, drives)
+            refuse(
+                Fault(fault.code, fault.detail, "", fault.hint)
+                for fault in unmeasured_sides(followed, drives)
+            )
+            names = list(dict.fromkeys(followed.values()))
+        except InvalidInput as error:
+            raise InvalidInput(f"{path}: {error.message}", hint=error.hint) from None
+    angles = {name: columns.drives[name] for name in names}
+    named = {name: columns.values[name] for name in ("t", "phi", "theta", "psi")} | angles
     return InlineSample.parse(
         {
             "name": sample_name(path.stem),
             "role": role,
-            **{field: list(columns[name]) for name, field in INLINE.items()},
+            **{INLINE.get(name, f"{name}_rad"): list(values) for name, values in named.items()},
         }
     )
 

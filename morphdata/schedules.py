@@ -1,25 +1,28 @@
-"""Sweep schedules: what each hinge does over time."""
+"""Schedules: what each drive does over time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, FailFast, Field
+from pydantic import ConfigDict, FailFast, Field, PrivateAttr, model_validator
+from pydantic_core import PydanticCustomError
 
 from morphdata.base import MAX_ROWS, MIN_ROWS, Angle, Document
-from morphdata.drives import SIDES
-from morphdata.faults import Fault, InvalidInput
+from morphdata.drives import SWEEPS, Drive, resolved
+from morphdata.faults import Fault, InvalidInput, refuse
+from morphdata.refusals import FAULTS, HALF_TURN_RAD, escaped
+from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
 from morphdata.samplefiles.reading import place_in, read_file
-from morphdata.vehicle import HingeRange
+from morphdata.samples import columns_of_aircraft
 
 MAX_DURATION_S = LONGEST_FLIGHT_S
 MAX_KNOTS = 1000
 DEFAULT_RAMP_S = 0.1
-SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
+SCHEDULE_COLUMNS = ("t", *SWEEPS)
 
 EXAMPLE_SCHEDULE: dict[str, Any] = {
     "kind": "constant_rate",
@@ -158,56 +161,145 @@ AnySchedule = Hold | ConstantRate | Quadratic | Spline | Tabulated
 Schedule = Annotated[AnySchedule, Field(discriminator="kind")]
 
 
+EXAMPLE_HOLD: dict[str, Any] = {"kind": "hold", "angle_rad": 0.2}
+
+
 class Schedules(Document):
-    """What the hinges do: both sides the same, or each side its own."""
+    """What the drives do: a schedule for each drive that moves, by its name; the others hold their angle.
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"both": EXAMPLE_SCHEDULE}]})
+    A key is the name of a drive (`fold_left`) or the word of a kind of hinge, which moves both sides alike
+    (`sweep`). Where a side has only one kind of hinge, `both`, `left` and `right` may stand for it.
+    """
 
-    both: Schedule | None = None
-    left: Schedule | None = None
-    right: Schedule | None = None
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "examples": [
+                {"both": EXAMPLE_SCHEDULE},
+                {"sweep": EXAMPLE_SCHEDULE},
+                {"sweep": EXAMPLE_SCHEDULE, "fold_left": EXAMPLE_HOLD},
+            ]
+        },
+    )
 
-    def faults(self) -> Iterator[Fault]:
-        """No side is told twice what to do."""
-        if self.both is not None and (self.left is not None or self.right is not None):
-            yield Fault(
-                "given_twice",
-                "`both` and a schedule for one side are given.",
-                "/both",
-                "Give both, or left and right.",
+    __pydantic_extra__: dict[str, Schedule] = Field(init=False)
+
+    both: Schedule | None = Field(default=None, description="Of the only kind of hinge, on both sides.")
+    left: Schedule | None = Field(default=None, description="Of the only kind of hinge on the left.")
+    right: Schedule | None = Field(default=None, description="Of the only kind of hinge on the right.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_drive(cls, given: Any) -> Any:
+        """Refuse a schedule that stands where its drive should be named, in words for this case."""
+        if isinstance(given, dict) and isinstance(given.get("kind"), str):
+            fault = Fault(
+                "missing",
+                "This is one schedule, without the drive that follows it.",
+                "",
+                f'Name the drive: {{"sweep": {{"kind": "{given["kind"][:20]}", ...}}}}.',
             )
+            raise PydanticCustomError(FAULTS, "the drive is missing", {FAULTS: (fault,)})
+        return given
 
-    def of_side(self, side: str) -> tuple[str, AnySchedule] | None:
-        """Return the schedule that a side follows, and its name here; None where nothing is said."""
-        for name in (side, "both"):
-            schedule: AnySchedule | None = getattr(self, name)
-            if schedule is not None:
-                return name, schedule
-        return None
+    @property
+    def given(self) -> dict[str, AnySchedule]:
+        """Every schedule by its key."""
+        return {key: schedule for key, schedule in self if schedule is not None}
 
-    def range_faults(self, hinges: Mapping[str, HingeRange]) -> Iterator[Fault]:
-        """Check that every side with hinges has a schedule, within their range.
+    def keys_by_drive(self, drives: Mapping[str, Drive]) -> dict[str, str]:
+        """Find the key of the schedule that each drive of an aircraft follows.
+
+        Parameters
+        ----------
+        drives : mapping of str to Drive
+            Of the aircraft.
+
+        Returns
+        -------
+        dict
+            Drive -> key; a drive that holds its angle is not in it.
+
+        Raises
+        ------
+        InvalidInput
+            A key names no drive, could mean several, or moves what another key moves.
+        """
+        keys, faults = resolved(self.given, drives)
+        refuse(fault.under("/schedules") for fault in faults)
+        return keys
+
+    def by_drive(self, drives: Mapping[str, Drive]) -> dict[str, AnySchedule]:
+        """Return the schedule of each drive of an aircraft that moves, by the drive's name.
+
+        Raises
+        ------
+        InvalidInput
+            As of `keys_by_drive`.
+        """
+        given = self.given
+        return {name: given[key] for name, key in self.keys_by_drive(drives).items()}
+
+    def drive_faults(self, drives: Mapping[str, Drive]) -> Iterator[Fault]:
+        """Check that every key moves a drive of an aircraft, within its range.
 
         A spline may leave its range between knots; the flight sees that.
         """
-        for side in SIDES:
-            if side in hinges and self.of_side(side) is None:
-                yield Fault(
-                    "missing",
-                    f"There is no schedule for the {side} hinges.",
-                    f"/{side}",
-                    'Add it ({"kind": "hold"} keeps them still), or give both sides one schedule as both.',
-                )
-        for name in ("both", *SIDES):
-            schedule: AnySchedule | None = getattr(self, name)
-            if schedule is None:
-                continue
-            for side in SIDES:
-                if side in hinges and name in (side, "both"):
-                    faults = (
-                        hinges[side].fault(side, angle, f"/{name}/{at}") for angle, at in _angles(schedule)
-                    )
-                    yield from islice(filter(None, faults), 1)
+        try:
+            keys = self.keys_by_drive(drives)
+        except InvalidInput as error:
+            yield from error.faults
+            return
+        given = self.given
+        reported = set()
+        for name, key in keys.items():
+            at = f"/schedules/{escaped(key)}"
+            faults = (drives[name].fault(angle, f"{at}/{place}") for angle, place in _angles(given[key]))
+            for fault in islice(filter(None, faults), 1):
+                if key not in reported:
+                    reported.add(key)
+                    yield fault
+
+
+class TabulatedSchedules(Schedules):
+    """Schedules out of a file, whose columns need not all be drives of the aircraft that flies them."""
+
+    _path: str = PrivateAttr(default="")
+    _unreadable: dict[str, str] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def of_file(cls, path: Path, histories: dict[str, Any], unreadable: dict[str, str]) -> Self:
+        """Build the schedules of a file's columns.
+
+        Parameters
+        ----------
+        path : Path
+            Of the file, for errors.
+        histories : dict
+            A schedule as a document for every column that could be a drive.
+        unreadable : dict of str to str
+            Columns that could be drives as well, and what is wrong with them.
+        """
+        return cls.parse(histories).read_from(path, unreadable)
+
+    def read_from(self, path: Path, unreadable: dict[str, str]) -> Self:
+        """Keep where the schedules are from, and return them."""
+        self._path, self._unreadable = str(path), unreadable
+        return self
+
+    def keys_by_drive(self, drives: Mapping[str, Drive]) -> dict[str, str]:
+        """Find the column of each drive that has one.
+
+        Raises
+        ------
+        InvalidInput
+            No column moves a drive, or one could mean several or cannot be read.
+        """
+        try:
+            return columns_of_aircraft(list(self.given), self._unreadable, drives)
+        except InvalidInput as error:
+            message = f"{self._path}: {error.message}" if self._path else error.message
+            raise InvalidInput(message, pointer="/schedules", hint=error.hint) from None
 
 
 def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
@@ -224,16 +316,16 @@ def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
 
 
 def load_schedules(path: str | Path) -> Schedules:
-    """Read a morph schedule from a file with the columns t, sweep_left, sweep_right.
+    """Read schedules from a file with the column t and a column for each drive that moves.
 
-    Units in the names are accepted (``t_ms``, ``sweep_left_deg``); other columns are not looked at, so that a
-    sample flight is a schedule too.
+    A column bears the name of a drive, or the word of a kind of hinge that moves both sides alike. Units in
+    the names are accepted (``t_ms``, ``fold_left_deg``); columns that are no drives of the aircraft are not
+    looked at, so that a sample flight is a schedule too. A drive without a column holds its angle.
 
     Raises
     ------
     InvalidInput
-        A column is missing or holds something that is not a finite number, there are too few rows, or time
-        does not rise.
+        The column of time is missing, none could be a drive, there are too few rows, or time does not rise.
     """
     path = Path(path)
     table = read_file(path, SCHEDULE_COLUMNS)
@@ -246,9 +338,15 @@ def load_schedules(path: str | Path) -> Schedules:
                 f"{place_in(path, table, row)}: time does not increase",
                 hint="sort the rows by time and drop repeated ones",
             )
-    return Schedules.parse(
-        {
-            side: {"kind": "tabulated", "time_s": times, "angle_rad": list(table.values[f"sweep_{side}"])}
-            for side in SIDES
-        }
-    )
+    unreadable = {name: said_of(fault) for name, fault in table.unreadable.items()}
+    histories = {}
+    for name, angles in table.drives.items():
+        if max(map(abs, angles)) > HALF_TURN_RAD:
+            row = next(row for row, angle in enumerate(angles) if abs(angle) > HALF_TURN_RAD)
+            unreadable[name] = (
+                f"{place_in(path, table, row)}: {name} is {angles[row]:g} rad; if the column is in degrees, "
+                f"name it {name}_deg"
+            )
+        else:
+            histories[name] = {"kind": "tabulated", "time_s": times, "angle_rad": list(angles)}
+    return TabulatedSchedules.of_file(path, histories, unreadable)

@@ -18,7 +18,7 @@ from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
-from morphdata.vehicle import flexible_wing_faults, hinge_ranges, model_surfaces_faults, start_faults
+from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
@@ -80,7 +80,7 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 
 
 class SimulateRequest(Request):
-    """Aircraft, flight condition, a model, and what the hinges do."""
+    """Aircraft, flight condition, a model, and what the drives do."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
 
@@ -108,10 +108,9 @@ class SimulateRequest(Request):
         return math.ceil(self.output_step_s / longest_s - ROUND_OFF) * (self.rows - 1)
 
     def faults(self) -> Iterator[Fault]:
-        """The flight can begin, its hinges stay in range, it is neither too short nor too long."""
+        """The flight can begin, its drives stay in range, it is neither too short nor too long."""
         yield from start_faults(self.flight, flown_with(self.model).start)
-        for fault in self.schedules.range_faults(hinge_ranges(self.aircraft)):
-            yield fault.under("/schedules")
+        yield from self.schedules.drive_faults(self.aircraft.drives)
         if not MIN_ROWS <= self.rows <= MAX_ROWS:
             yield Fault(
                 "too_many_rows" if self.rows > MAX_ROWS else "too_few_rows",
@@ -158,11 +157,16 @@ class TrimState(Result):
 
 
 class SimulatedTrajectory(Result):
-    """Columns of the flight: those of a sample, and body rates, velocity, position and wing tips."""
+    """Columns of the flight: those of a sample, and body rates, velocity, position and wing tips.
+
+    Every drive of the aircraft has its column, `fold_left_rad`.
+    """
 
     time_s: list[float]
-    sweep_left_rad: list[float]
-    sweep_right_rad: list[float]
+    sweep_left_rad: list[float] = Field(
+        description="Angle of the first drive of the left side, whatever its kind; zeros without any."
+    )
+    sweep_right_rad: list[float] = Field(description="The same of the right side.")
     phi_rad: list[float]
     theta_rad: list[float]
     psi_rad: list[float]
@@ -183,6 +187,9 @@ class SimulateResult(Result):
     model: FlownModel
     trim: TrimState
     trajectory: SimulatedTrajectory
+    drives: list[str] = Field(
+        default=[], description="Names of the aircraft's drives, whose columns the trajectory has."
+    )
     summary: FlightSummary
     warnings: Warnings = Field(default=[])
     cost: dict[str, Any]

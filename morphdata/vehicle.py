@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
@@ -13,42 +11,6 @@ from morphdata.flight import Flight
 from morphdata.parameters import Parameters
 
 T = TypeVar("T")
-
-ANGLE_TOLERANCE_RAD = 1e-6  # measured sweeps are not exactly zero
-
-
-@dataclass(frozen=True, slots=True)
-class HingeRange:
-    """Angles that all hinges of one side allow, rad, and the name of a surface there."""
-
-    low: float
-    high: float
-    surface: str
-
-    def fault(self, side: str, angle: float, pointer: str) -> Fault | None:
-        """Tell that an angle is out of range, or None."""
-        if self.low - ANGLE_TOLERANCE_RAD <= angle <= self.high + ANGLE_TOLERANCE_RAD:
-            return None
-        hint = f"The hinge of {self.surface!r} goes from {self.low:g} to {self.high:g} rad."
-        if abs(angle) > math.pi:
-            hint += " Is the sweep in degrees?"
-        return Fault(
-            "sweep_out_of_range",
-            f"The {side} sweep is {angle:g} rad.",
-            pointer,
-            f"{hint} Correct the angle, or the hinge's min_rad and max_rad.",
-        )
-
-
-def hinge_ranges(aircraft: Aircraft) -> Mapping[str, HingeRange]:
-    """Range of every side that has a hinge."""
-    ranges: dict[str, HingeRange] = {}
-    for surface in aircraft.surfaces:
-        if surface.hinge is not None:
-            former = ranges.get(surface.side, HingeRange(-math.inf, math.inf, surface.name))
-            low, high = max(former.low, surface.hinge.min_rad), min(former.high, surface.hinge.max_rad)
-            ranges[surface.side] = HingeRange(low, high, former.surface)
-    return ranges
 
 
 def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
@@ -70,7 +32,7 @@ def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
 
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:
     """Check that there is a wing whose bending counts."""
-    if not any(surface.flexible and surface.hinge is not None for surface in aircraft.surfaces):
+    if not any(surface.flexible and surface.all_hinges for surface in aircraft.surfaces):
         yield Fault(
             code,
             "No surface is both hinged and flexible.",

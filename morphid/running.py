@@ -1,7 +1,7 @@
 """Run an operation in this process or at a service, and hand over what comes out.
 
 ``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
-progress is shown, the first Ctrl-C asks for the best so far, a result and its files come out.
+progress is shown, the first Ctrl-C requests the best so far, a result and its files come out.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from typing import Any, NoReturn
 
 import typer
 
-from morphdata.faults import InvalidInput
+from morphdata.drives import Drive
+from morphdata.faults import InvalidInput, MorphError
 from morphdata.operations import operation_named
 from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
 from morphid.files import STANDARD_OUTPUT, require_file, save_files, write_json
 from morphid.interrupt import first_interrupt
-from morphid.request import Document, Request
+from morphid.request import Document, Request, aircraft_drives
 from morphid.screen import Meter, exit_for, meter, print_job_error, print_json, print_warnings, stderr
 from morphid.service import Service
 
@@ -47,9 +48,7 @@ class Answer:
 def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
     """Run the operation, at the service of this address or in this process; print what went wrong on the way.
 
-    Raises
-    ------
-    CommandError : the request is refused; the error names the option at fault.
+    An error names the option at fault.
     """
     if at_service_of_environment(url):
         stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
@@ -72,13 +71,14 @@ def run_here(request: Request, bar: Meter) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best so far."""
     from worker import numerics
 
-    body = request.body(sample_document)
+    drives = aircraft_drives(request)
+    body = request.body(lambda path, role: sample_document(path, role, drives))
     require_valid(request.operation, body)  # before the library is loaded, which takes seconds
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
-    from morphcore.stopping import listening
-    from worker.operations import WorkInterrupted, WorkRefused, find_operation
+    from morphcore.stopping import Interrupted, listening
+    from worker.operations import find_operation
     from worker.progress import Pace
 
     checkpoint: bytes | None = None
@@ -90,7 +90,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 for step in work.steps(None, interrupted):
                     checkpoint = step.checkpoint
                     bar.show(pace.progress(step))
-            except WorkInterrupted:
+            except Interrupted:
                 best = None if checkpoint is None else work.best_so_far(checkpoint)
                 if best is None:
                     return Answer(exit=Exit.INTERRUPTED, result=None)
@@ -100,19 +100,14 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 raise CommandError(f"{request.operation} ended without a step")
             outcome = work.outcome(checkpoint)
         return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
-    except WorkRefused as error:
+    except MorphError as error:
         raise CommandError(
-            error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+            error.message, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
         ) from None
 
 
 def require_valid(operation: str, body: Document) -> None:
-    """Refuse a request that the operation's document refuses.
-
-    Raises
-    ------
-    CommandError : with the first fault as its own, and a line for each of the others.
-    """
+    """Refuse a request that the operation's document refuses: the first fault, and a line for each other."""
     try:
         operation_named(operation).request.parse(body)
     except InvalidInput as error:
@@ -186,10 +181,15 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: Role) -> Document:
-    """Read a sample file and give it as it stands inline in a request."""
+def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None) -> Document:
+    """Read a sample file and give it as it stands inline in a request.
+
+    Parameters
+    ----------
+    drives : of the aircraft, where it is one.
+    """
     require_file(path)
     try:
-        return load_sample(path, role).model_dump(exclude_defaults=True) | {"role": role}
+        return load_sample(path, role, drives).model_dump(exclude_defaults=True) | {"role": role}
     except InvalidInput as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None

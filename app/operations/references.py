@@ -7,24 +7,29 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel
 
 from app.database import Session
 from app.documents import Document
-from app.errors import JobNotFound, ModelNotFound
+from app.errors import NotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
 from app.models.extraction import extracted_model
 from app.trajectories import repository as trajectories
+from morphdata.aircraft import Aircraft
+from morphdata.drives import unmeasured_sides
 from morphdata.execution import Request
-from morphdata.faults import Fault, InvalidInput
-from morphdata.identify import total_rows_faults
+from morphdata.faults import Fault, InvalidInput, refuse
+from morphdata.identify import SamplesRequest, total_rows_faults
 from morphdata.parameters import Parameters
+from morphdata.samplefiles.titles import CHANNELS
+from morphdata.samples import columns_of_aircraft, drive_key
 
-Asked = TypeVar("Asked", bound=Request)
+AnyRequest = TypeVar("AnyRequest", bound=Request)
 
 
 class Reference(NamedTuple):
@@ -40,13 +45,10 @@ class Reference(NamedTuple):
         return f"{self.at}/{self.field}"
 
 
-def resolved(session: Session, owner: str, request: Asked) -> Asked:
+def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
     """Return the request with everything inline that it refers to.
 
-    Raises
-    ------
-    InvalidInput
-        Something does not exist, or does not fit the rest of the request; every fault is named.
+    Raises `InvalidInput`, which names every fault, where something does not exist or does not fit.
     """
     found = list(_references(request))
     if not found:
@@ -56,15 +58,20 @@ def resolved(session: Session, owner: str, request: Asked) -> Asked:
     faults: list[Fault] = []
     for item in found:
         try:
-            _put(document, item, RESOLVERS[item.field](session, owner, item))
+            named = RESOLVERS[item.field](session, owner, item)
+            if item.field == "trajectory_id" and isinstance(request, SamplesRequest):
+                named = _of_aircraft(named, request.aircraft, item.pointer)
+            _put(document, item, named)
         except InvalidInput as error:
             faults += error.faults
+        except NotFound as error:
+            faults.append(Fault(error.code, error.detail, item.pointer, error.hint))
     if faults:
         raise InvalidInput.of(faults)
     try:
         return type(request).parse(document)
     except InvalidInput as error:
-        raise InvalidInput.of([_told(fault, found) for fault in error.faults]) from None
+        raise InvalidInput.of([_at_its_id(fault, found) for fault in error.faults]) from None
 
 
 def _references(value: object, pointer: str = "") -> Iterator[Reference]:
@@ -82,7 +89,7 @@ def _references(value: object, pointer: str = "") -> Iterator[Reference]:
 
 
 def _put(document: Document, reference: Reference, found: Document) -> None:
-    """Put what was found in the place of an id; what the request itself says there counts more."""
+    """Put what was found in the place of an id; what the request itself says there has priority."""
     place: Any = document
     for key in reference.at.split("/")[1:]:
         place = place[int(key)] if isinstance(place, list) else place[key]
@@ -90,7 +97,7 @@ def _put(document: Document, reference: Reference, found: Document) -> None:
     place.update({**found, **place})
 
 
-def _told(fault: Fault, references: list[Reference]) -> Fault:
+def _at_its_id(fault: Fault, references: list[Reference]) -> Fault:
     """Name the id instead of a model that the client has not sent."""
     for item in references:
         if item.field != "trajectory_id" and f"{fault.pointer}/".startswith(f"{item.at}/parameters/"):
@@ -124,25 +131,34 @@ def _require_rows(session: Session, owner: str, uploads: list[Reference], reques
 
 def _flight(session: Session, owner: str, reference: Reference) -> Document:
     stored, columns = trajectories.get_trajectory(session, owner, reference.id)
-    return {"name": stored.name, **columns}
+    return {"name": stored.name, **json.loads(columns)}
+
+
+def _of_aircraft(flight: Document, aircraft: Aircraft, pointer: str) -> Document:
+    """Leave out of a file's columns those that are no drives of the aircraft."""
+    columns = dict(flight)
+    unreadable = columns.pop("unreadable", {})
+    fields = {
+        key: field for field in columns if (key := drive_key(field)) is not None and key not in CHANNELS
+    }
+    drives = aircraft.drives
+    try:
+        followed = columns_of_aircraft(list(fields), unreadable, drives)
+        refuse(unmeasured_sides(followed, drives))
+    except InvalidInput as error:
+        raise InvalidInput.of(replace(fault, pointer=pointer) for fault in error.faults) from None
+    left_out = {field for key, field in fields.items() if key not in followed.values()}
+    return {field: values for field, values in columns.items() if field not in left_out}
 
 
 def _model(session: Session, owner: str, reference: Reference) -> Document:
-    try:
-        _, document = models.get_model(session, owner, reference.id)
-    except ModelNotFound as error:
-        raise InvalidInput.of(
-            [Fault("model_not_found", error.detail, reference.pointer, error.hint)]
-        ) from None
+    _, document = models.get_model(session, owner, reference.id)
     return {"parameters": _as_given(document["model"])}
 
 
 def _model_of_job(session: Session, owner: str, reference: Reference) -> Document:
     """Find the model that a job left, whole or as its best so far."""
-    try:
-        job = get_job(session, owner, reference.id)
-    except JobNotFound as error:
-        raise InvalidInput.of([Fault("job_not_found", error.detail, reference.pointer, error.hint)]) from None
+    job = get_job(session, owner, reference.id)
     text = jobs.result_json(session, owner, job.id)
     left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:

@@ -14,7 +14,7 @@ from app.errors import MalformedBody
 from app.parsing.confinement import Limits, confine, confine_time
 from app.parsing.frame import BadFrame, pack
 from app.parsing.json_text import parse_json
-from morphdata.samplefiles.columns import Wanted
+from morphdata.samplefiles.columns import MOST_DRIVES, Wanted
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.reading import read_columns
 
@@ -23,23 +23,29 @@ LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
-    """What is said of a file: its document or columns, or what is wrong with it."""
+    """Return a file's document or columns, or what is wrong with it."""
     try:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
-        return {"columns": read_columns(stream, kind, wanted).values}
+        read = read_columns(stream, kind, wanted)
+        unreadable = {name: _words(fault) for name, fault in list(read.unreadable.items())[:MOST_DRIVES]}
+        return {"columns": read.values, "candidates": read.candidates, "unreadable": unreadable}
     except MalformedBody as error:
         return {"malformed": [error.detail, error.pointer, error.hint]}
     except FileFault as fault:
-        return {"fault": [fault.code, fault.detail, fault.hint, fault.row, fault.line, fault.title]}
+        return {"fault": _words(fault)}
     except (MemoryError, RecursionError) as error:
         return {"failed": type(error).__name__}
+
+
+def _words(fault: FileFault) -> list[Any]:
+    return [fault.code, fault.detail, fault.hint, fault.row, fault.line, fault.title]
 
 
 def main(arguments: list[str]) -> None:
     """Read standard input under limits and write a frame."""
     kind, *words, rows = arguments
-    limits = Limits.of(words)
+    limits = Limits(*map(int, words))
     confine_time(limits)
     for module in LOADED_BEFORE.get(kind, ()):
         try:
@@ -55,7 +61,7 @@ def main(arguments: list[str]) -> None:
         frame = pack({"failed": type(error).__name__})
     sys.stdout.buffer.write(frame)
     sys.stdout.buffer.flush()
-    os._exit(0)  # libraries' farewells are nobody's business, and may hang
+    os._exit(0)  # the libraries' own clean-up may hang
 
 
 if __name__ == "__main__":

@@ -3,55 +3,49 @@
 from __future__ import annotations
 
 from pathlib import PurePosixPath
+from typing import Any
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
+from app.documents import packed
 from app.errors import InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge
 from app.parsing.pool import refusal
-from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.faults import Fault, InvalidInput
-from morphdata.samplefiles.fault import FileFault, as_sentence
+from morphdata.samplefiles.columns import MOST_DRIVES, FlightColumns
+from morphdata.samplefiles.fault import FileFault, as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import kind_of
 from morphdata.samples import sample_name
 
 
 def file_kind(filename: str) -> str:
-    """What an uploaded file is, by its name.
-
-    Raises
-    ------
-    UnsupportedMediaType
-        When files of its kind are not read.
-    """
+    """What an uploaded file is, by its name; raise `UnsupportedMediaType` for a kind that is not read."""
     try:
         return kind_of(PurePosixPath(filename).suffix)
     except FileFault as fault:
         raise refusal(fault, "/file") from None
 
 
-def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) -> TrajectoryUpload:
-    """Make an upload of a file's columns.
-
-    Raises
-    ------
-    InvalidRequest
-        Naming row and column.
-    """
+def upload_of(flight: FlightColumns, filename: str, name: str | None) -> TrajectoryUpload:
+    """Make an upload of a file's columns, or raise `InvalidRequest` naming row and column."""
+    columns = {**flight.values, **flight.drives}
     faults = [
         Fault(fault.code, as_sentence(fault.detail), f"/file{_place(fault)}", as_sentence(fault.hint))
         for fault in flight_faults(columns)  # before the document is made, which has other names for them
     ]
     if faults:
         raise InvalidRequest.of(faults)
-    named = {INLINE[key]: values for key, values in columns.items()}
+    named: dict[str, Any] = {_field(key): values for key, values in columns.items()}
+    unreadable = list(flight.unreadable.items())[:MOST_DRIVES]
     try:
         return TrajectoryUpload(
             name=sample_name(PurePosixPath(filename.replace("\\", "/")).stem) if name is None else name,
+            unreadable={key: said_of(fault) for key, fault in unreadable},
             **named,
         )
     except InvalidInput as error:
@@ -60,22 +54,20 @@ def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) 
         ) from None
 
 
+def _field(key: str) -> str:
+    return INLINE.get(key, f"{key}_rad")
+
+
 def _place(fault: FileFault) -> str:
     """Where in a file: a time by its column, an angle by its row."""
-    column = f"/{INLINE[fault.title]}" if fault.title else ""
+    column = f"/{_field(fault.title)}" if fault.title else ""
     row = "" if fault.row is None else f"/{fault.row}"
     return f"{column}{row}" if fault.title == "t" else f"{row}{column}"
 
 
 def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload) -> TrajectorySummary:
-    """Store a flight.
-
-    Raises
-    ------
-    QuotaExceeded
-        When the caller's key may not store that much more.
-    """
-    document = stored_form(upload.model_dump(exclude={"name"}))
+    """Store a flight, or raise `QuotaExceeded`."""
+    document = packed(upload.columns())
     charge(session, caller.key_id, size_bytes=len(document))
     stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
     note(session, caller, Action.TRAJECTORY_POST, stored.id)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from morphcore.frames import skew
 from morphdata import drives as documents
-from morphdata.drives import drive_name
-from morphdata.vehicle import ANGLE_TOLERANCE_RAD
+from morphdata.drives import ANGLE_TOLERANCE_RAD, drive_name
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -26,6 +26,7 @@ from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.search.step import Step
 from morphcore.simulate.compilation import compile_flights
+from morphcore.simulate.hinge_schedules import moved_flight
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphcore.stopping import Deadline, Stop, say
@@ -68,12 +69,13 @@ class Identification:
     ) -> None:
         self.settings = model or EquivalentModel()
         self.search = search or SearchSettings()
-        self.samples = tuple(samples)
         self._clock = clock
         self._step_s = self.settings.step_s
         refuse(samples_faults(samples))
         for number, sample in enumerate(samples):
             require_flight(sample, f"/samples/{number}")
+        samples = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
+        self.samples = tuple(samples)
         if self.settings.start == "given" and flight.start is None:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'

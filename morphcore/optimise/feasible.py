@@ -11,8 +11,6 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
-from morphdata.drives import resolved, shown_names
-from morphdata.faults import refuse
 from morphdata.optimize import Limits, Morph
 
 OVERSHOOT = 0.5  # of the change: how far a schedule that may turn back may go beyond either end
@@ -59,22 +57,12 @@ def morph_drives(aircraft: Aircraft, morph: Morph) -> tuple[str, ...]:
         raise InvalidInput(
             "no surface has a hinge", pointer="/aircraft/surfaces", hint="give the wings a hinge"
         )
-    if morph.drive is None:
-        if len({drive.word for drive in drives.values()}) > 1:
-            raise InvalidInput(
-                "the aircraft has several drives, and the morph does not say which one it moves",
-                pointer="/morph/drive",
-                hint=f"give one of {shown_names(drives)}",
-            )
-        return tuple(drives)
-    moved, faults = resolved([morph.drive], drives)
-    refuse(replace(fault, pointer="/morph/drive") for fault in faults)
-    return tuple(moved)
+    return morph.moved(drives)
 
 
 def morph_word(aircraft: Aircraft, morph: Morph) -> str:
     """What a morph moves, for people and results: the word or name of its drive."""
-    return morph.drive or aircraft.drives[morph_drives(aircraft, morph)[0]].word
+    return morph.named_drive(aircraft.drives)
 
 
 def require_schedules(space: MorphSpace) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
-from morphdata.drives import resolved, shown_names
-from morphdata.faults import refuse
+from morphdata.drives import resolved, shown_names, unmeasured_sides
+from morphdata.faults import Fault, refuse
+from morphdata.samples import columns_of_aircraft, no_drive
 
 Schedules = Mapping[str, Schedule] | documents.Schedules | Trajectory
 Followed = dict[str, tuple[str, Schedule]]  # drive -> key of the history it follows, and that
@@ -39,40 +41,63 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = 
     """
     if isinstance(schedules, Trajectory):
         return followed_flight(aircraft, schedules, pointer)
-    given: Mapping[str, Schedule]
     if isinstance(schedules, documents.Schedules):
-        found = {key: getattr(schedules, key) for key in type(schedules).model_fields}
-        given = {key: scheduled(schedule) for key, schedule in found.items() if schedule is not None}
-    elif isinstance(schedules, Mapping):
-        given = schedules
-    else:
+        moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
+        keys = schedules.keys_by_drive(aircraft.drives)
+        return {name: (key, moved[key]) for name, key in keys.items()}
+    if not isinstance(schedules, Mapping):
         raise InvalidInput(
             "the schedules do not say what they move",
             pointer=pointer,
             hint=f"give them by drive: {shown_names(aircraft.drives) or 'the aircraft has none'}",
         )
-    return {name: (key, given[key]) for name, key in _resolved(aircraft, given, pointer).items()}
+    keys, faults = resolved(schedules, aircraft.drives)
+    refuse(fault.under(pointer) for fault in faults)
+    return {name: (key, schedules[key]) for name, key in keys.items()}
 
 
 def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Followed:
-    """Find out which measured angles each drive follows: as `followed_schedules`, and no drive is left alone.
+    """Find out which measured angles each drive follows; one that was not measured is not in it.
 
-    Columns beside, of which a file may have many, count where they bear the name of a drive or a word.
+    Columns of a file that are no drives of the aircraft are left alone.
+
+    Raises
+    ------
+    InvalidInput
+        No angle moves a drive, one could mean several or none at all, or one side alone was measured.
     """
-    words = {drive.word for drive in aircraft.drives.values()}
-    measured = dict(flight.drives)
-    for name, values in flight.extra.items():
-        if (name in aircraft.drives or name in words) and name not in measured:
-            measured[name] = values
-    keys = _resolved(aircraft, measured, pointer)
-    if aircraft.drives and not keys:
-        raise InvalidInput(
-            f"{flight.name!r} moves no drive of the aircraft: it has "
-            f"{', '.join([*flight.drives, *flight.extra]) or 'no angles of drives'}",
-            pointer=pointer,
-            hint=f"its drives are {shown_names(aircraft.drives)}",
-        )
-    return {name: (key, Tabulated(flight.time_s, measured[key])) for name, key in keys.items()}
+    drives = aircraft.drives
+    faults: list[Fault] = []
+    if flight.of_file:
+        try:
+            keys = columns_of_aircraft(list(flight.drives), flight.unreadable, drives)
+        except InvalidInput as error:
+            raise InvalidInput(f"{flight.name}: {error.message}", pointer=pointer, hint=error.hint) from None
+    else:
+        keys, faults = resolved(flight.drives, drives)
+        if drives and not flight.drives:
+            faults = [no_drive(drives)]
+    faults = faults or list(unmeasured_sides(keys, drives))
+    refuse(
+        replace(fault, pointer=f"{fault.pointer}_rad" if fault.pointer else "").under(pointer)
+        for fault in faults
+    )
+    return {name: (key, Tabulated(flight.time_s, flight.drives[key])) for name, key in keys.items()}
+
+
+def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Trajectory:
+    """Return a flight without those columns of its file that are no drives of the aircraft.
+
+    Raises
+    ------
+    InvalidInput
+        As of `followed_flight`.
+    """
+    keys = {key for key, _ in followed_flight(aircraft, flight, pointer).values()}
+    if keys == set(flight.drives):
+        return flight
+    drives = {name: angles for name, angles in flight.drives.items() if name in keys}
+    return replace(flight, drives=drives)
 
 
 def hinge_schedules(aircraft: Aircraft, followed: Followed) -> list[Schedule]:
@@ -100,9 +125,3 @@ def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, 
                     pointer=f"{pointer}/{key}",
                     hint="lower the angles, or widen the hinge's range; a spline can go beyond its knots",
                 )
-
-
-def _resolved(aircraft: Aircraft, keys: Iterable[str], pointer: str) -> dict[str, str]:
-    found, faults = resolved(keys, aircraft.drives)
-    refuse(fault.under(pointer) for fault in faults)
-    return found

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
 from morphdata.drives import SIDES
+from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import read_flight
 from morphdata.samples import InlineSample
@@ -20,7 +21,6 @@ from morphdata.samples import InlineSample
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
 
-SWEEPS = ("sweep_left", "sweep_right")
 ANGLES = ("phi", "theta", "psi")
 
 
@@ -29,7 +29,9 @@ class Trajectory(Shown):
     """One flight: ``time_s`` (k,) rising, Euler angles (k,) in rad; other columns in ``extra``.
 
     ``drives`` : angle (k,) in rad of each drive that moves, by its name (``sweep_left``), or by its word
-    where both sides move alike (``sweep``).
+    where both sides move alike (``sweep``). ``of_file`` : they are all columns of a file that could be
+    drives, in which case those that the aircraft does not have are left alone; ``unreadable`` tells what is
+    wrong with further ones, by their names.
     """
 
     name: str
@@ -41,6 +43,8 @@ class Trajectory(Shown):
     role: Role = "train"
     weight: float = 1.0
     extra: dict[str, Array] = field(default_factory=dict)
+    of_file: bool = False
+    unreadable: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sample: InlineSample) -> Trajectory:
@@ -48,7 +52,7 @@ class Trajectory(Shown):
         return cls(
             name=sample.name,
             time_s=_column(sample.time_s),
-            drives={name: _column(getattr(sample, f"{name}_rad")) for name in SWEEPS},
+            drives={name: _column(angles) for name, angles in sample.drives.items()},
             phi=_column(sample.phi_rad),
             theta=_column(sample.theta_rad),
             psi=_column(sample.psi_rad),
@@ -78,9 +82,9 @@ class Trajectory(Shown):
 
     def _side(self, side: str) -> Array:
         # a drive's name ends with its side, a word stands for both
-        other = next(each for each in SIDES if each != side)
-        own = (values for name, values in self.drives.items() if not name.endswith(f"_{other}"))
-        return next(own, np.zeros_like(self.time_s))
+        own = [values for name, values in self.drives.items() if name.endswith(f"_{side}")]
+        words = [values for name, values in self.drives.items() if _word(name) == name]
+        return next(iter([*own, *words]), np.zeros_like(self.time_s))
 
     @property
     def drive_order(self) -> tuple[str, ...]:
@@ -91,12 +95,13 @@ class Trajectory(Shown):
 
 
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
-    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, sweep_left, sweep_right, phi, theta, psi.
+    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, phi, theta, psi and those of drives.
 
-    The ending of its name tells the kind. Units in the names are accepted (``t_ms``, ``theta [deg]``); other
-    columns of numbers land in ``extra`` as they are. Time that counts from an epoch, and dates, count from
-    the first row. In JSON the columns are lists of one object, in MATLAB vectors or the fields of one struct;
-    Parquet needs pyarrow.
+    The ending of its name tells the kind. A drive's column bears its name (``sweep_left``), or the word of
+    both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``); columns of numbers
+    beside the first ones land in ``extra`` as they are, and in ``drives``, in rad, if they could be drives.
+    Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
+    object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
 
     Raises
     ------
@@ -108,21 +113,24 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     return Trajectory(
         name=path.stem,
         time_s=_column(columns.values["t"]),
-        drives={name: _column(columns.values[name]) for name in SWEEPS},
+        drives={name: _column(angles) for name, angles in columns.drives.items()},
         **{name: _column(columns.values[name]) for name in ANGLES},  # type: ignore[arg-type]
         role=role,
         extra={title: _column(values) for title, values in columns.others.items()},
+        of_file=True,
+        unreadable={name: said_of(fault) for name, fault in columns.unreadable.items()},
     )
 
 
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
     """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in ANGLES}}
-    columns |= {name: getattr(trajectory, name) for name in SWEEPS}
-    for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, INLINE):
+    columns |= trajectory.drives
+    called = {name: INLINE.get(name, f"{name}_rad") for name in columns}
+    for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, called):
         row = "" if fault.row is None else f"/{fault.row}"
         raise InvalidInput(
-            fault.detail, pointer=f"{pointer}/{INLINE[fault.title or 't']}{row}", hint=fault.hint
+            fault.detail, pointer=f"{pointer}/{called[fault.title or 't']}{row}", hint=fault.hint
         )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from morphdata.aircraft import Surface
+from morphdata.drives import SIDES, Hinge, drive_name
 from morphdata.identifiable import corrections
 from morphdata.identify import (
     CostEstimate,
@@ -76,19 +77,35 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
 
 def _mirror_groups(surfaces: Sequence[Surface]) -> int:
     """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
-    nameless = [each.model_copy(update={"name": ""}) for each in surfaces if each.flexible]
+    nameless = [_plainly(each) for each in surfaces if each.flexible]
     return len(paired_by_reflection(nameless, [_reflection(each) for each in nameless]))
 
 
 def _reflection(surface: Surface) -> Surface:
-    hinge = surface.hinge
+    side = "left" if surface.side == "right" else "right"
+    hinges = [_mirrored(hinge, surface.side, side) for hinge in surface.all_hinges]
     return surface.model_copy(
-        update={
-            "side": "left" if surface.side == "right" else "right",
-            "position_m": _across(surface.position_m),
-            "hinge": hinge and hinge.model_copy(update={"position_m": _across(hinge.position_m)}),
-        }
+        update={"side": side, "position_m": _across(surface.position_m), "hinges": hinges}
     )
+
+
+def _mirrored(hinge: Hinge, from_side: str, to_side: str) -> Hinge:
+    """Return a hinge's image on the other side: a rotation vector keeps its y and loses its signs."""
+    x, y, z = hinge.axis_B(from_side)
+    name = drive_name(hinge, from_side).removesuffix(f"_{from_side}") + f"_{to_side}"
+    update = {"name": name, "axis": [-x, y, -z], "position_m": _across(hinge.position_m)}
+    return hinge.model_copy(update=update)
+
+
+def _plainly(surface: Surface) -> Surface:
+    """Return a surface without its name, its hinges in one form: a list, with names and vectors."""
+    hinges = [
+        hinge.model_copy(
+            update={"name": drive_name(hinge, surface.side), "axis": list(hinge.axis_B(surface.side))}
+        )
+        for hinge in surface.all_hinges
+    ]
+    return surface.model_copy(update={"name": "", "hinge": None, "hinges": hinges})
 
 
 def _across(position_m: list[float] | None) -> list[float] | None:
@@ -96,9 +113,20 @@ def _across(position_m: list[float] | None) -> list[float] | None:
 
 
 def _asymmetric(sample: InlineSample) -> bool:
-    apart = max(abs(a - b) for a, b in zip(sample.sweep_left_rad, sample.sweep_right_rad, strict=True))
+    drives = sample.drives
+    apart = max((_apart(drives, key) for key in drives), default=0.0)
     turned = max(max(angle) - min(angle) for angle in (sample.phi_rad, sample.psi_rad))
     return max(apart, turned) > ASYMMETRIC_RAD
+
+
+def _apart(drives: Mapping[str, Sequence[float]], key: str) -> float:
+    """Largest difference of a drive to that of the other side, rad; to rest where there is none."""
+    for side, other in (SIDES, SIDES[::-1]):
+        if key.endswith(f"_{side}"):
+            angles = drives[key]
+            opposite = drives.get(f"{key.removesuffix(side)}{other}", [angles[0]] * len(angles))
+            return max(abs(a - b) for a, b in zip(angles, opposite, strict=True))
+    return 0.0  # a word moves both sides
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:
@@ -141,6 +169,7 @@ IDENTIFY = Operation(
     cost=cost,
     summary=_summary,
     begin="worker.operations.identification:begin",
+    files=("result.json", "convergence.*", "attitude_*", "residuals_*", "curves_*.csv"),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,
 )

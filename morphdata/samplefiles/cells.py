@@ -23,7 +23,7 @@ class Numbers:
 
     def __init__(self) -> None:
         self.point = self.comma = ""  # the first cell of each kind
-        self._proven = False  # whether some comma cannot part thousands
+        self.proven = False  # whether some comma cannot part thousands
 
     def read(self, cell: str) -> float:
         """The number in a cell; NaN for all else (``1_000`` is a number in Python, not in a table).
@@ -39,7 +39,7 @@ class Numbers:
             return math.nan
         if "," in cell:
             self.comma = self.comma or cell.strip()
-            self._proven = self._proven or not THOUSANDS.fullmatch(cell.strip())
+            self.proven = self.proven or not THOUSANDS.fullmatch(cell.strip())
         elif "." in cell:
             self.point = self.point or cell.strip()
         if self.comma and self.point:
@@ -57,7 +57,7 @@ class Numbers:
 
     def require_decimals(self) -> None:
         """Raise FileFault where every comma may part thousands."""
-        if self.comma and not self._proven:
+        if self.comma and not self.proven:
             raise FileFault(
                 "ambiguous_decimals",
                 f"{shown(self.comma)} may be {self.pointed(self.comma)} or {self.comma.replace(',', '')}",

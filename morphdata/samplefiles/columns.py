@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from morphdata.samplefiles.fault import FileFault, shown
-from morphdata.samplefiles.flight import MOST_ROWS, from_first_row
-from morphdata.samplefiles.titles import FLIGHT
+from morphdata.samplefiles.flight import MOST_ROWS, angle_fault, from_first_row
+from morphdata.samplefiles.titles import (
+    FLIGHT,
+    SWEEPS,
+    drive_in_brackets,
+    drive_meant,
+    known_units,
+    missing_columns,
+)
+
+MOST_DRIVES = 64  # 16 surfaces of 4 hinges each
+MOST_DRIVE_NUMBERS = 2_000_000  # in all columns that could be drives: 20 of the longest flight
 
 Numbers = Iterable[float]
 
@@ -20,14 +30,23 @@ class Wanted:
 
     Parameters
     ----------
-    names : the columns that must be there; given in SI units.
-    others : whether further columns of numbers are given too, as they are.
+    names : the columns that are read strictly, and given in SI units.
+    optional : those of them that may be missing.
+    others : whether further columns of numbers are given too, as they are; those that could be drives are
+        given in any case, in rad.
     most_rows : a longer file is refused.
     """
 
     names: tuple[str, ...] = FLIGHT
+    optional: tuple[str, ...] = SWEEPS
     others: bool = False
     most_rows: int = MOST_ROWS
+
+    def further(self, titles: Iterable[str]) -> list[str]:
+        """Which of the further columns are read."""
+        if self.others:
+            return [title for title in titles if title]
+        return _preferred([title for title in titles if drive_meant(title) is not None], MOST_DRIVES)
 
     def too_many_rows(self) -> FileFault:
         """The fault of a file that is too long."""
@@ -47,11 +66,28 @@ class FlightColumns:
     values : the wanted ones by name, SI units.
     others : further ones by their own titles, units as they are.
     lines : of a text file the line of each row, from 1; else empty.
+    candidates : further ones that could be drives by the drive's name, rad.
+    unreadable : what is wrong with columns that could be drives as well, by the drive's name.
     """
 
     values: dict[str, array[float]]
     others: dict[str, array[float]] = field(default_factory=dict)
     lines: Sequence[int] = ()
+    candidates: dict[str, array[float]] = field(default_factory=dict)
+    unreadable: dict[str, FileFault] = field(default_factory=dict)
+
+    @property
+    def drives(self) -> dict[str, array[float]]:
+        """All columns that could be drives, by the drive's name; rad."""
+        return {**{name: self.values[name] for name in SWEEPS if name in self.values}, **self.candidates}
+
+
+def _preferred(names: Sequence[str], most: int) -> list[str]:
+    """So many of the names that drives may have, those with a side first; in their order."""
+    kept = set(
+        sorted(names, key=lambda name: not any(f"_{side}" in name for side in ("left", "right")))[:most]
+    )
+    return [name for name in names if name in kept]
 
 
 def column_in_si(name: str, values: Sequence[float], factor: float | None, title: str) -> array[float]:
@@ -101,3 +137,93 @@ def equally_long(columns: FlightColumns, titles: dict[str, str]) -> FlightColumn
                 title=titles[name],
             )
     return columns
+
+
+def gathered(
+    wanted: Wanted,
+    titles: Sequence[str],
+    columns: FlightColumns,
+    units: Mapping[str, float | FileFault] | None = None,
+    faults: Mapping[str, FileFault] | None = None,
+) -> FlightColumns:
+    """The columns that were read, with the further ones that could be drives.
+
+    Parameters
+    ----------
+    wanted : what was asked for.
+    titles : of all columns of the file but the wanted ones.
+    columns : those that were read; the further ones with units as they are.
+    units : of further columns, by title, where they stand apart from the title: factor to rad, or what is
+        wrong with them.
+    faults : what is wrong with further columns that could not be read, by title.
+
+    Raises
+    ------
+    FileFault : no column could be a drive.
+    """
+    meant, unreadable = _meant(titles, units or {})
+    rows = len(next(iter(columns.values.values())))
+    most = min(MOST_DRIVES, MOST_DRIVE_NUMBERS // max(rows, 1))
+    candidates: dict[str, array[float]] = {}
+    kept = _preferred([name for name, (title, _) in meant.items() if title in columns.others], most)
+    read = wanted.further(titles)
+    for name, (title, factor) in meant.items():
+        if title not in columns.others and title in read:
+            unreadable[name] = (faults or {}).get(title) or _no_numbers(title)
+        elif name not in kept:
+            unreadable[name] = FileFault(
+                "too_many_columns",
+                f"{shown(title)} is not read: more than {most} further columns could be drives",
+                "leave out the columns that are none",
+            )
+        else:
+            angles = in_si(columns.others[title], factor, title)
+            fault = angle_fault(name, angles, shown(title))
+            if fault is None:
+                candidates[name] = angles
+            else:
+                unreadable[name] = fault
+    found = FlightColumns(
+        columns.values, columns.others if wanted.others else {}, columns.lines, candidates, unreadable
+    )
+    if not found.drives and wanted.optional:
+        sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))
+        raise next(sided, missing_columns(titles, wanted.names, wanted.optional))
+    return found
+
+
+def _meant(
+    titles: Sequence[str], units: Mapping[str, float | FileFault]
+) -> tuple[dict[str, tuple[str, float | None]], dict[str, FileFault]]:
+    """The drives that titles could mean, with title and factor to rad, and those that they cannot give."""
+    meant: dict[str, tuple[str, float | None]] = {}
+    unreadable: dict[str, FileFault] = {}
+    for title in titles:
+        found = drive_meant(title)
+        if found is None:
+            name = drive_in_brackets(title)
+            if name is not None:
+                unreadable[name] = _unknown_unit(f"the unit of {shown(title)!r} is not read", name)
+            continue
+        name, factor = found
+        unit = units.get(title, factor)
+        if isinstance(unit, FileFault):
+            unreadable[name] = unit
+        elif name in meant or name in SWEEPS:
+            former = shown(meant[name][0]) if name in meant else name
+            unreadable[name] = FileFault(
+                "column_twice",
+                f"the columns {former!r} and {shown(title)!r} both give {name}",
+                "keep one of them",
+            )
+        else:
+            meant[name] = title, unit
+    return {name: found for name, found in meant.items() if name not in unreadable}, unreadable
+
+
+def _unknown_unit(detail: str, name: str) -> FileFault:
+    return FileFault("unknown_unit", detail, known_units(name))
+
+
+def _no_numbers(title: str) -> FileFault:
+    return FileFault("not_numbers", f"{shown(title)} does not hold numbers", "give an angle in every row")

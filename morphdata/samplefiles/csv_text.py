@@ -13,10 +13,10 @@ from itertools import chain
 from typing import BinaryIO
 
 from morphdata.samplefiles.cells import Clock, Numbers
-from morphdata.samplefiles.columns import FlightColumns, Wanted, not_finite
+from morphdata.samplefiles.columns import FlightColumns, Wanted, gathered, not_finite
 from morphdata.samplefiles.comments import is_comment, is_octave, uncommented
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
-from morphdata.samplefiles.titles import chosen, known_units, meaning, unit_factor
+from morphdata.samplefiles.titles import chosen, drive_meant, known_units, meaning, unit_factor
 
 LONGEST_LINE = 64 * 1024  # characters; one endless line must not fill the memory
 LONGEST_FILE = 1_000_000  # lines, blank ones too
@@ -161,7 +161,7 @@ def _titled(line: str, wanted: Wanted) -> tuple[str, list[str], Found]:
 
     delimiter = max(DELIMITERS, key=lambda mark: (known(mark), line.count(mark)))
     cells = _cells(line, delimiter)
-    return delimiter, cells, chosen(cells, wanted.names)
+    return delimiter, cells, chosen(cells, wanted.names, wanted.optional)
 
 
 def _no_rows() -> FileFault:
@@ -177,6 +177,7 @@ class _Column:
     factor: float | None = None
     numbers: Numbers = field(default_factory=Numbers)
     values: array[float] = field(default_factory=lambda: array("d"))
+    fault: FileFault | None = None
 
 
 class _Table:
@@ -190,11 +191,15 @@ class _Table:
             for name, (position, factor) in found.items()
         }
         taken = {column.position for column in self._columns.values()}
+        further = [title for position, title in enumerate(titles) if position not in taken]
+        read = set(wanted.further(further))
         self._others = [
             _Column(position, title)
             for position, title in enumerate(titles)
-            if wanted.others and position not in taken and title
+            if position not in taken and title in read
         ]
+        self._sound = self._others  # as far as they hold nothing but numbers
+        self._units: dict[str, float | FileFault] = {}
         self._clock: Clock | None = None
         self._lines = array("q")
         self._units_read = False
@@ -218,7 +223,7 @@ class _Table:
         except FileFault as fault:
             fault.line = line
             raise
-        self._others = [column for column in self._others if _append(column, row)]
+        self._sound = [column for column in self._sound if _append(column, row, len(self._lines), line)]
         self._lines.append(line)
 
     def columns(self) -> FlightColumns:
@@ -226,11 +231,15 @@ class _Table:
         if not self._lines:
             raise _no_rows()
         self._numbers.require_decimals()
-        return FlightColumns(
-            values={name: self._columns[name].values for name in self._wanted.names},
-            others={column.title: column.values for column in self._others if self._is_read_right(column)},
+        columns = FlightColumns(
+            values={name: self._columns[name].values for name in self._wanted.names if name in self._columns},
+            others={column.title: column.values for column in self._sound if self._is_read_right(column)},
             lines=self._lines,
         )
+        taken = {column.position for column in self._columns.values()}
+        titles = [title for position, title in enumerate(self._titles) if position not in taken]
+        faults = {column.title: column.fault for column in self._others if column.fault is not None}
+        return gathered(self._wanted, titles, columns, self._units, faults)
 
     def _value(self, column: _Column, row: Sequence[str]) -> float:
         value = self._numbers.read(row[column.position])
@@ -270,6 +279,10 @@ class _Table:
                     title=column.title,
                 )
             column.factor = factor
+        for column in self._others:
+            cell = row[column.position].strip()
+            if cell.strip("-") and (meant := drive_meant(column.title)) is not None:
+                self._units[column.title] = _unit_of_drive(*meant, cell, column.title, line)
 
     def _uneven(self, row: Sequence[str], line: int) -> FileFault:
         hint = "every row must be as long as the title line"
@@ -287,8 +300,10 @@ class _Table:
         """Whether a further column's decimal mark is the table's, so that its commas are no thousands'."""
         own, table = column.numbers, self._numbers
         try:
-            own.require_decimals()
-        except FileFault:
+            if not table.proven:
+                own.require_decimals()
+        except FileFault as fault:
+            column.fault = fault
             return False
         return not (own.comma and table.point) and not (own.point and table.comma)
 
@@ -301,11 +316,29 @@ def _is_no_number(cell: str) -> bool:
     return cell.strip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none")
 
 
-def _append(column: _Column, row: Sequence[str]) -> bool:
-    """Whether a further column still holds nothing but numbers."""
+def _unit_of_drive(name: str, factor: float | None, cell: str, title: str, line: int) -> float | FileFault:
+    """The factor to rad that a row of units gives for a column which could be a drive, or what is wrong."""
+    given = unit_factor(name, cell)
+    if given is None or factor not in (None, given):
+        said = "is not supported" if given is None else "differs from that in its title"
+        return FileFault(
+            "unknown_unit" if given is None else "two_units",
+            f"the unit {shown(cell)!r} of {shown(title)} {said}",
+            known_units(name) if given is None else "say the unit once",
+            line=line,
+            title=title,
+        )
+    return given
+
+
+def _append(column: _Column, row: Sequence[str], number: int, line: int) -> bool:
+    """Whether a further column still holds nothing but numbers; else its fault says where it does not."""
     try:
         value = column.numbers.read(row[column.position])
-    except FileFault:
+    except FileFault as fault:
+        column.fault = fault
         return False
     column.values.append(value)
-    return math.isfinite(value)
+    if not math.isfinite(value):
+        column.fault = not_finite(column.title, row[column.position].strip(), number, line)
+    return column.fault is None

@@ -59,6 +59,11 @@ class FileFault(Pickled, Exception):
         return "" if self.row is None else f"row {self.row} (from 0)"
 
 
+def said_of(fault: FileFault) -> str:
+    """What is wrong with a file and where, without the file's name."""
+    return f"{fault.detail} ({fault.place})" if fault.place else fault.detail
+
+
 def octave_text() -> FileFault:
     """The fault of Octave's own text format, which it writes under any name."""
     return FileFault(

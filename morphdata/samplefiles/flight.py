@@ -21,7 +21,6 @@ ROUND_OFF = 1e-6  # rad; of an angle written in few digits
 
 # a flight's columns as they are called inline in a JSON document
 INLINE = {"t": "time_s", **{name: f"{name}_rad" for name in FLIGHT if name != "t"}}
-ANGLES = tuple(name for name in FLIGHT if name != "t")
 TOO_LONG_HINT = f"cut it to at most {LONGEST_FLIGHT_S:g} s, or check that time is in seconds"
 
 
@@ -51,14 +50,15 @@ def flight_faults(
 
     Parameters
     ----------
-    columns : by the names of `FLIGHT`, finite numbers; s and rad.
-    called : what their owner calls them; `INLINE` in a JSON document. Left out: as in a file.
+    columns : t, phi, theta, psi and those of drives by their names, finite numbers; s and rad.
+    called : what their owner calls them; `INLINE` and the like in a JSON document. Left out: as in a file.
 
     Yields
     ------
-    FileFault : with the row (from 0), and the name out of `FLIGHT` as the title; none where it is about all.
+    FileFault : with the row (from 0), and the column's name as the title; none where it is about all.
     """
-    called = called or {name: name for name in FLIGHT}
+    called = called or {name: name for name in columns}
+    angles = [name for name in (*FLIGHT, *columns) if name in columns and name != "t"]
     times = columns["t"]
     if not FEWEST_ROWS <= len(times) <= MOST_ROWS:
         yield FileFault(
@@ -67,7 +67,7 @@ def flight_faults(
             f"give {FEWEST_ROWS} to {MOST_ROWS} rows; 10 ms between them are enough",
         )
         return
-    for name in ANGLES:
+    for name in dict.fromkeys(angles):
         if len(columns[name]) != len(times):
             yield FileFault(
                 "unequal_lengths",
@@ -76,8 +76,10 @@ def flight_faults(
                 title=name,
             )
     yield from _time_faults(times)
-    for name in ANGLES:
-        yield from _angle_faults(name, columns[name], called[name])
+    for name in dict.fromkeys(angles):
+        fault = angle_fault(name, columns[name], called[name])
+        if fault is not None:
+            yield fault
 
 
 def _time_faults(times: Sequence[float]) -> Iterator[FileFault]:
@@ -96,14 +98,16 @@ def _time_faults(times: Sequence[float]) -> Iterator[FileFault]:
         yield FileFault("too_long_a_flight", f"the flight takes {duration_s:g} s", TOO_LONG_HINT, title="t")
 
 
-def _angle_faults(name: str, angles: Sequence[float], called: str) -> Iterator[FileFault]:
+def angle_fault(name: str, angles: Sequence[float], called: str) -> FileFault | None:
+    """What is wrong with a column of angles, rad; None where nothing is."""
     limit, bound = (STEEPEST_PITCH, "pi/2") if name == "theta" else (LARGEST_ANGLE, f"{LARGEST_ANGLE:g} rad")
     row = next((row for row, angle in enumerate(angles) if abs(angle) > limit + ROUND_OFF), None)
-    if row is not None:
-        yield FileFault(
-            "looks_like_degrees",
-            f"{called} is {angles[row]:g} rad at row {row}, beyond {bound}",
-            f"if the angles are in degrees, convert them, or name the unit in a file's title ({name}_deg)",
-            row=row,
-            title=name,
-        )
+    if row is None:
+        return None
+    return FileFault(
+        "looks_like_degrees",
+        f"{called} is {angles[row]:g} rad at row {row}, beyond {bound}",
+        f"if the angles are in degrees, convert them, or name the unit in a file's title ({name}_deg)",
+        row=row,
+        title=name,
+    )

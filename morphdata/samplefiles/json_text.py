@@ -5,10 +5,19 @@ from __future__ import annotations
 import json
 import math
 import sys
+from array import array
 from typing import Any, BinaryIO
 
 from morphdata.samplefiles.cells import Clock, Numbers
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si, not_finite
+from morphdata.samplefiles.columns import (
+    FlightColumns,
+    Wanted,
+    column_in_si,
+    equally_long,
+    gathered,
+    in_si,
+    not_finite,
+)
 from morphdata.samplefiles.comments import is_comment, is_octave
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
 from morphdata.samplefiles.titles import chosen
@@ -27,11 +36,11 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     if not isinstance(document, dict):
         raise FileFault("not_an_object", "the JSON text is not an object", HINT)
     titles = list(document)
-    found = chosen(titles, wanted.names)
+    found = chosen(titles, wanted.names, wanted.optional)
     names = {name: titles[position] for name, (position, _) in found.items()}
     values = {}
-    for name in wanted.names:
-        items, title = document[names[name]], names[name]
+    for name, title in names.items():
+        items = document[title]
         if not isinstance(items, list):
             raise FileFault("list_type", f"{shown(title)} is not a list", HINT, title=title)
         if len(items) > wanted.most_rows:
@@ -44,11 +53,14 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         values[name] = column_in_si(name, items, found[name][1], title)
     columns = equally_long(FlightColumns(values), names)
     rows = len(values[wanted.names[0]])
-    if wanted.others:
-        for title, items in document.items():
-            if title not in names.values() and isinstance(items, list) and len(items) == rows:
-                _keep_numbers(columns, title, items)
-    return columns
+    further = [title for title in titles if title not in names.values() and isinstance(document[title], list)]
+    faults = {}
+    for title in wanted.further(further):
+        try:
+            columns.others[title] = _column_of_numbers(title, document[title], rows)
+        except FileFault as fault:
+            faults[title] = fault
+    return gathered(wanted, further, columns, faults=faults)
 
 
 def _dates(items: list[Any], title: str) -> list[float]:
@@ -63,12 +75,14 @@ def _dates(items: list[Any], title: str) -> list[float]:
     return times
 
 
-def _keep_numbers(columns: FlightColumns, title: str, items: list[Any]) -> None:
-    if all(map(_is_number, items)):
-        try:
-            columns.others[title] = in_si(items, 1.0, title)
-        except FileFault:
-            return
+def _column_of_numbers(title: str, items: list[Any], rows: int) -> array[float]:
+    if len(items) != rows:
+        detail = f"{shown(title)} has {len(items)} rows, time has {rows}"
+        raise FileFault("unequal_lengths", detail, "give equal lengths", title=title)
+    for row, item in enumerate(items):
+        if not _is_number(item):
+            raise not_finite(title, item, row)
+    return in_si(items, 1.0, title)
 
 
 def _is_number(item: object) -> bool:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, in_si
+from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, gathered, in_si
 from morphdata.samplefiles.comments import is_octave
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
 from morphdata.samplefiles.titles import MOST_COLUMNS, chosen, meaning
@@ -95,21 +95,19 @@ def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns
         if len(structs) == 1:
             return _vectors(_fields(stream, structs[0], contents[structs[0]][0]), wanted)
         _refuse_containers(contents, structs)
-    found = chosen(list(contents), wanted.names)
+    found = chosen(list(contents), wanted.names, wanted.optional)
     names = [list(contents)[position] for position, _ in found.values()]
     for name in names:
         _require_vector(name, *contents[name], wanted)
     length = max(contents[names[0]][0])
-    others = [
+    vectors = [
         name
         for name, (shape, kind) in contents.items()
-        if wanted.others
-        and name not in names
-        and kind in NUMBERS
-        and _is_vector(shape)
-        and max(shape) == length
+        if name not in names and kind in NUMBERS and _is_vector(shape) and max(shape) == length
     ]
-    return _vectors(_loaded(stream, [*names, *others]), wanted)
+    others = wanted.further(vectors)
+    unread = [name for name in contents if name not in names and name not in others]
+    return _vectors(_loaded(stream, [*names, *others]), wanted, unread)
 
 
 def _refuse_containers(contents: Contents, structs: list[str]) -> None:
@@ -169,13 +167,12 @@ def _fields(stream: BinaryIO, name: str, shape: tuple[int, ...]) -> dict[str, An
     return {field: record[field] for field in struct.dtype.names}
 
 
-def _vectors(arrays: Mapping[str, Any], wanted: Wanted) -> FlightColumns:
+def _vectors(arrays: Mapping[str, Any], wanted: Wanted, unread: Sequence[str] = ()) -> FlightColumns:
     titles = list(arrays)
-    found = chosen(titles, wanted.names)
+    found = chosen(titles, wanted.names, wanted.optional)
     names = {name: titles[position] for name, (position, _) in found.items()}
     values = {}
-    for name in wanted.names:
-        title = names[name]
+    for name, title in names.items():
         item = arrays[title]
         kind = CLASSES.get(item.dtype.name, item.dtype.name) if hasattr(item, "ravel") else "sparse"
         _require_vector(title, item.shape, kind, wanted)
@@ -184,15 +181,19 @@ def _vectors(arrays: Mapping[str, Any], wanted: Wanted) -> FlightColumns:
     columns = equally_long(FlightColumns(values), names)
     if not len(values[wanted.names[0]]):
         raise FileFault("no_rows", "the vectors are empty", "give rows of numbers")
-    if wanted.others:
-        _keep_numbers(columns, arrays, set(names.values()), len(values[wanted.names[0]]))
-    return columns
+    further = [title for title in titles if title not in names.values()]
+    faults = _keep_numbers(columns, {title: arrays[title] for title in wanted.further(further)})
+    return gathered(wanted, [*further, *unread], columns, faults=faults)
 
 
-def _keep_numbers(columns: FlightColumns, arrays: Mapping[str, Any], taken: set[str], rows: int) -> None:
+def _keep_numbers(columns: FlightColumns, arrays: Mapping[str, Any]) -> dict[str, FileFault]:
+    """Add what is as long as the rest and holds nothing but numbers; what is wrong with the others."""
+    rows = len(next(iter(columns.values.values())))
+    faults = {}
     for title, item in arrays.items():
-        if title not in taken and getattr(item, "size", 0) == rows and item.dtype.kind in "iuf":
+        if getattr(item, "size", 0) == rows and item.dtype.kind in "iuf":
             try:
                 columns.others[title] = in_si(item.ravel().astype(float), 1.0, title)
-            except FileFault:
-                continue
+            except FileFault as fault:
+                faults[title] = fault
+    return faults

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, in_si, not_finite
+from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, gathered, in_si, not_finite
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.titles import MOST_COLUMNS, chosen
 
@@ -57,33 +56,31 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
         )
     schema = file.schema_arrow
     titles = list(schema.names)
-    found = chosen(titles, wanted.names)
+    found = chosen(titles, wanted.names, wanted.optional)
     asked = {titles[position]: name for name, (position, _) in found.items()}
     for title, name in asked.items():
         _require_numbers(schema.field(title).type, title, dates=name == "t")
-    others = [
+    numeric = [
         title
         for title in dict.fromkeys(titles)
-        if wanted.others and title not in asked and titles.count(title) == 1 and _numeric(schema, title)
+        if title not in asked and titles.count(title) == 1 and _numeric(schema, title)
     ]
+    others = wanted.further(numeric)
     read, further = _decoded(file, list(asked), others, wanted)
     if not len(read[next(iter(asked))]):
         raise FileFault("no_rows", "the file holds no rows", "give rows of numbers")
     values = {}
-    for name in wanted.names:
-        position, factor = found[name]
+    for name, (position, factor) in found.items():
         title = titles[position]
         own = CLOCK_UNITS.get(getattr(schema.field(title).type, "unit", ""), factor)
         values[name] = column_in_si(name, read[title], own, title)
-    return FlightColumns(values, dict(_finite(further)))
-
-
-def _finite(columns: dict[str, array[float]]) -> Iterator[tuple[str, array[float]]]:
-    for title, values in columns.items():
+    columns, faults = FlightColumns(values), {}
+    for title, raw in further.items():
         try:
-            yield title, in_si(values, 1.0, title)
-        except FileFault:
-            continue
+            columns.others[title] = in_si(raw, 1.0, title)
+        except FileFault as fault:
+            faults[title] = fault
+    return gathered(wanted, [title for title in titles if title not in asked], columns, faults=faults)
 
 
 def _decoded(

@@ -53,7 +53,7 @@ def read_columns(stream: BinaryIO, kind: str, wanted: Wanted | None = None) -> F
 
 
 def read_file(path: Path, names: Sequence[str] = FLIGHT) -> FlightColumns:
-    """Read the named columns of a file, and its further columns of numbers.
+    """Read the named columns of a file, what could be drives, and its further columns of numbers.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def place_in(path: Path, columns: FlightColumns, row: int) -> str:
 
 
 def read_flight(path: Path) -> FlightColumns:
-    """Read a file that holds one flight, and its further columns of numbers.
+    """Read a file that holds one flight, what could be its drives, and its further columns of numbers.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def read_flight(path: Path) -> FlightColumns:
         As of `read_file`; or time does not increase, the flight is too long, or an angle is not in rad.
     """
     columns = read_file(path)
-    for fault in flight_faults(columns.values):
+    for fault in flight_faults({**columns.values, **columns.drives}):
         place = str(path) if fault.row is None else place_in(path, columns, fault.row)
         raise InvalidInput(f"{place}: {fault.detail}", hint=fault.hint)
     return columns

@@ -9,6 +9,11 @@ from collections.abc import Sequence
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
+SWEEPS = ("sweep_left", "sweep_right")
+ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
+# columns of flown flights that no drive can be called
+CHANNELS = frozenset({*ATTITUDE, "p", "q", "r", "vx", "vy", "vz", "x", "y", "z", "tip_left_z", "tip_right_z"})
+DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
 MOST_COLUMNS = 1000  # a file of more is something else, or an attack
 LONGEST_TITLE = 200
 SYNONYMS = {"time": "t"}
@@ -63,8 +68,41 @@ def meaning(title: str, names: Sequence[str]) -> tuple[str, float | None] | None
     return (name, factor) if name in names and factor is not None else None
 
 
-def chosen(titles: Sequence[str], names: Sequence[str]) -> dict[str, tuple[int, float | None]]:
+def drive_meant(title: str) -> tuple[str, float | None] | None:
+    """The drive that a title could mean and its factor to rad, None where it names no unit.
+
+    >>> drive_meant("Fold_left [deg]"), drive_meant("cant"), drive_meant("p_rad_s")
+    (('fold_left', 0.017453292519943295), ('cant', None), None)
+    """
+    whole = plain(title)
+    factor = None
+    match = UNIT.fullmatch(whole)
+    if match is not None:
+        whole = match["name"].rstrip("_")
+        factor = ANGLE_UNITS.get(match["unit"])
+        if factor is None:
+            return None
+    could_be = DRIVE.fullmatch(whole) and whole not in CHANNELS and whole not in SYNONYMS
+    return (whole, factor) if could_be else None
+
+
+def drive_in_brackets(title: str) -> str | None:
+    """The drive that a title could mean whose unit in brackets is none that is read; None for all others."""
+    match = BRACKETS.fullmatch(plain(title))
+    name = None if match is None else match["name"].rstrip("_")
+    return name if name and DRIVE.fullmatch(name) and name not in CHANNELS else None
+
+
+def chosen(
+    titles: Sequence[str], names: Sequence[str], optional: Sequence[str] = ()
+) -> dict[str, tuple[int, float | None]]:
     """Find the columns that count.
+
+    Parameters
+    ----------
+    titles : of all columns.
+    names : the columns that are wanted.
+    optional : those of them that may be missing.
 
     Returns
     -------
@@ -95,15 +133,20 @@ def chosen(titles: Sequence[str], names: Sequence[str]) -> dict[str, tuple[int, 
                 title=TITLES,
             )
         found[name] = position, factor
-    missing = [name for name in names if name not in found]
+    missing = [name for name in names if name not in found and name not in optional]
     if missing:
-        raise FileFault(
-            "missing",
-            f"there is no column {', '.join(missing)}",
-            _way_out(titles, names, missing),
-            title=TITLES,
-        )
+        raise missing_columns(titles, names, missing)
     return found
+
+
+def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> FileFault:
+    """The fault of a file that lacks some of the columns `names`."""
+    return FileFault(
+        "missing",
+        f"there is no column {', '.join(missing)}",
+        _way_out(titles, names, missing),
+        title=TITLES,
+    )
 
 
 def _way_out(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> str:
@@ -112,7 +155,8 @@ def _way_out(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]
         match = BRACKETS.fullmatch(plain(title))
         if match and SYNONYMS.get(match["name"], match["name"]) in missing:
             return f"the unit of {shown(title)!r} is not read: {known_units(match['name'])}"
-    return f"give the columns {', '.join(names)}; units may be in the names (theta_deg, t_ms)"
+    drives = "; other drives of the aircraft by their names" if SWEEPS[0] in names else ""
+    return f"give the columns {', '.join(names)}{drives}; units may be in the names (theta_deg, t_ms)"
 
 
 def known_units(name: str) -> str:

@@ -1,4 +1,4 @@
-"""What ``morphid optimize`` has beside its request: the known model, the written schedule, the tables."""
+"""What ``morphid optimize`` has besides its request: the known model, the written schedule, the tables."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from morphdata.drives import SWEEPS, label
 from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.files import writing
 from morphid.request import Request
-from morphid.screen import short, stdout
+from morphid.screen import new_table, short, stdout
 
 if TYPE_CHECKING:
     from morphid.running import Answer
@@ -41,12 +41,13 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
     from morphcore.simulate.schedule_table import write_schedule_csv
     from morphid.running import wrote
 
-    found, moved = result["schedule"], result.get("drives", ("sweep_left", "sweep_right"))
+    found = result["schedule"]
     spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
+    drives = sorted(result.get("drives", SWEEPS))  # results of earlier versions have no others
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
-        write_schedule_csv(dict.fromkeys(sorted(moved), spline), times, path)
+        write_schedule_csv(dict.fromkeys(drives, spline), times, path)
     wrote(path)
 
 
@@ -66,19 +67,11 @@ def show_schedule(result: Mapping[str, Any]) -> None:
 def variation_table(result: Mapping[str, Any]) -> Table:
     """Compare the schedules: attitude variation (rad^2) in the models that flew them, and what they reach."""
     reduction, model = result.get("reduction_percent"), result.get("reduction_model")
-    table = Table(
-        title="Attitude variation in rad²; largest rate, acceleration, torque",
-        caption=None
-        if reduction is None
-        else f"optimum: {reduction:.1f} % below constant rate ({model} model)",
-        box=SIMPLE_HEAD,
-        padding=(0, 1),
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    table.add_column("schedule", no_wrap=True)
-    for title in (*MODELS, *REACHED.values()):
-        table.add_column(title, justify="right", no_wrap=True)
+    caption = None
+    if reduction is not None:
+        caption = f"optimum: {reduction:.1f} % below constant rate ({model} model)"
+    title = "Attitude variation in rad²; largest rate, acceleration, torque"
+    table = new_table("schedule", *MODELS, *REACHED.values(), title=title, caption=caption)
     for name, title in SCHEDULES.items():
         flown = result["variation"].get(name) or {}
         reached = (result.get("reached") or {}).get(name) or {}
@@ -90,22 +83,20 @@ def variation_table(result: Mapping[str, Any]) -> Table:
 
 def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
     """Show the front of duration (s) against variation (rad^2)."""
-    table = Table(title="Pareto front of duration and variation", box=SIMPLE_HEAD)
-    for title in ("duration, s", "variation, rad²", "at constant rate"):
-        table.add_column(title, justify="right")
+    columns = ("duration, s", "variation, rad²", "at constant rate")
+    table = new_table(*columns, title="Pareto front of duration and variation", left=0)
     for point in front:
         variations = (short(point["variation_rad2"]), short(point.get("constant_rad2")))
         table.add_row(f"{point['duration_s']:.2f}", *variations)
     return table
 
 
-def knot_table(schedule: Mapping[str, Sequence[float]]) -> Table:
+def knot_table(schedule: Mapping[str, Any]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
-    table = Table(title="Knots of the spline", box=SIMPLE_HEAD)
-    table.add_column("time, s", justify="right")
-    table.add_column("sweep, rad", justify="right")
-    for time_s, sweep_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
-        table.add_row(f"{time_s:.4f}", f"{sweep_rad:.4f}")
+    angle = f"{label(schedule.get('drive') or 'sweep')}, rad"
+    table = new_table("time, s", angle, title="Knots of the spline", left=0)
+    for time_s, angle_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
+        table.add_row(f"{time_s:.4f}", f"{angle_rad:.4f}")
     return table
 
 

@@ -1,4 +1,4 @@
-"""What ``morphid simulate`` has beside its request: model, schedule, the written flight, the table."""
+"""What ``morphid simulate`` has besides its request: model, schedule, the written flight, the table."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from morphdata.drives import BOTH
 from morphdata.faults import InvalidInput
 from morphdata.options import SCHEDULE
 from morphdata.schedules import load_schedules
@@ -19,8 +19,8 @@ from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.exits import CommandError, Exit
 from morphid.files import require_file, write_bytes
-from morphid.request import Request
-from morphid.screen import short, stdout
+from morphid.request import Request, aircraft_drives
+from morphid.screen import new_table, short, stdout
 
 if TYPE_CHECKING:
     from morphid.running import Answer
@@ -45,7 +45,7 @@ def _fill(request: Request, values: Values) -> None:
     request.put("/model/kind", kind, "--model")
     if known or kind is Model.EQUIVALENT:
         options.put_known_model(request, parameters, model_id, values["url"])
-    _put_schedules(request, *(values[name] for name in ("schedule", "rate", "final", "duration")))
+    _put_schedules(request, *(values[name] for name in ("schedule", "rate", "final", "drive", "duration")))
 
 
 def _save(answer: Answer, path: Path) -> None:
@@ -56,18 +56,23 @@ def _save(answer: Answer, path: Path) -> None:
 
 
 def _put_schedules(
-    request: Request, table: Path | None, rate: float | None, final: float | None, duration: float | None
+    request: Request,
+    table: Path | None,
+    rate: float | None,
+    final: float | None,
+    drive: str | None,
+    duration: float | None,
 ) -> None:
-    """Fill in what the hinges do, and for how long to fly."""
-    if table is not None and rate is None and final is None:
+    """Fill in what the drives do, and for how long to fly."""
+    if table is not None and rate is None and final is None and drive is None:
         end_s = _put_table(request, table)
     elif table is None and rate is not None and final is not None:
-        end_s = _put_rate(request, rate, final)
+        end_s = _put_rate(request, rate, final, drive)
     else:
         raise CommandError(
-            "there is no schedule for the hinges"
+            "there is no schedule for the drives"
             if table is None
-            else "--schedule and --rate exclude each other",
+            else "--schedule excludes --rate, --final and --drive",
             code=Exit.USAGE,
             hint="give either --schedule S.csv, or both --rate and --final",
         )
@@ -81,18 +86,23 @@ def _put_schedules(
 
 def _put_table(request: Request, path: Path) -> float:
     require_file(path)
+    drives = aircraft_drives(request)
     try:
-        schedules = load_schedules(path).model_dump(exclude_none=True)
+        schedules = load_schedules(path)
+        histories = schedules.given if drives is None else schedules.by_drive(drives)
     except InvalidInput as error:
         raise CommandError(
             error.message, code=Exit.INVALID_INPUT, hint=error.hint, given_by=f"--schedule {path}"
         ) from None
-    for side, history in schedules.items():
-        request.put(f"/schedules/{side}", history, f"--schedule {path}")
-    return float(schedules["left"]["time_s"][-1])
+    end_s = 0.0
+    for drive, history in histories.items():
+        document = history.model_dump()
+        request.put(f"/schedules/{drive}", document, f"--schedule {path}")
+        end_s = document["time_s"][-1]
+    return end_s
 
 
-def _put_rate(request: Request, rate: float, final: float) -> float:
+def _put_rate(request: Request, rate: float, final: float, drive: str | None) -> float:
     if not rate > 0.0 or final == 0.0:
         raise CommandError(
             f"--rate {rate:g} --final {final:g}: these values do not define a morph",
@@ -100,7 +110,10 @@ def _put_rate(request: Request, rate: float, final: float) -> float:
             hint="give a positive rate in rad/s, and a final angle in rad other than 0",
         )
     document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
-    request.put("/schedules/both", document, f"--rate {rate:g} --final {final:g}")
+    words = f"--rate {rate:g} --final {final:g}"
+    request.put(
+        f"/schedules/{drive or BOTH}", document, words if drive is None else f"{words} --drive {drive}"
+    )
     return abs(final) / rate
 
 
@@ -113,9 +126,8 @@ def flight_table(result: Mapping[str, Any]) -> Table:
     """Show how a flight started, how far the attitude went, and what it cost."""
     trim, summary, cost = (result.get(part) or {} for part in ("trim", "summary", "cost"))
     tips, largest = trim.get("tip_z_m") or {}, summary.get("max_abs_rad") or {}
-    table = Table(title=f"Flight of the {result['model']['kind']} model", box=SIMPLE_HEAD, show_header=False)
-    table.add_column("what")
-    table.add_column("value", justify="right")
+    table = new_table("what", "value", title=f"Flight of the {result['model']['kind']} model")
+    table.show_header = False
     table.add_row("angle of attack at the start, rad", short(trim.get("alpha_rad")))
     for side in ("left", "right"):
         if tips.get(side) is not None:
@@ -139,16 +151,28 @@ SIMULATE = Particulars(
         ],
         "schedule": Annotated[
             Path | None,
-            schedule_option("--schedule", help="Sweep over time: a file with t, sweep_left, sweep_right."),
+            schedule_option(
+                "--schedule",
+                help="Angles over time: a file with t and a column for each drive that moves (sweep_left, "
+                "fold_left_deg, or fold for both sides).",
+            ),
         ],
         "rate": Annotated[
             float | None,
             schedule_option(
-                "--rate", help="Instead of --schedule: sweep both wings at this mean rate, rad/s."
+                "--rate", help="Instead of --schedule: move both wings at this mean rate, rad/s."
             ),
         ],
         "final": Annotated[
-            float | None, schedule_option("--final", help="With --rate: sweep at the end, rad.")
+            float | None, schedule_option("--final", help="With --rate: angle at the end, rad.")
+        ],
+        "drive": Annotated[
+            str | None,
+            schedule_option(
+                "--drive",
+                help="With --rate: the drive that moves, fold_left, or fold for both sides; needed where the "
+                "aircraft has several kinds.",
+            ),
         ],
         "duration": Annotated[
             float | None,

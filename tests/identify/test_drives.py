@@ -61,11 +61,11 @@ def test_what_is_not_measured_holds() -> None:
     assert not asymmetric(alone)
 
 
-def test_a_column_beside_that_bears_a_drives_name_counts() -> None:
-    """Files have columns of all kinds; that of a drive is one."""
+def test_columns_of_a_file_that_are_no_drives_are_left_alone() -> None:
+    """A file has columns of all kinds; those of drives are followed."""
     sample = flown(fold=ConstantRate(0.0, 0.3, 0.3))
-    beside = replace(sample, drives={}, extra=dict(sample.drives) | {"q": np.zeros(sample.time_s.size)})
-    plain, moved = (sample_schedules(AIRCRAFT, each, "") for each in (sample, beside))
+    filed = replace(sample, drives=dict(sample.drives) | {"q": sample.phi}, of_file=True)
+    plain, moved = (sample_schedules(AIRCRAFT, each, "") for each in (sample, filed))
     for one, other in zip(plain, moved, strict=True):
         np.testing.assert_array_equal(one.motion([0.2]).angle, other.motion([0.2]).angle)
 
@@ -73,8 +73,8 @@ def test_a_column_beside_that_bears_a_drives_name_counts() -> None:
 @pytest.mark.parametrize(
     ("drives", "pointer"),
     [
-        ({"swep": 0.0}, "/samples/0/swep"),
-        ({"fold": 0.0, "fold_left": 0.1}, "/samples/0/fold_left"),
+        ({"swep": 0.0}, "/samples/0/swep_rad"),
+        ({"fold": 0.0, "fold_left": 0.1}, "/samples/0/fold_left_rad"),
         ({}, "/samples/0"),
         ({"fold": 2.0}, "/samples/0/fold_rad/0"),
     ],

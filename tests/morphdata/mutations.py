@@ -14,7 +14,22 @@ ODD: tuple[Any, ...] = (
     "", "1.0", "auto", "hold", "ä\n", [], [0.0], [1.0, 2.0, 3.0], [[1.0]], {}, {"kind": "hold"},
 )  # fmt: skip
 FACTORS = (-1.0, 0.0, 1e-9, 1e-3, 0.1, 0.5, 1.001, 2.0, 10.0, 1e3, 1e6, 1e12)
-EXTRA = ("chrod_m", "kind", "span_m", "name", "a/b~c", "role", "")
+EXTRA = (
+    "chrod_m",
+    "kind",
+    "span_m",
+    "name",
+    "a/b~c",
+    "role",
+    "",
+    "fold_left_rad",
+    "sweep_deg",
+    "x_rad",
+    "p_rad_s",
+)
+# keys of schedules, and columns of drives: one in the place of another
+DRIVE_KEYS = ("both", "left", "right", "sweep", "fold", "sweep_left", "fold_right", "elevator", "cant_left")
+COLUMN_UNITS = ("_rad", "_deg", "_mrad", "")
 
 
 def places(document: Any, here: Place = ()) -> list[Place]:
@@ -52,7 +67,7 @@ def _change(draw: st.DrawFn, document: Any, place: Place) -> None:
     *before, key = place
     parent = at(document, tuple(before))
     value = parent[key]
-    kind = draw(st.sampled_from(["drop", "retype", "perturb", "perturb", "extra", "swap", "twice"]))
+    kind = draw(st.sampled_from(["drop", "retype", "perturb", "perturb", "extra", "swap", "twice", "rename"]))
     if kind == "drop":
         del parent[key]
     elif kind == "perturb" and isinstance(value, int | float) and not isinstance(value, bool):
@@ -62,6 +77,9 @@ def _change(draw: st.DrawFn, document: Any, place: Place) -> None:
     elif kind == "swap":
         other = draw(st.sampled_from(list(parent) if isinstance(parent, dict) else range(len(parent))))
         parent[key], parent[other] = parent[other], value
+    elif kind == "rename" and isinstance(parent, dict):
+        unit = draw(st.sampled_from(COLUMN_UNITS)) if isinstance(value, list) else ""
+        parent[draw(st.sampled_from(DRIVE_KEYS)) + unit] = parent.pop(key)
     elif kind == "twice" and isinstance(value, list):
         value.extend(copy.deepcopy(value))
     else:

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 
 from app.settings import Settings
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, EXAMPLE_MATERIAL
-from morphdata.faults import InvalidInput
+from morphdata.faults import InvalidInput, MorphError
 from morphdata.identify import EXAMPLE_REQUEST
 from morphdata.operations import operation_named
 from morphdata.optimize import EXAMPLE_OPTIMIZATION
@@ -25,7 +25,7 @@ from morphdata.simulate import EXAMPLE_SIMULATION
 from morphdata.study import EXAMPLE_STUDY
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.morphdata.mutations import mutated
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 Document = dict[str, Any]
 
@@ -53,6 +53,28 @@ TAIL = {
     },
     "position_m": [-2.2, 0.0, 0.0],
     "flexible": False,
+}
+FOLDING: Document = {  # wings that sweep and fold, one hinge about a skew axis, one on a side alone
+    "fuselage": EXAMPLE_AIRCRAFT["fuselage"],
+    "surfaces": [
+        {
+            **{name: value for name, value in wing.items() if name != "hinge"},
+            "position_m": [0.0, 0.5 if wing["side"] == "right" else -0.5, 0.0],
+            "hinges": [
+                wing["hinge"],
+                {"position_m": [0.0, 0.5, 0.0], "axis": "x", "angle_rad": 0.1, "max_rad": 1.0},
+                {"position_m": [0.1, 0.5, 0.0], "axis": [0.1, 2.0, 0.0], "name": "cant"},
+            ][: 3 if wing["side"] == "left" else 2],
+        }
+        for wing in EXAMPLE_AIRCRAFT["surfaces"]
+    ],
+}
+FOLD_SAMPLE: Document = {
+    **{name: value for name, value in EXAMPLE_SAMPLE.items() if not name.startswith("sweep")},
+    "fold_rad": [0.0, 0.0, 0.1, 0.2],
+    "sweep_left_deg": [0.0, 0.0, 1.0, 2.0],
+    "sweep_right_rad": [0.0, 0.0, 0.01, 0.02],
+    "vx_m_s": [150.0] * 4,
 }
 BODY = {"mass_kg": 875.0, "inertia_kg_m2": [[60.0, 0.0, -1.0], [0.0, 1800.0, 0.0], [-1.0, 0.0, 1850.0]]}
 AS_IDENTIFIED = {"lattice": {"chordwise": 2, "spanwise": 6}, "step_s": 0.005, "start": "given"}
@@ -93,7 +115,11 @@ RICH_OPTIMIZATION: Document = {
     "flexible": {"elements": 4},
 }
 EXAMPLES: dict[str, tuple[Document, ...]] = {
-    "identify": (EXAMPLE_REQUEST, RICH_IDENTIFICATION),
+    "identify": (
+        EXAMPLE_REQUEST,
+        RICH_IDENTIFICATION,
+        {**EXAMPLE_REQUEST, "aircraft": FOLDING, "samples": [FOLD_SAMPLE]},
+    ),
     "study": (EXAMPLE_STUDY, {**RICH_IDENTIFICATION, "model": {"links_per_wing": [1, 2]}, "search": {}}),
     "simulate": (
         EXAMPLE_SIMULATION,
@@ -102,6 +128,8 @@ EXAMPLES: dict[str, tuple[Document, ...]] = {
             "model": {"kind": "equivalent", "parameters": EXAMPLE_PARAMETERS | AS_IDENTIFIED},
             "schedules": {"left": SPLINE, "right": TABLE},
         },
+        EXAMPLE_SIMULATION
+        | {"aircraft": FOLDING, "schedules": {"sweep": SPLINE, "fold_left": TABLE, "cant": {"kind": "hold"}}},
         EXAMPLE_SIMULATION
         | {
             "aircraft": {"fuselage": BODY, "surfaces": [*EXAMPLE_AIRCRAFT["surfaces"], TAIL]},
@@ -118,7 +146,15 @@ EXAMPLES: dict[str, tuple[Document, ...]] = {
             }
         },
     ),
-    "optimize": (EXAMPLE_OPTIMIZATION, RICH_OPTIMIZATION),
+    "optimize": (
+        EXAMPLE_OPTIMIZATION,
+        RICH_OPTIMIZATION,
+        {
+            **EXAMPLE_OPTIMIZATION,
+            "aircraft": FOLDING,
+            "morph": {**EXAMPLE_OPTIMIZATION["morph"], "drive": "fold"},
+        },
+    ),
 }
 # what takes more than the request to see: whether a spline keeps the limits, the library finds by computing
 COMPUTED = ("/limits/max_rate_rad_s", "/limits/max_accel_rad_s2")
@@ -140,7 +176,7 @@ def refused_by_library(operation: str, document: Document) -> list[str]:
         return [fault.pointer for fault in error.faults]
     try:
         find_operation(operation)(document, 1)
-    except WorkRefused as error:
+    except MorphError as error:
         if error.code == InvalidInput.code and error.pointer not in COMPUTED:
             return [error.pointer]
     return []

@@ -10,7 +10,7 @@ import pytest
 from morphcore.errors import InvalidInput
 from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.schedule import ConstantRate, Hold, Quadratic, Spline, Tabulated, scheduled
-from morphdata.aircraft import EXAMPLE_AIRCRAFT
+from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.schedules import AnySchedule, Schedules
 from morphdata.simulate import EXAMPLE_SIMULATION, SimulateRequest
 
@@ -107,52 +107,113 @@ def test_what_is_wrong_is_pointed_at(document: Any, pointer: str) -> None:
     assert caught.value.hint
 
 
-def refused(document: Any, aircraft: Document) -> list[str]:
-    """Pointers to what is wrong with schedules for an aircraft."""
-    request = {**EXAMPLE_SIMULATION, "aircraft": aircraft, "schedules": document}
+def aircraft(*words: str, tail: bool = False) -> Document:
+    """The example with wings whose hinges have these axes, and with a tail that has an incidence hinge."""
+    wings = []
+    for wing in EXAMPLE_AIRCRAFT["surfaces"]:
+        place = wing["hinge"]["position_m"]
+        hinges = [{"position_m": place, "axis": axis} for axis in words]
+        wings.append({**wing, "hinge": None, "hinges": hinges} if words else {**wing})
+    tails = [
+        {**wing, "name": f"{wing['side']} tail", "span_m": 1.0, "flexible": False, "hinges": None}
+        | {"hinge": {"position_m": [-2.0, wing["hinge"]["position_m"][1], 0.0], "axis": "y"}}
+        for wing in EXAMPLE_AIRCRAFT["surfaces"]
+    ]
+    return EXAMPLE_AIRCRAFT | {"surfaces": [*wings, *(tails if tail else ())]}
+
+
+def refusals(schedules: Any, of: Document) -> list[tuple[str, str, str]]:
+    """Code, pointer and hint of every fault."""
     with pytest.raises(InvalidInput) as caught:
-        SimulateRequest.parse(request)
-    assert caught.value.hint
-    return [fault.pointer for fault in caught.value.faults]
+        SimulateRequest.parse({**EXAMPLE_SIMULATION, "aircraft": of, "schedules": schedules})
+    return [(fault.code, fault.pointer, fault.hint) for fault in caught.value.faults]
 
 
-def test_one_for_both_sides_or_one_for_each() -> None:
-    """``both`` moves both sides; ``left`` and ``right`` each their own."""
-    both, each = Schedules.parse({"both": HOLD}), Schedules.parse({"left": HOLD, "right": RATE})
-    assert both.of_side("left") == both.of_side("right") == ("both", both.both)
-    assert (each.of_side("left"), each.of_side("right")) == (("left", each.left), ("right", each.right))
+@pytest.mark.parametrize("key", ["both", "left"])
+def test_one_history_never_turns_two_unlike_hinges(key: str) -> None:
+    """The case of the issue: a wing that sweeps and a tail with an incidence hinge, and `both` for them."""
+    ((code, pointer, hint),) = refusals({key: RATE}, aircraft("z", tail=True))
+    assert (code, pointer) == ("ambiguous_drive", f"/schedules/{key}")
+    for name in (
+        "sweep_left",
+        "sweep_right",
+        "incidence_left",
+        "incidence_right",
+        "sweep, incidence for both",
+    ):
+        assert name in hint
+
+
+def test_keys_are_drives_words_and_sides() -> None:
+    """The wings sweep and the left one folds; the tail holds its angle."""
+    drives = Aircraft.parse(aircraft("z", "x", tail=True)).drives
+    given = Schedules.parse({"sweep": RATE, "fold_left": HOLD})
+    sweep, fold = given.given.values()
+    assert given.by_drive(drives) == {"sweep_right": sweep, "sweep_left": sweep, "fold_left": fold}
+    assert given.keys_by_drive(drives)["sweep_left"] == "sweep"
+    assert Schedules.parse(given.model_dump(exclude_none=True)) == given
+
+
+def test_documents_of_old_move_what_they_moved() -> None:
+    """``both`` moves both sides; ``left`` and ``right`` each their own, be it sweep or another one kind."""
+    for axis, word in (("z", "sweep"), ("x", "fold")):
+        drives = Aircraft.parse(aircraft(axis)).drives
+        both, each = Schedules.parse({"both": HOLD}), Schedules.parse({"left": HOLD, "right": RATE})
+        assert both.by_drive(drives) == {f"{word}_right": both.both, f"{word}_left": both.both}
+        assert each.by_drive(drives) == {f"{word}_right": each.right, f"{word}_left": each.left}
+        assert Schedules.parse({"both": None, "left": HOLD}).by_drive(drives) == {f"{word}_left": each.left}
+
+
+@pytest.mark.parametrize("schedules", [{}, {"left": HOLD}, {"sweep_right": RATE}])
+def test_what_nobody_moves_holds_its_angle(schedules: Document) -> None:
+    """A drive without a schedule is no fault."""
+    SimulateRequest.parse({**EXAMPLE_SIMULATION, "schedules": schedules})
 
 
 @pytest.mark.parametrize(
-    ("document", "pointers"),
+    ("document", "code", "pointers"),
     [
-        ({}, ["/schedules/left", "/schedules/right"]),
-        ({"left": HOLD}, ["/schedules/right"]),
-        ({"both": HOLD, "right": HOLD}, ["/schedules/both"]),
-        ({"both": HOLD, "middle": HOLD}, ["/schedules/middle"]),
-        ({"both": {"kind": "hold", "angle_rad": "x"}}, ["/schedules/both/angle_rad"]),
-        ({"both": RATE | {"final_rad": 1.4}}, ["/schedules/both/final_rad"] * 2),
+        ({"both": HOLD, "right": HOLD}, "given_twice", ["/schedules/right"]),
+        ({"sweep": HOLD, "sweep_left": HOLD}, "given_twice", ["/schedules/sweep_left"]),
+        ({"both": HOLD, "middle": HOLD}, "unknown_drive", ["/schedules/middle"]),
+        ({"swep": RATE}, "unknown_drive", ["/schedules/swep"]),
+        ({"sweep": {"kind": "hold", "angle_rad": "x"}}, "float_type", ["/schedules/sweep/angle_rad"]),
+        ({"sweep": {"kind": "hold", "angel_rad": 0.1}}, "unknown_field", ["/schedules/sweep/angel_rad"]),
+        ({"both": RATE | {"final_rad": 1.4}}, "sweep_out_of_range", ["/schedules/both/final_rad"]),
         (
             {"left": SPLINE | {"knot_angle_rad": [0.0, 1.5, 1.6]}, "right": RATE},
+            "sweep_out_of_range",
             ["/schedules/left/knot_angle_rad/1"],
         ),
-        ("hold", ["/schedules"]),
+        (RATE, "missing", ["/schedules"]),
+        ("hold", "model_type", ["/schedules"]),
     ],
 )
-def test_sides_are_told_apart(document: Any, pointers: list[str]) -> None:
-    """A side without a schedule or with two, no side at all, an angle beyond a hinge: refused by name."""
-    assert refused(document, EXAMPLE_AIRCRAFT) == list(dict.fromkeys(pointers))
+def test_what_moves_nothing_or_too_much_is_refused(document: Any, code: str, pointers: list[str]) -> None:
+    """Two schedules of a drive, a drive that is none, an angle beyond a range: refused by its key."""
+    found = refusals(document, EXAMPLE_AIRCRAFT)
+    assert [pointer for _, pointer, _ in found] == pointers
+    assert found[0][0] == code
+    assert all(hint for _, _, hint in found)
 
 
-def test_a_side_without_a_hinge_needs_no_schedule() -> None:
-    """Where only the right wing is hinged, the left side may stay out."""
-    right, left = EXAMPLE_AIRCRAFT["surfaces"]
-    fixed = {name: value for name, value in left.items() if name != "hinge"} | {
-        "position_m": [0.0, -0.35, 0.0]
-    }
-    aircraft = EXAMPLE_AIRCRAFT | {"surfaces": [right, fixed]}
-    request = {**EXAMPLE_SIMULATION, "aircraft": aircraft, "schedules": {"right": RATE}}
-    assert SimulateRequest.parse(request).schedules.of_side("left") is None
+def test_a_misspelt_key_is_guessed() -> None:
+    """By name; and a schedule that stands where schedules by drive are wanted is told how."""
+    ((_, _, hint),) = refusals({"swep_left": RATE}, EXAMPLE_AIRCRAFT)
+    assert "Did you mean 'sweep_left'?" in hint
+    assert "sweep" in refusals(RATE, EXAMPLE_AIRCRAFT)[0][2]
+
+
+def test_every_drive_has_its_own_range() -> None:
+    """Fold to 1.25 rad is beyond the hinges' range, sweep is not; degrees are guessed."""
+    document = aircraft("z", "x")
+    for wing in document["surfaces"]:
+        wing["hinges"][1]["max_rad"] = 1.2
+    ((code, pointer, hint),) = refusals({"sweep": HOLD, "fold": HOLD | {"angle_rad": 1.25}}, document)
+    assert (code, pointer) == ("angle_out_of_range", "/schedules/fold/angle_rad")
+    assert "'right wing'" in hint
+    ((_, _, hint),) = refusals({"fold": HOLD | {"angle_rad": 45.0}}, document)
+    assert "degrees" in hint
 
 
 def test_hinges_keep_their_range_between_knots() -> None:

@@ -105,11 +105,11 @@ def test_the_written_schedule_is_the_spline(tmp_path: Path, play: Play) -> None:
     ended = RUNNER.invoke(app, command("optimize", *words, "--url", "http://there"))
     assert ended.exit_code == Exit.OK, ended.output
     written = load_schedules(out).model_dump()
-    time_s = np.array(written["left"]["time_s"])
+    time_s = np.array(written["sweep_left"]["time_s"])
     np.testing.assert_allclose(time_s, np.linspace(0.0, 2.5, 251), atol=1e-12)
     spline = Spline(np.array([0.0, 0.9, 2.0]), np.array([0.0, 0.4, 1.0])).motion(time_s)
     for side in ("left", "right"):
-        np.testing.assert_allclose(written[side]["angle_rad"], spline.angle, rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(written[f"sweep_{side}"]["angle_rad"], spline.angle, rtol=0.0, atol=1e-11)
 
 
 def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ from morphdata.schedules import load_schedules
 
 def read(path: Path) -> dict[str, Any]:
     """The motion of each side's hinge."""
-    given = load_schedules(path)
-    return {side: scheduled(found[1]) for side in SIDES if (found := given.of_side(side))}
+    found = load_schedules(path).given
+    return {side: scheduled(found[f"sweep_{side}"]) for side in SIDES if f"sweep_{side}" in found}
 
 
 def test_a_sample_flight_is_a_schedule(examples: Path) -> None:
@@ -66,7 +66,8 @@ def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     [
         ("", "the file is empty"),
         ("t,sweep_left,sweep_right\n", "holds no rows"),
-        ("t,sweep_left\n0,0\n1,0\n2,0\n", "no column sweep_right"),
+        ("t\n0\n1\n2\n", "no column sweep_left, sweep_right"),
+        ("t,theta,q\n0,0,0\n1,0,0\n2,0,0\n", "no column sweep_left, sweep_right"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,x\n2,0,0\n", "line 3: sweep_right is 'x'"),
         ("t,sweep_left,sweep_right\n0,0,0\n1,0,nan\n2,0,0\n", "line 3: sweep_right is 'nan'"),
         ("t,sweep_left,sweep_right\n0,0,0\n\n2,0,0\n1,0,0\n", "line 5: time does not increase"),

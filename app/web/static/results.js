@@ -105,7 +105,8 @@ function reductionSentence(result) {
 function knotTable(schedule) {
   if (!schedule) return element("p", {}, "None was found yet that flies to its end.");
   const knots = schedule.knot_time_s.map((time, i) => [String(i + 1), show.number(time), show.number(schedule.knot_sweep_rad[i])]);
-  return table(["Knot", "time, s", "sweep, rad"].map(number), knots, { wide: false });
+  const drive = (schedule.drive ?? "sweep").replaceAll("_", " ");
+  return table(["Knot", "time, s", `${drive}, rad`].map(number), knots, { wide: false });
 }
 
 function optimizeCards(result) {

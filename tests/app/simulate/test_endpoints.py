@@ -127,9 +127,9 @@ def schedules(**sides: Any) -> tuple[str, Document]:
 RATE = {"kind": "constant_rate", "final_rad": 1.0}
 # (field that is changed, its bad value, pointer of the fault, code, words that the hint must hold)
 BAD_FIELDS = [
-    (*schedules(), "/schedules/left", "missing", "hold"),
-    (*schedules(left=TABLE), "/schedules/right", "missing", "both"),
-    (*schedules(both=TABLE, left=TABLE), "/schedules/both", "given_twice", "left and right"),
+    (*schedules(both=TABLE, left=TABLE), "/schedules/left", "given_twice", "Leave one"),
+    (*schedules(fold=TABLE), "/schedules/fold", "unknown_drive", "sweep_left"),
+    ("/schedules", TABLE, "/schedules", "missing", "Name the drive"),
     (*schedules(both={**RATE}), "/schedules/both/duration_s", "missing", "one of them"),
     (
         *schedules(both={**RATE, "duration_s": 1.0, "rate_rad_s": 1.0}),

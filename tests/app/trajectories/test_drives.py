@@ -1,0 +1,118 @@
+"""Columns of drives survive upload and reading back, and reach the jobs of the aircraft that has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import update
+
+from app.documents import packed
+from app.jobs import store
+from app.tables import trajectories
+from morphdata.identify import EXAMPLE_REQUEST
+from morphdata.samples import EXAMPLE_SAMPLE
+from tests.app.calls import fault, post
+from tests.app.running_service import RunningService
+from tests.app.trajectories.test_endpoints import upload
+from tests.morphdata.test_schedules import aircraft
+
+T = [0.0, 0.01, 0.02, 0.03]
+HEAD = "t,phi,theta,psi"
+ROWS = [f"{t},0,0.06,0" for t in T]
+
+
+def flight(*columns: str, **angles: list[Any]) -> bytes:
+    """A file with these further columns."""
+    rows = [
+        ",".join([row, *map(str, cells)])
+        for row, cells in zip(ROWS, zip(*angles.values(), strict=True), strict=True)
+    ]
+    return "\n".join([",".join([HEAD, *angles, *columns]), *rows]).encode()
+
+
+def request(trajectory_id: str, *axes: str) -> dict[str, Any]:
+    """An identification with an uploaded sample."""
+    return {**EXAMPLE_REQUEST, "aircraft": aircraft(*axes), "samples": [{"trajectory_id": trajectory_id}]}
+
+
+def stored(service: RunningService, document: dict[str, Any]) -> dict[str, Any]:
+    """Post an identification and give what the worker reads of it."""
+    answer = post(service, "/identify", document)
+    assert answer.status_code == 202, answer.text
+    with service.database.read() as session:
+        return store.load_request(session, answer.json()["id"])
+
+
+def uploaded(service: RunningService, content: bytes) -> tuple[str, dict[str, Any]]:
+    """The id of an uploaded file, and what reads back."""
+    answer = upload(service, content, "flight.csv")
+    assert answer.status_code == 201, answer.text
+    return answer.json()["id"], service.client.get(answer.headers["location"]).json()
+
+
+def test_a_drive_survives_upload_reading_back_and_identification(any_service: RunningService) -> None:
+    """Fold in degrees and a throttle: both read back in rad, and the fold alone reaches the job."""
+    content = flight(fold_left_deg=[0, 0, 1, 2], fold_right_deg=[0, 0, 1, 3], throttle=[1, 1, 1, 1])
+    name, back = uploaded(any_service, content)
+    np.testing.assert_allclose(back["fold_right_rad"], np.deg2rad([0, 0, 1, 3]), rtol=1e-14)
+    assert back["throttle_rad"] == [1.0] * 4
+    assert "sweep_left_rad" not in back
+    (sample,) = stored(any_service, request(name, "x"))["samples"]
+    assert sample["fold_left_rad"] == back["fold_left_rad"]
+    assert "throttle_rad" not in sample
+    again = any_service.client.post(
+        "/trajectories",
+        json={k: v for k, v in back.items() if k.endswith(("_rad", "_s")) and k != "duration_s"},
+    )
+    assert again.status_code == 201, again.text
+
+
+@pytest.mark.parametrize(
+    ("angles", "axes", "code", "words"),
+    [
+        ({"flap": T}, ("x",), "no_drive", "fold_left"),
+        ({"fold_left": T}, ("x",), "missing", "fold_right"),
+        ({"sweep_left": T, "sweep_right": T}, ("x", "y"), "ambiguous_drive", "incidence_right"),
+        ({"sweep": T, "fold": [0, 0, "x", 0]}, ("z", "x"), "unreadable_column", "Repair"),
+    ],
+)
+def test_what_does_not_move_the_aircraft_is_refused_at_the_sample(
+    service: RunningService, angles: dict[str, Any], axes: tuple[str, ...], code: str, words: str
+) -> None:
+    """Once the aircraft is known; the pointer is the id's, and the hint holds the way out."""
+    name, _ = uploaded(service, flight(**angles))
+    (found,) = fault(service.client.post("/identify", json=request(name, *axes)))["errors"]
+    assert (found["code"], found["pointer"]) == (code, "/samples/0/trajectory_id")
+    assert words in found["hint"]
+
+
+def test_a_column_that_cannot_be_read_is_told_and_harms_no_other_aircraft(service: RunningService) -> None:
+    """The flight says why; whoever does not fold is not concerned."""
+    name, back = uploaded(service, flight(sweep=T, fold=[0, 0, "x", 0]))
+    assert "not a finite number" in back["unreadable"]["fold"]
+    assert service.client.post("/validate/identify", json=request(name, "z")).status_code == 200
+
+
+def test_flights_of_before_are_read(any_service: RunningService) -> None:
+    """A row with the six columns that every upload had: read back, and taken for an identification."""
+    name, _ = uploaded(any_service, flight(sweep=T))
+    columns = {field: EXAMPLE_SAMPLE[field] for field in EXAMPLE_SAMPLE if field.endswith(("_s", "_rad"))}
+    with any_service.database.write() as session:
+        session.execute(
+            update(trajectories).where(trajectories.c.id == name).values(document=packed(columns))
+        )
+    back = any_service.client.get(f"/trajectories/{name}").json()
+    assert {field: back[field] for field in columns} == columns
+    for axes in (("z",), ("x",)):
+        (sample,) = stored(any_service, request(name, *axes))["samples"]
+        assert sample["sweep_left_rad"] == columns["sweep_left_rad"]
+
+
+def test_json_without_a_drive_is_refused(service: RunningService) -> None:
+    """As a file is."""
+    columns = dict.fromkeys(("time_s", "phi_rad", "theta_rad", "psi_rad"), T)
+    (found,) = fault(service.client.post("/trajectories", json=columns))["errors"]
+    assert (found["code"], found["pointer"]) == ("missing", "/sweep_left_rad")
+    assert "fold_left_rad" in found["hint"]
