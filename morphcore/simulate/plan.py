@@ -433,8 +433,10 @@ def _nodes(length_rad: float, spacing_rad: float) -> int:
 
 def _operator_table(model: ChainModel, angles: Array, spacing: float) -> OperatorTable:
     mach = model.flight.mach or 0.0
-    moved = np.abs(np.diff(angles, axis=0)).max(axis=1, initial=0.0)
-    travelled = np.concatenate([[0.0], np.cumsum(moved)])
+    moved = np.abs(np.diff(angles, axis=0))
+    # a surface turns by no more than all its hinges together
+    turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
+    travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
 
     def operator(row: Array) -> LatticeOperator:
         return lattice_operator(model.lattice, tuple(row), mach=mach)
