@@ -20,12 +20,7 @@ logger = logging.getLogger(__name__)
 
 
 class BackgroundWriter:
-    """One thread that writes in the order of asking; a write that fails is logged and forgotten.
-
-    Parameters
-    ----------
-    database : Database
-    """
+    """One thread that writes in the order of requests; a write that fails is logged and forgotten."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -45,7 +40,7 @@ class BackgroundWriter:
         self._thread.join(STOP_S)
 
     def put(self, write: Write) -> None:
-        """Have `write` called with a session of its own, soon; never waits."""
+        """Have `write` called soon with a session of its own; never waits."""
         try:
             self._waiting.put_nowait(write)
         except queue.Full:

@@ -17,29 +17,21 @@ SCHEMES = {
     "unix": "unix",
     "redis+socket": "unix",  # Celery's
 }
-CERTIFICATE_CHECKS = {
-    "required": "required",
-    "cert_required": "required",
-    "optional": "optional",
-    "cert_optional": "optional",
-    "none": "none",
-    "cert_none": "none",
-}
-TLS_OPTIONS = frozenset(
-    {
-        "ssl_ca_certs",
-        "ssl_ca_path",
-        "ssl_cert_reqs",
-        "ssl_certfile",
-        "ssl_check_hostname",
-        "ssl_ciphers",
-        "ssl_keyfile",
-        "ssl_min_version",
-        "ssl_password",
-    }
-)
-OPTIONS = frozenset({"client_name", "db", "password", "protocol", "socket_keepalive", "username"})
+CERTIFICATE_CHECKS = ("required", "optional", "none")  # in Celery's spelling with `cert_` before them
+OPTIONS = frozenset({"client_name", "db", "password", "protocol", "username"})
 HOST_OPTIONS = frozenset({"socket_keepalive"})  # a socket file knows no such thing
+TLS_OPTIONS = frozenset(
+    f"ssl_{name}"
+    for name in (
+        *("ca_certs", "ca_path", "cert_reqs", "certfile", "check_hostname"),
+        *("ciphers", "keyfile", "min_version", "password"),
+    )
+)
+OPTIONS_OF = {
+    "redis": OPTIONS | HOST_OPTIONS,
+    "rediss": OPTIONS | HOST_OPTIONS | TLS_OPTIONS,
+    "unix": OPTIONS,
+}
 
 
 def is_redis(url: str) -> bool:
@@ -73,18 +65,16 @@ def canonical(url: str) -> str:
         options["db"] = options.pop("virtual_host").strip("/")
     _refuse_unknown(scheme, options)
     path = parts.path
-    if scheme == "unix":
-        if parts.hostname or not path.strip("/"):
-            raise ValueError(
-                "MORPHID_BROKER_URL: a socket file is named by its full path: unix:///run/valkey.sock"
-            )
-    else:
-        number = options.get("db", path.strip("/"))
-        if number and not number.isdecimal():
-            raise ValueError(
-                "MORPHID_BROKER_URL: what follows the broker's host is no number of a database; "
-                "a slash in the password is written %2F"
-            )
+    number = "" if scheme == "unix" else options.get("db", path.strip("/"))
+    if scheme == "unix" and (parts.hostname or not path.strip("/")):
+        raise ValueError(
+            "MORPHID_BROKER_URL: a socket file is named by its full path: unix:///run/valkey.sock"
+        )
+    if number and not number.isdecimal():
+        raise ValueError(
+            "MORPHID_BROKER_URL: what follows the broker's host is no number of a database; "
+            "a slash in the password is written %2F"
+        )
     if scheme == "rediss":
         options["ssl_cert_reqs"] = _certificate_check(options.get("ssl_cert_reqs", "required"))
     # Celery takes what stands behind a semicolon for another address
@@ -93,24 +83,19 @@ def canonical(url: str) -> str:
 
 
 def _refuse_unknown(scheme: str, options: dict[str, str]) -> None:
-    for name in sorted(options):
+    known = OPTIONS_OF[scheme]
+    for name in sorted(options.keys() - known):
         if name in TLS_OPTIONS:
-            if scheme != "rediss":
-                raise ValueError(f"MORPHID_BROKER_URL: {name} is for TLS, which is spelled rediss://")
-        elif name not in OPTIONS or (scheme == "unix" and name in HOST_OPTIONS):
-            known = (OPTIONS - HOST_OPTIONS if scheme == "unix" else OPTIONS) | (
-                TLS_OPTIONS if scheme == "rediss" else frozenset()
-            )
-            raise ValueError(
-                f"MORPHID_BROKER_URL: unknown option {name[:40]!r}; the options are "
-                f"{', '.join(sorted(known))}"
-            )
+            raise ValueError(f"MORPHID_BROKER_URL: {name} is for TLS, which is spelled rediss://")
+        raise ValueError(
+            f"MORPHID_BROKER_URL: unknown option {name[:40]!r}; the options are {', '.join(sorted(known))}"
+        )
 
 
 def _certificate_check(value: str) -> str:
-    try:
-        return CERTIFICATE_CHECKS[value.lower()]
-    except KeyError:
+    check = value.lower().removeprefix("cert_")
+    if check not in CERTIFICATE_CHECKS:
         raise ValueError(
             f"MORPHID_BROKER_URL: ssl_cert_reqs is required, optional or none, not {value[:40]!r}"
-        ) from None
+        )
+    return check

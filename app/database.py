@@ -141,9 +141,8 @@ def _keep_private(file: Path) -> None:
 def _postgres_link(url: URL) -> dict[str, Any]:
     """Connection options in addition to the URL; whatever the URL says itself takes precedence."""
     options = " ".join(f"-c {name}={value}" for name, value in POSTGRES_PATIENCE.items())
-    own = url.query.get("options")
-    told = {**POSTGRES_LINK, "options": f"{options} {own}" if own else options}
-    return {key: value for key, value in told.items() if key == "options" or key not in url.query}
+    link = {key: value for key, value in POSTGRES_LINK.items() if key not in url.query}
+    return {**link, "options": f"{options} {url.query.get('options', '')}".rstrip()}
 
 
 class Database:
@@ -153,11 +152,6 @@ class Database:
     ----------
     url : str
         SQLAlchemy URL, ``sqlite:///...`` or ``postgresql://...``.
-
-    Attributes
-    ----------
-    reserve : Reserve or None
-        Room for `write_even_if_full`; None where there is no file of ours.
     """
 
     def __init__(self, url: str) -> None:
@@ -165,7 +159,7 @@ class Database:
         self.engine = make_engine(url)
         parsed = make_url(self.url)
         file = _sqlite_file(parsed) if parsed.get_backend_name() == "sqlite" else None
-        self.reserve = None if file is None else Reserve(file)
+        self.reserve = None if file is None else Reserve(file)  # room for `write_even_if_full`
         # SQLite: a transaction that will write takes the write lock at once; upgrading later may fail
         self._writer = self.engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"})
 
@@ -243,21 +237,18 @@ def upgrade(url: str, revision: str = "head") -> None:
     from app.disk_space import make_shrinkable  # lazy: it stands on this module
     from migrations import HEAD
 
-    if revision == "head":
-        database = Database(url)
-        try:
-            with database.read() as session:
-                current = schema_revision(session) == HEAD
-            if current:
-                make_shrinkable(database)
-                return
-        finally:
-            database.dispose()
-    from alembic import command  # lazy: most starts have nothing to migrate
+    database = Database(url)
+    try:
+        with database.read() as session:
+            current = schema_revision(session)
+        if revision != "head" or current != HEAD:
+            from alembic import command  # lazy: most starts have nothing to migrate
 
-    command.upgrade(migration_config(url), revision)
-    if revision == "head":
-        upgrade(url)
+            command.upgrade(migration_config(url), revision)
+        if revision == "head":
+            make_shrinkable(database)
+    finally:
+        database.dispose()
 
 
 def downgrade(url: str, revision: str) -> None:

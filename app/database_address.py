@@ -1,4 +1,4 @@
-"""The address of a database as text: written so that the file lies where it was asked, or refused."""
+"""The address of a database as text: written so that the file lies where it should, or refused."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sqlite_url(file: Path) -> str:
     Raises
     ------
     UnusableAddress
-        SQLite would look for another file: it takes names in UTF-8, and this process has others.
+        SQLite would look for another file: it reads names as UTF-8, and this process encodes them otherwise.
     """
     from sqlalchemy import URL  # lazy, here and below: settings are read where no database is
 

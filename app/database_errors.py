@@ -1,4 +1,4 @@
-"""What a failed transaction says of the database: it is away, it is full, or the statement was wrong."""
+"""Why a transaction failed: the database is away or full, or the statement was wrong."""
 
 from __future__ import annotations
 
@@ -10,14 +10,8 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 # https://www.postgresql.org/docs/current/errcodes-appendix.html
 POSTGRES_DISK_FULL = "53100"
-POSTGRES_PASSING = (
-    "08",
-    "40",
-    "53",
-    "55",
-    "57",
-    "58",
-)  # connection, rollback, resources, locks, operator, system
+POSTGRES_PASSING = ("08", "40", "53", "55", "57", "58")
+# of these classes: connection, rollback, resources, locks, operator, system
 POSTGRES_STANDBY = "25006"  # writes are refused: the former primary answers after a switch-over
 # https://www.sqlite.org/rescode.html, primary codes
 SQLITE_PASSING = frozenset(

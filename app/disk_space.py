@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 
 def give_back(database: Database) -> bool:
-    """Give one slice of free pages back to the disk; tell whether more are left."""
+    """Give one slice of free pages back to the disk; return whether more are left."""
     if database.engine.dialect.name != "sqlite":
         return False
     with database.read() as session:

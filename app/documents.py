@@ -15,9 +15,8 @@ Document = dict[str, Any]
 
 CONTAINERS = frozenset({dict, list, tuple})
 
-DEFLATE_LEVEL = (
-    1  # trajectories shrink threefold in a few milliseconds; level 6 wins 10 per cent for four times that
-)
+# trajectories shrink threefold in a few milliseconds; level 6 wins 10 per cent for four times that
+DEFLATE_LEVEL = 1
 
 
 def finite(value: Any) -> Any:

@@ -1,38 +1,48 @@
-"""The one error tree of the service: an error knows its status, its stable code, the field, the way out."""
+"""The one error tree of the service: an error knows its status, its stable code, the field, the way out.
+
+What is the same for every error of a kind stands in its class; whoever raises one adds what is not.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from morphdata.faults import Fault, Pickled
 
 
-@dataclass(eq=False)
 class ServiceError(Pickled, Exception):
     """Root of the tree; carries what a problem document says."""
-
-    detail: str = ""
-    pointer: str = ""
-    hint: str = ""
-    faults: tuple[Fault, ...] = field(default=())
 
     status = 500
     code = "internal_error"
     title = "Something went wrong inside the service"
-    ask_again_s: ClassVar[int | None] = None  # when a repetition may succeed
+    detail = ""
+    pointer = ""
+    hint = ""
+    retry_after_s: int | None = None  # when a repetition may succeed
+    challenge: str | None = None  # how to authenticate
 
-    def __post_init__(self) -> None:
-        self.args = (self.detail,)  # not what a subclass was constructed of
+    def __init_subclass__(cls, *, status: int | None = None, code: str = "", title: str = "") -> None:
+        cls.status, cls.code, cls.title = status or cls.status, code or cls.code, title or cls.title
+
+    def __init__(
+        self, detail: str = "", pointer: str = "", hint: str = "", faults: tuple[Fault, ...] = ()
+    ) -> None:
+        super().__init__(detail or self.detail)
+        self.detail = detail or self.detail
+        self.pointer = pointer or self.pointer
+        self.hint = hint or self.hint
+        self.faults = faults
 
     def __str__(self) -> str:
         return self.detail or self.title
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers that the answer must carry (Retry-After: RFC 9110, section 10.2.3)."""
-        return {} if self.ask_again_s is None else {"Retry-After": str(self.ask_again_s)}
+        """Headers that the answer must carry (RFC 9110, sections 10.2.3 and 11.6.1)."""
+        headers = {"Retry-After": self.retry_after_s, "WWW-Authenticate": self.challenge}
+        return {name: str(value) for name, value in headers.items() if value is not None}
 
     @property
     def members(self) -> dict[str, Any]:
@@ -40,289 +50,188 @@ class ServiceError(Pickled, Exception):
         return {}
 
 
-class InvalidRequest(ServiceError):
+class InvalidRequest(ServiceError, status=422, code="invalid_request", title="The request is not valid"):
     """The body, a header or a parameter does not say something that can be done."""
-
-    status = 422
-    code = "invalid_request"
-    title = "The request is not valid"
 
     @classmethod
     def of(cls, faults: Sequence[Fault]) -> InvalidRequest:
-        """Bundle one or more faults; the first is told at the top."""
+        """Bundle one or more faults; the first stands at the top."""
         first = faults[0]
         more = f" ({len(faults) - 1} more below)" if len(faults) > 1 else ""
         return cls(first.detail + more, first.pointer, first.hint, tuple(faults))
 
 
-class MalformedBody(ServiceError):
+class MalformedBody(ServiceError, status=400, code="malformed_body", title="The body cannot be read"):
     """The body is not the JSON text that was announced."""
 
-    status = 400
-    code = "malformed_body"
-    title = "The body cannot be read"
 
-
-class BodyTooLarge(ServiceError):
+class BodyTooLarge(ServiceError, status=413, code="body_too_large", title="The body is too large"):
     """More bytes than the service takes."""
 
-    status = 413
-    code = "body_too_large"
-    title = "The body is too large"
+    hint = "Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories."
 
 
-class UnsupportedMediaType(ServiceError):
+class UnsupportedMediaType(
+    ServiceError,
+    status=415,
+    code="unsupported_media_type",
+    title="This kind of content is not supported",
+):
     """A body or file of a kind that is not read here."""
 
-    status = 415
-    code = "unsupported_media_type"
-    title = "This kind of content is not supported"
 
-
-class NotFound(ServiceError):
+class NotFound(ServiceError, status=404, code="not_found", title="Not found"):
     """Nothing of the caller's has this name."""
 
-    status = 404
-    code = "not_found"
-    title = "Not found"
+    thing: ClassVar[str] = "resource"
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"There is no {self.thing} {name}.", f"#path/{self.thing}_id")
 
 
-class JobNotFound(NotFound):
+class JobNotFound(NotFound, code="job_not_found", title="There is no such job"):
     """No such job, or another owner's."""
 
-    code = "job_not_found"
-    title = "There is no such job"
-
-    def __init__(self, job_id: str) -> None:
-        super().__init__(f"There is no job {job_id}.", "#path/job_id", "GET /jobs lists yours.")
+    thing = "job"
+    hint = "GET /jobs lists yours."
 
 
-class ModelNotFound(NotFound):
+class ModelNotFound(NotFound, code="model_not_found", title="There is no such model"):
     """No such identified model, or another owner's."""
 
-    code = "model_not_found"
-    title = "There is no such model"
-
-    def __init__(self, model_id: str) -> None:
-        super().__init__(f"There is no model {model_id}.", "#path/model_id", "GET /models lists yours.")
+    thing = "model"
+    hint = "GET /models lists yours."
 
 
-class TrajectoryNotFound(NotFound):
+class TrajectoryNotFound(NotFound, code="trajectory_not_found", title="There is no such trajectory"):
     """No such trajectory, or another owner's."""
 
-    code = "trajectory_not_found"
-    title = "There is no such trajectory"
-
-    def __init__(self, trajectory_id: str) -> None:
-        super().__init__(
-            f"There is no trajectory {trajectory_id}.",
-            "#path/trajectory_id",
-            "Upload it with POST /trajectories first.",
-        )
+    thing = "trajectory"
+    hint = "Upload it with POST /trajectories first."
 
 
-class ArtifactNotFound(NotFound):
-    """The job left no file of this name."""
-
-    code = "artifact_not_found"
-    title = "There is no such file"
-
-    def __init__(self, job_id: str, name: str) -> None:
-        super().__init__(
-            f"Job {job_id} has no file {name!r}.",
-            "#path/name",
-            f"GET /jobs/{job_id}/artifacts lists its files.",
-        )
-
-
-class WebhookNotFound(NotFound):
+class WebhookNotFound(NotFound, code="webhook_not_found", title="There is no such webhook"):
     """No such webhook, or another owner's."""
 
-    code = "webhook_not_found"
-    title = "There is no such webhook"
-
-    def __init__(self, webhook_id: str) -> None:
-        super().__init__(
-            f"There is no webhook {webhook_id}.", "#path/webhook_id", "GET /webhooks lists yours."
-        )
+    thing = "webhook"
+    hint = "GET /webhooks lists yours."
 
 
-class Conflict(ServiceError):
+class ArtifactNotFound(ServiceError, status=404, code="artifact_not_found", title="There is no such file"):
+    """The job left no file of this name."""
+
+    def __init__(self, job_id: str, name: str) -> None:
+        hint = f"GET /jobs/{job_id}/artifacts lists its files."
+        super().__init__(f"Job {job_id} has no file {name!r}.", "#path/name", hint)
+
+
+class Conflict(ServiceError, status=409, code="conflict", title="Not possible in this state"):
     """The thing is not in a state in which this can be done."""
 
-    status = 409
-    code = "conflict"
-    title = "Not possible in this state"
 
-
-class IdempotencyConflict(Conflict):
+class IdempotencyConflict(
+    Conflict, code="idempotency_conflict", title="The idempotency key belongs to another request"
+):
     """An idempotency key was used again for another request."""
 
-    code = "idempotency_conflict"
-    title = "The idempotency key belongs to another request"
+    pointer = "#header/Idempotency-Key"
+    hint = "Use a new key for a new request; reuse a key only with an identical body."
 
     def __init__(self, key: str) -> None:
-        super().__init__(
-            f"The key {key!r} was used before with another body or operation.",
-            "#header/Idempotency-Key",
-            "Use a new key for a new request; reuse a key only with an identical body.",
-        )
+        super().__init__(f"The key {key!r} was used before with another body or operation.")
 
 
-class ResultNotReady(Conflict):
+class ResultNotReady(Conflict, code="result_not_ready", title="There is no result"):
     """The job has no result (yet)."""
 
-    code = "result_not_ready"
-    title = "There is no result"
 
-
-class JobNotFinished(Conflict):
+class JobNotFinished(Conflict, code="job_not_finished", title="The job has not ended"):
     """Only finished jobs can be deleted."""
 
-    code = "job_not_finished"
-    title = "The job has not ended"
-
     def __init__(self, job_id: str, status: str) -> None:
-        super().__init__(
-            f"Job {job_id} is {status}.", "#path/job_id", f"POST /jobs/{job_id}/cancel first, then delete it."
-        )
+        hint = f"POST /jobs/{job_id}/cancel first, then delete it."
+        super().__init__(f"Job {job_id} is {status}.", "#path/job_id", hint)
 
 
-class TooManyWebhooks(Conflict):
+class TooManyWebhooks(Conflict, code="too_many_webhooks", title="There are too many webhooks"):
     """The owner has as many webhooks as one may have."""
 
-    code = "too_many_webhooks"
-    title = "There are too many webhooks"
-
-    def __init__(self, limit: int) -> None:
-        super().__init__(f"You have {limit} webhooks.", hint="Delete one that is not needed any more.")
+    hint = "Delete one that is not needed any more."
 
 
-class WebhookDisabled(Conflict):
+class WebhookDisabled(Conflict, code="webhook_disabled", title="The webhook is disabled"):
     """A disabled webhook is sent nothing."""
 
-    code = "webhook_disabled"
-    title = "The webhook is disabled"
-
-    def __init__(self, webhook_id: str) -> None:
-        super().__init__(
-            f"Webhook {webhook_id} is disabled.", "#path/webhook_id", "POST /webhooks/{id}/enable first."
-        )
+    pointer = "#path/webhook_id"
+    hint = "POST /webhooks/{id}/enable first."
 
 
-class WebhookPending(Conflict):
+class WebhookPending(Conflict, code="webhook_pending", title="The webhook is pending"):
     """A webhook whose receiver has not answered the challenge is sent nothing else."""
 
-    code = "webhook_pending"
-    title = "The webhook is pending"
-
-    def __init__(self, webhook_id: str) -> None:
-        super().__init__(
-            f"The receiver of webhook {webhook_id} has not answered the challenge yet.",
-            "#path/webhook_id",
-            "Make the receiver return the challenge; POST /webhooks/{id}/enable sends a new one.",
-        )
+    pointer = "#path/webhook_id"
+    hint = "Make the receiver return the challenge; POST /webhooks/{id}/enable sends a new one."
 
 
-class Unauthorized(ServiceError):
-    """No key, or one that does not open: unknown, expired and revoked keys are all told the same."""
+class Unauthorized(ServiceError, status=401, code="unauthorized", title="A valid API key is needed"):
+    """No valid key. Unknown, expired and revoked keys all get this same answer."""
 
-    status = 401
-    code = "unauthorized"
-    title = "A valid API key is needed"
-
-    def __init__(self) -> None:
-        super().__init__(
-            "The request has no valid API key.",
-            "#header/Authorization",
-            "Send `Authorization: Bearer mid_...`; `morphid keys create` makes a key.",
-        )
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """How to authenticate (RFC 9110, section 11.6.1)."""
-        return {"WWW-Authenticate": 'Bearer realm="MorphID"'}
+    detail = "The request has no valid API key."
+    pointer = "#header/Authorization"
+    hint = "Send `Authorization: Bearer mid_...`; `morphid keys create` makes a key."
+    challenge = 'Bearer realm="MorphID"'
 
 
-class MissingScope(ServiceError):
-    """The key is valid and may not do this."""
+class MissingScope(ServiceError, status=403, code="missing_scope", title="The API key lacks permission"):
+    """The key is valid but does not have the scope of the route."""
 
-    status = 403
-    code = "missing_scope"
-    title = "The API key lacks permission"
+    pointer = "#header/Authorization"
+    hint = "Use a key with this scope: `morphid keys create --scope ...`; GET /me shows what yours may do."
 
     def __init__(self, scopes: list[str]) -> None:
-        self.scopes = scopes
-        super().__init__(
-            f"The key lacks the scope {' '.join(scopes)}.",
-            "#header/Authorization",
-            "Use a key with this scope: `morphid keys create --scope ...`; GET /me tells what yours may do.",
+        needed = " ".join(scopes)
+        super().__init__(f"The key lacks the scope {needed}.")
+        self.challenge = (
+            f'Bearer realm="MorphID", error="insufficient_scope", scope="{needed}"'  # RFC 6750, 3.1
         )
 
-    @property
-    def headers(self) -> dict[str, str]:
-        """What would be enough (RFC 6750, section 3.1)."""
-        scope = " ".join(self.scopes)
-        return {"WWW-Authenticate": f'Bearer realm="MorphID", error="insufficient_scope", scope="{scope}"'}
 
-
-class TooManyRequests(ServiceError):
+class TooManyRequests(ServiceError, status=429, code="too_many_requests", title="Too many requests"):
     """Too much, too fast; ask again later."""
 
-    status = 429
-    code = "too_many_requests"
-    title = "Too many requests"
 
-    def __init__(self, detail: str, hint: str, *, retry_after_s: int) -> None:
-        self.retry_after_s = max(1, retry_after_s)
-        super().__init__(detail, hint=hint)
+class TooManyRefusals(
+    TooManyRequests, code="too_many_refusals", title="Too many invalid API keys from this address"
+):
+    """An address that keeps sending invalid keys."""
 
-    @property
-    def headers(self) -> dict[str, str]:
-        """When to ask again, s (RFC 9110, section 10.2.3)."""
-        return {"Retry-After": str(self.retry_after_s)}
-
-
-STREAM_ENDS_S = 5  # when to ask again for what other requests of the owner give back
-
-
-class TooManyRefusals(TooManyRequests):
-    """An address that keeps sending keys that do not open."""
-
-    code = "too_many_refusals"
-    title = "Too many invalid API keys from this address"
+    detail = "This address has sent too many invalid API keys."
+    hint = "Correct the key and retry after the time in Retry-After."
 
     def __init__(self, retry_after_s: int) -> None:
-        super().__init__(
-            "This address has sent too many invalid API keys.",
-            "Correct the key and retry after the time in Retry-After.",
-            retry_after_s=retry_after_s,
-        )
+        super().__init__()
+        self.retry_after_s = retry_after_s
 
 
-class TooManyStreams(TooManyRequests):
+class TooManyStreams(
+    TooManyRequests, code="too_many_streams", title="Too many event streams or waiting requests at once"
+):
     """The owner follows as many jobs at once as one may."""
 
-    code = "too_many_streams"
-    title = "Too many event streams or waiting requests at once"
+    retry_after_s = 5  # other requests of the owner may have ended by then
 
     @classmethod
     def of_streams(cls, limit: int) -> TooManyStreams:
-        """Tell that there are as many event streams as one owner may have."""
-        return cls(
-            f"You have {limit} open event streams, which is the limit.",
-            "Close one that is not needed, or read the events a page at a time: Accept: application/json.",
-            retry_after_s=STREAM_ENDS_S,
-        )
+        """The owner has as many open event streams as one may have."""
+        hint = "Close one that is not needed, or read the events a page at a time: Accept: application/json."
+        return cls(f"You have {limit} open event streams, which is the limit.", hint=hint)
 
     @classmethod
     def of_waits(cls, limit: int) -> TooManyStreams:
-        """Tell that as many requests wait as one owner may have."""
-        return cls(
-            f"{limit} of your requests are waiting for jobs (Prefer: wait), which is the limit.",
-            "Send the request without Prefer: wait, or retry when one of them has been answered.",
-            retry_after_s=STREAM_ENDS_S,
-        )
+        """As many of the owner's requests wait for jobs as may."""
+        detail = f"{limit} of your requests are waiting for jobs (Prefer: wait), which is the limit."
+        hint = "Send the request without Prefer: wait, or retry when one of them has been answered."
+        return cls(detail, hint=hint)
 
 
 QUOTA_HINTS = {
@@ -332,96 +241,78 @@ QUOTA_HINTS = {
 }
 
 
-class QuotaExceeded(TooManyRequests):
+class QuotaExceeded(TooManyRequests, code="quota_exceeded", title="The API key's quota is used up"):
     """The key's quota has no room for this."""
 
-    code = "quota_exceeded"
-    title = "The API key's quota is used up"
-
     def __init__(self, quota: str, *, limit: int, used: int, asked: int, retry_after_s: int) -> None:
-        self.quota, self.limit, self.used, self.asked = quota, limit, used, asked
+        self.quota = {"name": quota, "limit": limit, "used": used, "asked": asked}
+        self.retry_after_s = max(1, retry_after_s)
         words = quota.replace("_", " ")
         super().__init__(
             f"The key's quota is {limit} {words}; {used} are used and this request needs {asked} more.",
-            QUOTA_HINTS.get(quota, "Ask the operator for a larger quota."),
-            retry_after_s=retry_after_s,
+            hint=QUOTA_HINTS.get(quota, "Ask the operator for a larger quota."),
         )
 
     @property
     def members(self) -> dict[str, Any]:
         """Limit and use, for programs."""
-        return {"quota": {"name": self.quota, "limit": self.limit, "used": self.used, "asked": self.asked}}
+        return {"quota": self.quota}
 
 
-class CrossSiteRequest(ServiceError):
+class CrossSiteRequest(
+    ServiceError,
+    status=403,
+    code="cross_site_request",
+    title="Requests from pages of other sites are refused",
+):
     """A web page of another site made the browser send this."""
 
-    status = 403
-    code = "cross_site_request"
-    title = "Requests from pages of other sites are refused"
+    detail = "The request comes from a web page of another site."
+    pointer = "#header/Origin"
+    hint = "Open the service's own page, or call the API from a program."
 
 
-class WrongHost(ServiceError):
+class WrongHost(
+    ServiceError, status=421, code="wrong_host", title="The service does not accept this host name"
+):
     """The request names a host that this service does not answer for."""
 
-    status = 421
-    code = "wrong_host"
-    title = "The service does not accept this host name"
+
+class HttpError(ServiceError):
+    """Refused by the server or the framework, before any code of this service has seen the request."""
+
+    def __init__(self, status: int, code: str, title: str, detail: str = "", hint: str = "") -> None:
+        super().__init__(detail or f"{title}.", hint=hint)
+        self.status, self.code, self.title = status, code, title
 
 
-class DatabaseAway(ServiceError):
-    """The database restarts, cannot be reached or is too busy; no promise was made."""
+class DatabaseAway(
+    ServiceError, status=503, code="database_unavailable", title="The database does not answer"
+):
+    """The database restarts, cannot be reached or is too busy; nothing was promised to the client."""
 
-    status = 503
-    code = "database_unavailable"
-    title = "The database does not answer"
-    ask_again_s = 2
-
-    def __init__(self) -> None:
-        super().__init__(
-            "The database does not answer at the moment.",
-            hint="Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most.",
-        )
+    detail = "The database does not answer at the moment."
+    hint = "Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most."
+    retry_after_s = 2
 
 
-class StorageFull(ServiceError):
+class StorageFull(ServiceError, status=503, code="storage_full", title="The service's storage is full"):
     """The database has no room for what the request would store."""
 
-    status = 503
-    code = "storage_full"
-    title = "The service's storage is full"
-    ask_again_s = 60  # people have to make room
-
-    def __init__(self) -> None:
-        super().__init__(
-            "The database is out of disk space; nothing was stored.",
-            hint="Delete finished jobs that are not needed, or ask the operator for more disk space.",
-        )
+    detail = "The database is out of disk space; nothing was stored."
+    hint = "Delete finished jobs that are not needed, or ask the operator for more disk space."
+    retry_after_s = 60  # people have to make room
 
 
-class SlowBody(ServiceError):
+class SlowBody(ServiceError, status=408, code="slow_body", title="The body did not arrive in time"):
     """The body arrives too slowly to be worth a connection."""
 
-    status = 408
-    code = "slow_body"
-    title = "The body did not arrive in time"
-
-    def __init__(self) -> None:
-        super().__init__("The body arrived too slowly, or not at all.", hint="Send it again, in one go.")
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """The connection is of no more use."""
-        return {"Connection": "close"}
+    detail = "The body arrived too slowly, or not at all."
+    hint = "Send it again, in one go."
 
 
-class ServiceBusy(ServiceError):
+class ServiceBusy(ServiceError, status=503, code="service_busy", title="The service is busy"):
     """As many bodies or files are being read as this process can bear."""
 
-    status = 503
-    code = "service_busy"
-    title = "The service is busy"
-    ask_again_s = 5
-
-    def __init__(self, detail: str = "") -> None:
-        super().__init__(detail, hint="Send the request again in a few seconds.")
+    hint = "Send the request again in a few seconds."
+    retry_after_s = 5

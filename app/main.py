@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -18,14 +19,12 @@ from app.database import Database, upgrade
 from app.errors import TooManyStreams
 from app.health.endpoints import router as health
 from app.health.service import Health
-from app.http.body_limit import BodyLimit, BodyLimits
+from app.http.body_limit import BodyLimit
 from app.http.context import Service
 from app.http.gate import Gate
-from app.http.head import HeadAsGet
+from app.http.middleware import HeadAsGet, RequestId, SecurityHeaders
 from app.http.observed import Observed
 from app.http.problems import install_problem_handlers
-from app.http.request_id import RequestId
-from app.http.security_headers import SecurityHeaders
 from app.jobs.endpoints import router as jobs
 from app.jobs.queue import Publisher
 from app.jobs.upkeep import Upkeep
@@ -39,8 +38,7 @@ from app.observability.logs import configure_logging
 from app.observability.tracing import start_tracing, stop_tracing
 from app.openapi import openapi_document
 from app.operations.endpoints import router as operations
-from app.owner_limit import OwnerLimit
-from app.owner_turns import OwnerTurns
+from app.owner_turns import OwnerLimit, OwnerTurns
 from app.parsing.confinement import Limits
 from app.parsing.pool import ParserPool
 from app.settings import Settings, load_settings
@@ -52,7 +50,6 @@ from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
 from morphdata.version import VERSION
 
-BODIES_AT_ONCE = 16  # of the largest size
 READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too
 
 
@@ -70,40 +67,26 @@ def routed_app() -> FastAPI:
 def create_app(settings: Settings | None = None, *, sending: SenderSettings | None = None) -> FastAPI:
     """Build the service; database and messages are opened when it starts.
 
-    Parameters
-    ----------
-    settings : Settings, optional
-        Those of the environment when left out.
-    sending : SenderSettings, optional
-        How webhooks are sent; as `settings` say when left out.
+    Settings come from the environment when they are left out, and webhooks are sent as the settings say.
     """
     chosen = settings or load_settings()
     if settings is None:  # a process of its own, not a guest in another's
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
-    app.router.lifespan_context = _lifespan(chosen, sending or _sending(chosen))
-    install_problem_handlers(app)
-    bodies = BODIES_AT_ONCE * chosen.max_body_bytes
-    limits = BodyLimits(
-        chosen.max_body_bytes,
-        chosen.body_grace_s,
-        max_total_bytes=bodies,
-        max_owner_bytes=bodies // 2 if chosen.demands_keys else bodies,
+    app.router.lifespan_context = partial(
+        _running, settings=chosen, sending=sending or _sender_settings(chosen)
     )
+    install_problem_handlers(app)
     app.add_middleware(HeadAsGet)
-    app.add_middleware(BodyLimit, limits=limits)
+    app.add_middleware(BodyLimit, settings=chosen)
     app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
-    _wrap(app)
+    # these see every answer, also of unforeseen errors, which the framework answers outside of its middleware
+    inner = app.build_middleware_stack
+    app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
     return app
 
 
-def _wrap(app: FastAPI) -> None:
-    """Put what must see every answer around the framework: it answers unforeseen errors outermost itself."""
-    inner = app.build_middleware_stack
-    app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
-
-
-def _sending(settings: Settings) -> SenderSettings:
+def _sender_settings(settings: Settings) -> SenderSettings:
     return SenderSettings(
         AddressPolicy(allow_private=settings.webhook_allow_private, dial_only=settings.webhook_hosts)
     )
@@ -114,55 +97,52 @@ def _turns(settings: Settings, at_once: int) -> OwnerTurns:
     return OwnerTurns(at_once, max(1, at_once - 1) if settings.demands_keys else at_once)
 
 
-def _lifespan(settings: Settings, sending: SenderSettings) -> Any:
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        start_tracing("morphid-api", settings.traces)
-        await asyncio.to_thread(upgrade, settings.database_url)
-        database = Database(settings.database_url)
-        publisher = Publisher(settings.broker_url)
-        watcher = JobWatcher(database, settings.event_poll_s)
-        background = BackgroundWriter(database)
-        keys = KeyRing(database, background)
-        key_watch = KeyWatch(database, on_lost=keys.forget)
-        app.state.service = Service(
-            settings=settings,
-            database=database,
-            publisher=publisher,
-            watcher=watcher,
-            queue=QueueView(),
-            keys=keys,
-            key_watch=key_watch,
-            background=background,
-            parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
-            reads=_turns(settings, READS_AT_ONCE),
-            streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
-            waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
-            webhook_policy=sending.policy,
-        )
-        app.state.health = Health(database, settings)
-        background.start()
-        publisher.start()
-        watcher.start()
-        key_watch.start()
-        sender = WebhookSender(database, sending)
-        sender.start()
-        upkeep = Upkeep(database, publisher, settings)
-        upkeep.start()
-        try:
-            with _streams_end_with_the_process(watcher):
-                yield
-        finally:
-            await watcher.stop()
-            await key_watch.stop()
-            await asyncio.to_thread(upkeep.stop)
-            await asyncio.to_thread(sender.stop)
-            await asyncio.to_thread(publisher.stop)
-            await asyncio.to_thread(background.stop)
-            database.dispose()
-            await asyncio.to_thread(stop_tracing)
+def _service(settings: Settings, database: Database, sending: SenderSettings) -> Service:
+    background = BackgroundWriter(database)
+    keys = KeyRing(database, background)
+    return Service(
+        settings=settings,
+        database=database,
+        publisher=Publisher(settings.broker_url),
+        watcher=JobWatcher(database, settings.event_poll_s),
+        queue=QueueView(),
+        keys=keys,
+        key_watch=KeyWatch(database, on_lost=keys.forget),
+        background=background,
+        parsers=ParserPool(_turns(settings, settings.parsers), Limits(settings.parser_memory_bytes)),
+        reads=_turns(settings, READS_AT_ONCE),
+        streams=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_streams),
+        waits=OwnerLimit(settings.max_streams_per_owner, TooManyStreams.of_waits),
+        webhook_policy=sending.policy,
+        health=Health(database, settings),
+    )
 
-    return lifespan
+
+@asynccontextmanager
+async def _running(app: FastAPI, settings: Settings, sending: SenderSettings) -> AsyncIterator[None]:
+    """Start the parts of the process, and stop them when the block ends."""
+    start_tracing("morphid-api", settings.traces)
+    await asyncio.to_thread(upgrade, settings.database_url)
+    database = Database(settings.database_url)
+    service = app.state.service = _service(settings, database, sending)
+    sender = WebhookSender(database, sending)
+    upkeep = Upkeep(database, service.publisher, settings)
+    service.background.start()
+    service.publisher.start()
+    service.watcher.start()
+    service.key_watch.start()
+    sender.start()
+    upkeep.start()
+    try:
+        with _streams_end_with_the_process(service.watcher):
+            yield
+    finally:
+        await service.watcher.stop()
+        await service.key_watch.stop()
+        for stop in (upkeep.stop, sender.stop, service.publisher.stop, service.background.stop):
+            await asyncio.to_thread(stop)
+        database.dispose()
+        await asyncio.to_thread(stop_tracing)
 
 
 @contextmanager
@@ -192,7 +172,7 @@ def _streams_end_with_the_process(watcher: JobWatcher) -> Iterator[None]:
 
 
 def __getattr__(name: str) -> Any:
-    """Build ``app.main:app`` when a server asks for it, not on import."""
+    """Build ``app.main:app`` when a server looks it up, not on import."""
     if name == "app":
         return create_app()
     raise AttributeError(name)

@@ -9,17 +9,21 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from app.errors import (
     CrossSiteRequest,
     DatabaseAway,
     MissingScope,
+    ServiceError,
     StorageFull,
     TooManyRefusals,
     Unauthorized,
     WrongHost,
 )
-from app.http.problems import MEDIA_TYPE, documented
+from app.http.problems import documented
+from app.schemas.problem import Problem
 from app.trajectories.endpoints import FORM_SCHEMA
 from app.trajectories.schemas import TrajectoryUpload
 from app.webhooks.endpoints import messages
@@ -27,17 +31,17 @@ from morphdata.operations import OPERATIONS
 from morphdata.version import VERSION
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "openapi.json"
-PROBLEM = "#/components/schemas/Problem"
-PROBLEM_CONTENT = {MEDIA_TYPE: {"schema": {"$ref": PROBLEM}}}
-_AUTHENTICATE = {"WWW-Authenticate": {"description": "How, and for what.", "schema": {"type": "string"}}}
-_RETRY_AFTER = {
+SCHEMA_REF = "#/components/schemas/{model}"
+AUTHENTICATE = {"WWW-Authenticate": {"description": "How, and for what.", "schema": {"type": "string"}}}
+RETRY_AFTER = {
     "Retry-After": {"description": "Seconds to wait before retrying.", "schema": {"type": "string"}}
 }
-REFUSAL_HEADERS: dict[int | str, dict[str, Any]] = {
-    401: _AUTHENTICATE,
-    403: _AUTHENTICATE,
+HEADERS: dict[int | str, dict[str, Any]] = {
+    401: AUTHENTICATE,
+    403: AUTHENTICATE,
     421: {},
-    429: _RETRY_AFTER,
+    429: RETRY_AFTER,
+    503: RETRY_AFTER,
 }
 WITHOUT_DATABASE = frozenset({"/livez"})
 DESCRIPTION = """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
@@ -48,7 +52,7 @@ the fields. Every error is a problem document (RFC 9457) with a stable `code`, a
 `hint`.
 
 A service beyond its own machine demands an API key: `Authorization: Bearer mid_...`. Each operation names the
-scope that the key must have; `GET /me` tells what yours has.
+scope that the key must have; `GET /me` shows what yours has.
 """
 TAGS = [
     *({"name": operation.name, "description": operation.subject} for operation in OPERATIONS),
@@ -74,65 +78,35 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             tags=TAGS,
             license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         )
-        _add_outages(document)
-        _add_refusals(document)
-        _name_problem_media_type(document)
-        _add_upload_schemas(document)
+        _add_shared_errors(document)
+        _add_schemas(document)
         app.openapi_schema = document
     return app.openapi_schema
 
 
-def _add_outages(document: dict[str, Any]) -> None:
-    """Whatever asks the database can meet one that is away or full."""
-    entry = documented(DatabaseAway, StorageFull)[DatabaseAway.status]
-    response = {
-        "description": entry["description"],
-        "headers": {
-            "Retry-After": {"description": "When to repeat the request, s.", "schema": {"type": "string"}}
-        },
-        "content": {"application/json": {"schema": {"$ref": PROBLEM}}},
-    }
+def _add_shared_errors(document: dict[str, Any]) -> None:
+    """Document what the gate answers before a route is reached, and a database that is away or full."""
     for path, operations in document["paths"].items():
-        if path not in WITHOUT_DATABASE:
-            for operation in operations.values():
-                known = operation["responses"].setdefault(str(DatabaseAway.status), dict(response))
-                if known["description"] != response["description"]:  # the route has a reason of its own
-                    known["description"] += f"; {response['description']}"
-                    known["headers"] = response["headers"]
-
-
-def _add_refusals(document: dict[str, Any]) -> None:
-    """Document what the gate answers before a route is reached: the same for all of them."""
-    strangers = documented(CrossSiteRequest, WrongHost)
-    callers = documented(Unauthorized, MissingScope, CrossSiteRequest, WrongHost, TooManyRefusals)
-    for operations in document["paths"].values():
+        outages = () if path in WITHOUT_DATABASE else (DatabaseAway, StorageFull)
         for operation in operations.values():
-            for status, told in (callers if "security" in operation else strangers).items():
-                known = operation["responses"].setdefault(str(status), {"description": ""})
-                known.setdefault("content", PROBLEM_CONTENT)
-                known.setdefault("headers", REFUSAL_HEADERS[status])
-                texts = (known["description"], told["description"])
-                known["description"] = "; ".join(dict.fromkeys(filter(None, texts)))
+            errors: list[type[ServiceError]] = [CrossSiteRequest, WrongHost, *outages]
+            if "security" in operation:
+                errors = [Unauthorized, MissingScope, *errors, TooManyRefusals]
+            for status, shared in documented(*errors).items():
+                own = operation["responses"].setdefault(str(status), {"content": shared["content"]})
+                own.setdefault("headers", HEADERS[status])
+                texts = (own.get("description"), shared["description"])
+                own["description"] = "; ".join(filter(None, texts))
 
 
-def _name_problem_media_type(document: dict[str, Any]) -> None:
-    """Errors are ``application/problem+json``, not ``application/json``."""
-    for operations in document["paths"].values():
-        for operation in operations.values():
-            for response in operation["responses"].values():
-                content = response.get("content", {})
-                plain = content.get("application/json", {}).get("schema", {})
-                if plain.get("$ref") == PROBLEM:
-                    response["content"] = {MEDIA_TYPE: content["application/json"]}
-
-
-def _add_upload_schemas(document: dict[str, Any]) -> None:
-    """Add the two bodies of POST /trajectories, which FastAPI does not see."""
-    schemas = document["components"]["schemas"]
-    schemas["TrajectoryFile"] = FORM_SCHEMA
-    schemas["TrajectoryUpload"] = TrajectoryUpload.model_json_schema(
-        ref_template="#/components/schemas/{model}"
-    )
+def _add_schemas(document: dict[str, Any]) -> None:
+    """Add problem documents and the two bodies of POST /trajectories, which FastAPI does not see."""
+    models: list[tuple[type[BaseModel], JsonSchemaMode]] = [
+        (Problem, "serialization"),
+        (TrajectoryUpload, "validation"),
+    ]
+    _, schemas = models_json_schema(models, ref_template=SCHEMA_REF)
+    document["components"]["schemas"] |= {**schemas["$defs"], "TrajectoryFile": FORM_SCHEMA}
 
 
 def document_text() -> str:

@@ -1,11 +1,45 @@
-"""Slots that owners take by turns: however many requests of one owner wait, another's is next."""
+"""Shares of owners: how many of something one may have at once, and slots that owners take by turns."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+
+from app.errors import ServiceError
+
+
+class OwnerLimit:
+    """Counts what each owner has; used from one thread (the event loop's).
+
+    Parameters
+    ----------
+    limit : int
+        Maximum for one owner.
+    refusal
+        Makes the error that says so to an owner.
+    """
+
+    def __init__(self, limit: int, refusal: Callable[[int], ServiceError]) -> None:
+        self._limit = limit
+        self._refusal = refusal
+        self._held: Counter[str] = Counter()
+
+    def has_room(self, owner: str) -> bool:
+        """Whether the owner may have one more."""
+        return self._held[owner] < self._limit
+
+    @contextmanager
+    def place(self, owner: str) -> Iterator[None]:
+        """Have one while the block lasts, or raise the refusal."""
+        if not self.has_room(owner):
+            raise self._refusal(self._limit)
+        self._held[owner] += 1
+        try:
+            yield
+        finally:
+            _drop_one(self._held, owner)
 
 
 class OwnerTurns:
@@ -55,9 +89,7 @@ class OwnerTurns:
     def give_back(self, owner: str) -> None:
         """Let the next one have the slot."""
         self._free += 1
-        self._held[owner] -= 1
-        if not self._held[owner]:
-            del self._held[owner]
+        _drop_one(self._held, owner)
         self._serve()
 
     def _serve(self) -> None:
@@ -81,3 +113,9 @@ class OwnerTurns:
             queue.remove(waiter)
             if not queue:
                 del self._waiting[owner]
+
+
+def _drop_one(held: Counter[str], owner: str) -> None:
+    held[owner] -= 1
+    if not held[owner]:
+        del held[owner]

@@ -21,7 +21,7 @@ def make_private_folder(path: Path) -> None:
 
 
 def touch_private(path: Path) -> None:
-    """Make an empty file for this user only, or take what others may do from one that exists.
+    """Make an empty file for this user only, or close one that exists to other users.
 
     One that exists is not opened: closing an SQLite file drops all locks that this process has on it, and
     another process would take itself for the last one and delete the journal (sqlite.org/howtocorrupt.html).
@@ -38,7 +38,7 @@ def open_private(path: Path, mode: str) -> IO[str]:
 
 
 def close_to_others(path: Path) -> bool:
-    """Take from a file or folder of ours what others may do with it; tell whether that was anything."""
+    """Close a file or folder of ours to other users; return whether it was open to them."""
     found = path.stat()
     if not found.st_mode & OTHERS or found.st_uid != os.geteuid():
         return False

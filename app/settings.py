@@ -276,7 +276,8 @@ def load_settings(**overrides: object) -> Settings:
         With one sentence per problem, fit to be printed to the operator.
     """
     try:
-        return Settings(**{name: value for name, value in overrides.items() if value is not None})  # type: ignore[arg-type]  # checked by pydantic itself
+        given = {name: value for name, value in overrides.items() if value is not None}
+        return Settings(**given)  # type: ignore[arg-type]  # checked by pydantic itself
     except ValidationError as error:
         sentences = []
         for item in error.errors():

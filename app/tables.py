@@ -34,6 +34,13 @@ STATUSES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled
 CHUNK_STATUSES = ("open", "running", "done")
 ZERO = text("0")  # what rows that are older than a column count as
 
+
+def _one_of(statuses: tuple[str, ...]) -> CheckConstraint:
+    return CheckConstraint(
+        "status IN ({})".format(", ".join(f"'{name}'" for name in statuses)), name="status"
+    )
+
+
 jobs = Table(
     "jobs",
     metadata,
@@ -47,9 +54,8 @@ jobs = Table(
     Column("error", JSON),
     Column("attempt", Integer, nullable=False),
     Column("max_attempts", Integer, nullable=False),
-    Column(
-        "fence", Integer, nullable=False
-    ),  # rises with every claim; a write with an old one changes nothing
+    # rises with every claim; a write with an old one changes nothing
+    Column("fence", Integer, nullable=False),
     Column("worker", String(128)),
     Column("lease_until", Double),
     Column("event_seq", Integer, nullable=False),  # the last event's number
@@ -68,11 +74,10 @@ jobs = Table(
     Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work lies in job_chunks
     Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
     Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
-    Column(
-        "size_bytes", BigInteger, nullable=False, server_default=ZERO
-    ),  # request, result, files; events too at the end
+    # request, result, files; events too at the end
+    Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Column("label", String(100)),  # the owner's own word, to find the job again
-    CheckConstraint("status IN ({})".format(", ".join(f"'{name}'" for name in STATUSES)), name="status"),
+    _one_of(STATUSES),
     Index("ix_jobs_owner_id", "owner", "id"),
     # a list is the owner's, newest first: whatever it is filtered by, the rows of a page lie side by side
     Index("ix_jobs_owner_status_id", "owner", "status", "id"),
@@ -92,20 +97,13 @@ owners = Table(
     "owners",
     metadata,
     Column("owner", String(64), primary_key=True),
-    Column(
-        "served_at", Double, nullable=False, server_default=ZERO
-    ),  # when a worker last took a job of theirs
+    # when a worker last took a job of theirs
+    Column("served_at", Double, nullable=False, server_default=ZERO),
 )
 
 
-def _job_key(*, primary_key: bool = True) -> Column[str]:
-    return Column(
-        "job_id",
-        String(64),
-        ForeignKey("jobs.id", ondelete="CASCADE"),
-        primary_key=primary_key,
-        nullable=False,
-    )
+def _job_key() -> Column[str]:
+    return Column("job_id", String(64), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
 
 
 job_requests = Table(
@@ -159,9 +157,7 @@ job_chunks = Table(
     Column("task", LargeBinary, nullable=False),  # what to fly
     Column("outcome", LargeBinary),  # what came of it; stored once
     Column("at", Double, nullable=False),
-    CheckConstraint(
-        "status IN ({})".format(", ".join(f"'{name}'" for name in CHUNK_STATUSES)), name="status"
-    ),
+    _one_of(CHUNK_STATUSES),
     Index("ix_job_chunks_status_owner_job_id", "status", "owner", "job_id"),
     Index("ix_job_chunks_status_lease_until", "status", "lease_until"),
 )
@@ -184,9 +180,9 @@ idempotency_keys = Table(
     Column("key", String(255), primary_key=True),
     Column("operation", String(32), nullable=False),
     Column("sha256", String(64), nullable=False),
-    Column("job_id", String(64), nullable=False),  # no foreign key: written before its job to win the race
+    # no foreign key: written before its job to win the race
+    Column("job_id", String(64), nullable=False, index=True),
     Column("at", Double, nullable=False),
-    Index("ix_idempotency_keys_job_id", "job_id"),
 )
 
 trajectories = Table(
@@ -198,12 +194,10 @@ trajectories = Table(
     Column("rows", Integer, nullable=False),
     Column("duration_s", Double, nullable=False),
     Column("document", LargeBinary, nullable=False),  # deflated JSON columns
-    Column("created_at", Double, nullable=False),
-    Column("key_id", String(64)),
+    Column("created_at", Double, nullable=False, index=True),
+    Column("key_id", String(64), index=True),
     Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Index("ix_trajectories_owner_id", "owner", "id"),
-    Index("ix_trajectories_key_id", "key_id"),
-    Index("ix_trajectories_created_at", "created_at"),
 )
 
 models = Table(
@@ -212,22 +206,22 @@ models = Table(
     Column("id", String(64), primary_key=True),
     Column("owner", String(64), nullable=False),
     Column("name", String(200), nullable=False),
-    Column("job_id", String(64), ForeignKey("jobs.id", ondelete="SET NULL")),  # a model outlives its job
+    # a model outlives its job
+    Column("job_id", String(64), ForeignKey("jobs.id", ondelete="SET NULL"), index=True),
     Column("links_per_wing", Integer),
     Column("document", LargeBinary, nullable=False),  # deflated JSON: model, aircraft, flight, fit
     Column("created_at", Double, nullable=False),
-    Column("key_id", String(64)),  # of the job that identified it: a model counts in the same quota
+    # of the job that identified it: a model counts in the same quota
+    Column("key_id", String(64), index=True),
     Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
     Index("ix_models_owner_id", "owner", "id"),
-    Index("ix_models_key_id", "key_id"),
-    Index("ix_models_job_id", "job_id"),
 )
 
 api_keys = Table(
     "api_keys",
     metadata,
     Column("id", String(64), primary_key=True),
-    Column("owner", String(64), nullable=False),  # keys of one owner see the same jobs
+    Column("owner", String(64), nullable=False, index=True),  # keys of one owner see the same jobs
     Column("name", String(64), nullable=False),
     Column("prefix", String(16), nullable=False, unique=True),  # the part of the key that may be shown
     Column("secret_sha256", String(64), nullable=False),  # the rest has 256 random bits: no slow hash needed
@@ -239,7 +233,6 @@ api_keys = Table(
     Column("expires_at", Double),
     Column("revoked_at", Double),
     Column("last_used_at", Double),
-    Index("ix_api_keys_owner", "owner"),
 )
 
 key_usage = Table(
@@ -254,7 +247,7 @@ audit_log = Table(
     "audit_log",
     metadata,
     Column("id", String(64), primary_key=True),
-    Column("at", Double, nullable=False),
+    Column("at", Double, nullable=False, index=True),
     Column("owner", String(64)),
     Column("key_id", String(64)),
     Column("action", String(64), nullable=False),  # job.cancel, key.create, auth.refused ...
@@ -263,7 +256,6 @@ audit_log = Table(
     Column("request_id", String(64)),
     Column("address", String(64)),
     Column("detail", JSON),
-    Index("ix_audit_log_at", "at"),
     Index("ix_audit_log_owner_at", "owner", "at"),
 )
 
@@ -318,10 +310,9 @@ workers = Table(
     Column("slots", Integer, nullable=False),  # jobs it can run at once
     Column("busy", Integer, nullable=False),
     Column("started_at", Double, nullable=False),
-    Column("seen_at", Double, nullable=False),  # when it last showed that it takes jobs
+    Column("seen_at", Double, nullable=False, index=True),  # when it last showed that it takes jobs
     Column("stopped_at", Double),  # it ended as it should
-    Column("process", String(128)),  # as `app.health.processes` names it
-    Index("ix_workers_seen_at", "seen_at"),
+    Column("process", String(128)),  # as `app.health.presence` names it
 )
 
 counters = Table(

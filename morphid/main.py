@@ -16,12 +16,13 @@ from typer.core import TyperGroup
 from morphid.commands.audit import audit
 from morphid.commands.bench import bench
 from morphid.commands.database import database
-from morphid.commands.doctor import doctor, ready
+from morphid.commands.doctor import doctor
 from morphid.commands.jobs import jobs
 from morphid.commands.keys import keys
 from morphid.commands.operations import operation_commands
 from morphid.commands.options import EXIT_CODES
 from morphid.commands.paper import paper
+from morphid.commands.ready import ready
 from morphid.commands.serve import serve
 from morphid.several_values import SeveralValues
 from morphid.streams import flush_streams, prepare_streams
@@ -40,7 +41,7 @@ class Morphid(TyperGroup):
 
 
 def print_version(wanted: bool) -> None:
-    """Print the version and end, where it is asked for."""
+    """Print the version and end, where it is requested."""
     if wanted:
         from morphdata.version import VERSION
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from morphid.screen import short
+from morphid.screen import new_table, short
 
 Document = Mapping[str, Any]
 
@@ -49,17 +48,9 @@ def model_table(result: Document) -> Table:
     model, uncertainty = result["model"], result.get("uncertainty") or {}
     intervals = uncertainty.get("interval_95") or {}
     unseen, bound = uncertainty.get("undetermined") or (), uncertainty.get("at_bound") or ()
-    table = Table(
-        title=f"Equivalent model, {model['links_per_wing']} links per wing",
-        caption="grey: the samples do not determine it" if unseen else None,
-        box=SIMPLE_HEAD,
-        padding=(0, 1),
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    table.add_column("parameter", no_wrap=True)
-    for title in ("value", "± 95 %"):
-        table.add_column(title, justify="right", no_wrap=True)
+    title = f"Equivalent model, {model['links_per_wing']} links per wing"
+    caption = "grey: the samples do not determine it" if unseen else None
+    table = new_table("parameter", "value", "± 95 %", title=title, caption=caption)
     table.add_column("")
     for name, value in named_parameters(model):
         known = name in intervals

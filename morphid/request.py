@@ -1,4 +1,4 @@
-"""The request that a command line asks for, and which option stands behind each part of it."""
+"""The request that a command line makes, and the option behind each part of it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,7 @@ SampleForm = Callable[[Path, Role], Document]
 
 
 class Request:
-    """A request, filled in part by part.
-
-    Parameters
-    ----------
-    operation : name of the operation, which is also its path at a service.
-    """
+    """A request, filled in part by part; the operation's name is also its path at a service."""
 
     def __init__(self, operation: str) -> None:
         self.operation = operation
@@ -42,11 +37,7 @@ class Request:
         """
         if value is None:
             return
-        *parents, name = pointer.split("/")[1:]
-        place = self.document
-        for parent in parents:
-            place = place.setdefault(parent, {})
-        place[name] = value
+        _put(self.document, pointer.split("/")[1:], value)
         self._given_by[pointer] = option if isinstance(value, dict | list) else f"{option} {value}"
 
     def add_samples(self, paths: Sequence[Path], role: Role, option: str) -> None:
@@ -85,10 +76,6 @@ def changed(document: Document, changes: Iterable[str]) -> Document:
     Parameters
     ----------
     changes : ``pointer=value`` each; the value is JSON, or a text where it is none.
-
-    Raises
-    ------
-    CommandError : a change has another form, or leads to a place that the request cannot have.
 
     Examples
     --------

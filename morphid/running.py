@@ -1,7 +1,7 @@
 """Run an operation in this process or at a service, and hand over what comes out.
 
 ``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
-progress is shown, the first Ctrl-C asks for the best so far, a result and its files come out.
+progress is shown, the first Ctrl-C requests the best so far, a result and its files come out.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import typer
 
 from morphdata.drives import Drive
-from morphdata.faults import InvalidInput
+from morphdata.faults import InvalidInput, MorphError
 from morphdata.operations import operation_named
 from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
@@ -48,9 +48,7 @@ class Answer:
 def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
     """Run the operation, at the service of this address or in this process; print what went wrong on the way.
 
-    Raises
-    ------
-    CommandError : the request is refused; the error names the option at fault.
+    An error names the option at fault.
     """
     if at_service_of_environment(url):
         stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
@@ -79,8 +77,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
-    from morphcore.stopping import listening
-    from worker.operations import WorkInterrupted, WorkRefused, find_operation
+    from morphcore.stopping import Interrupted, listening
+    from worker.operations import find_operation
     from worker.progress import Pace
 
     checkpoint: bytes | None = None
@@ -92,7 +90,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 for step in work.steps(None, interrupted):
                     checkpoint = step.checkpoint
                     bar.show(pace.progress(step))
-            except WorkInterrupted:
+            except Interrupted:
                 best = None if checkpoint is None else work.best_so_far(checkpoint)
                 if best is None:
                     return Answer(exit=Exit.INTERRUPTED, result=None)
@@ -102,19 +100,14 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 raise CommandError(f"{request.operation} ended without a step")
             outcome = work.outcome(checkpoint)
         return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
-    except WorkRefused as error:
+    except MorphError as error:
         raise CommandError(
-            error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+            error.message, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
         ) from None
 
 
 def require_valid(operation: str, body: Document) -> None:
-    """Refuse a request that the operation's document refuses.
-
-    Raises
-    ------
-    CommandError : with the first fault as its own, and a line for each of the others.
-    """
+    """Refuse a request that the operation's document refuses: the first fault, and a line for each other."""
     try:
         operation_named(operation).request.parse(body)
     except InvalidInput as error:

@@ -6,9 +6,9 @@ import functools
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, ParamSpec, TextIO, TypeVar
+from typing import Any, Literal, ParamSpec, TextIO, TypeVar
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from morphid.exits import CommandError, Exit, package_missing
+from morphid.exits import CommandError, Exit
 from morphid.streams import Terminal, prepare_streams, silence
 
 Document = Mapping[str, Any]
@@ -77,7 +77,12 @@ def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
         except CommandError as error:
             refusal = error
         except ModuleNotFoundError as error:
-            refusal = package_missing(error)
+            package = (error.name or "").partition(".")[0]
+            refusal = CommandError(
+                f"this command needs the package {package}, which is not installed",
+                code=Exit.ENVIRONMENT,
+                hint="pip install 'morphid[server]' brings all that the service and its tools need",
+            )
         if kwargs.get("as_json") or str(kwargs.get("json_out")) == "-":
             _write(sys.stderr, json.dumps(refusal.to_document()) + "\n")
         else:
@@ -143,9 +148,9 @@ class Meter:
         )
         self._print(phase, f"{100.0 * fraction:3.0f} %  {progress_detail(progress)}")
 
-    def _print(self, phase: str, said: str) -> None:
+    def _print(self, phase: str, detail: str) -> None:
         """Print a line, now and then, where there is no terminal."""
-        line, console = f"{phase:<10} {said}", self._progress.console
+        line, console = f"{phase:<10} {detail}", self._progress.console
         if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
             console.print(line, markup=False, soft_wrap=True)
             self._last_line = line
@@ -167,21 +172,38 @@ def meter() -> Iterator[Meter]:
         yield Meter(progress)
 
 
-def fit_table(result: Document) -> Table:
-    """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
-    title = "Fit: J in rad² (rigid, first guess, identified); RMS of φ, θ, ψ in mrad"
-    held_out = any(row["role"] != "train" for row in result["fit"])
+def new_table(
+    *columns: str, title: str = "", caption: str | None = None, left: int = 1, wrapped: Collection[str] = ()
+) -> Table:
+    """Make a table without rows.
+
+    Parameters
+    ----------
+    columns : their titles.
+    left : as many columns hold texts and stand left; the others hold numbers and stand right.
+    wrapped : columns whose cells may take several lines.
+    """
     table = Table(
-        title=title,
-        caption="* held out: not fitted" if held_out else None,
+        title=title or None,
+        caption=caption,
         box=SIMPLE_HEAD,
         padding=(0, 1),
         collapse_padding=True,
         pad_edge=False,
     )
-    table.add_column("sample", no_wrap=True)
-    for name in ("rigid", "guess", "identified", "ratio", "φ", "θ", "ψ"):
-        table.add_column(name, justify="right", no_wrap=True)
+    for number, name in enumerate(columns):
+        justify: Literal["left", "right"] = "left" if number < left else "right"
+        table.add_column(name, justify=justify, no_wrap=name not in wrapped, overflow="fold")
+    return table
+
+
+def fit_table(result: Document) -> Table:
+    """Show how well each sample is matched: cost J (rad^2) and RMS of the Euler angles (mrad)."""
+    title = "Fit: J in rad² (rigid, first guess, identified); RMS of φ, θ, ψ in mrad"
+    held_out = any(row["role"] != "train" for row in result["fit"])
+    caption = "* held out: not fitted" if held_out else None
+    columns = ("sample", "rigid", "guess", "identified", "ratio", "φ", "θ", "ψ")
+    table = new_table(*columns, title=title, caption=caption)
     for row in result["fit"]:
         rms = row["rms_rad"]
         ratio = (
@@ -200,9 +222,8 @@ def fit_table(result: Document) -> Table:
 
 def jobs_table(jobs: Sequence[Document]) -> Table:
     """Show jobs, one a line; ids are whole on a screen of 80 columns, to be copied."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1), collapse_padding=True, pad_edge=False)
-    for name in ("job", "operation", "status", "done", "try", "created UTC"):
-        table.add_column(name, no_wrap=True)
+    columns = ("job", "operation", "status", "done", "try", "created UTC")
+    table = new_table(*columns, left=len(columns))
     for job in jobs:
         fraction = (job.get("progress") or {}).get("fraction")
         status = str(job["status"])
@@ -223,7 +244,7 @@ def exit_for(status: str) -> Exit:
 
 
 def progress_detail(progress: Document) -> str:
-    """Give what is known of a job's progress beside its fraction."""
+    """Give what is known of a job's progress besides its fraction."""
     parts = []
     if progress.get("best_cost") is not None:
         parts.append(f"cost {short(progress['best_cost'])}")

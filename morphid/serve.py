@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -14,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.private_files import OTHERS, close_to_others, make_private_folder, open_private
-from morphid.broker import LOOPBACK, Broker, free_port, prepare_broker
+from morphid.broker import bound_port, in_url, prepare_broker
+from morphid.database import migrate
 from morphid.exits import CommandError, Exit
-from morphid.migrate import upgrade_to
 from morphid.screen import print_json_line, stderr, stdout
 from morphid.supervisor import Child, ChildSpec, Supervisor
 from worker.numerics import ensure_cache
@@ -51,18 +50,16 @@ def serve(settings: Settings, *, json_events: bool) -> None:
     ----------
     settings : where the API listens (port 0 takes a free one), jobs at once, data directory and all else.
     json_events : one JSON object per line instead of sentences.
-
-    Raises
-    ------
-    CommandError : a port is taken, a program is missing, data_dir is unusable, or a child will not start.
     """
+    from app.database import upgrade
+
     announcer = Announcer(json_events=json_events)
     ensure_cache()  # here, where its warning is seen; the workers inherit the folder
     data_dir = settings.data_dir
     with _own_data_dir(data_dir):
         port = _api_port(settings.host, settings.port)
         environment = _environment(settings, port)
-        upgrade_to(environment["MORPHID_DATABASE_URL"])
+        migrate(upgrade, settings.database_url)
         supervisor = Supervisor(
             data_dir / "logs", report=lambda sentence: announcer.event("restart", f"morphid: {sentence}")
         )
@@ -70,7 +67,7 @@ def serve(settings: Settings, *, json_events: bool) -> None:
         try:
             _start_children(supervisor, environment, settings, port)
             if not supervisor.stopping:
-                url = f"http://{_in_url(settings.host)}:{port}"
+                url = f"http://{in_url(settings.host)}:{port}"
                 announcer.event(
                     "ready",
                     f"MorphID is ready at {url} (documentation at {url}/docs, logs in {data_dir / 'logs'}). "
@@ -91,19 +88,17 @@ def _start_children(
     if not settings.names_broker:
         broker = prepare_broker(settings.data_dir)
         environment["MORPHID_BROKER_URL"] = broker.url
-        _start_broker(supervisor, broker)
+        _expect(supervisor, supervisor.start(broker.spec), broker.answers, BROKER_WITHIN_S)
     if supervisor.stopping:
         return
-    api = supervisor.start(_api(environment, settings.host, port))
+    command = _python("app.http.server", "--host", settings.host, "--port", str(port))
+    api = supervisor.start(ChildSpec("api", command, environment))
     # the worker loads while the API does; a wake-up that comes early waits in the queue
-    supervisor.start(_worker(environment, settings.workers))
-    supervisor.start(_beat(environment))
+    command = _python("worker.process", "worker", "--concurrency", str(settings.workers))
+    supervisor.start(ChildSpec("worker", command, environment, stop_within_s=WORKER_STOP_S))
+    # not inside the worker: nobody would notice its death, and no lost job would be found any more
+    supervisor.start(ChildSpec("beat", _python("worker.process", "beat"), environment))
     _expect(supervisor, api, lambda: _alive(settings.host, port), API_WITHIN_S)
-
-
-def _start_broker(supervisor: Supervisor, broker: Broker) -> None:
-    child = supervisor.start(broker.spec)
-    _expect(supervisor, child, broker.answers, BROKER_WITHIN_S)
 
 
 def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], within_s: float) -> None:
@@ -115,21 +110,6 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
         code=Exit.ENVIRONMENT,
         hint="repair what the log says and start again",
     )
-
-
-def _api(environment: dict[str, str], host: str, port: int) -> ChildSpec:
-    command = _python("app.http.server", "--host", host, "--port", str(port))
-    return ChildSpec(name="api", command=command, environment=environment)
-
-
-def _worker(environment: dict[str, str], workers: int) -> ChildSpec:
-    command = _python("worker.process", "worker", "--concurrency", str(workers))
-    return ChildSpec(name="worker", command=command, environment=environment, stop_within_s=WORKER_STOP_S)
-
-
-def _beat(environment: dict[str, str]) -> ChildSpec:
-    # not inside the worker: nobody would notice its death, and no lost job would be found any more
-    return ChildSpec(name="beat", command=_python("worker.process", "beat"), environment=environment)
 
 
 def _python(module: str, *arguments: str) -> list[str]:
@@ -184,37 +164,26 @@ def _close_to_others(home: Path) -> None:
     if not home.stat().st_mode & OTHERS:
         return
     if (not names or LOCK_NAME in names) and close_to_others(home):
-        said = f"the data directory {home} was open to other users; access is now restricted to you"
+        notice = f"the data directory {home} was open to other users; access is now restricted to you"
     else:
-        said = f"other users may list {home}, not read what MorphID writes there; chmod 700 closes it"
-    stderr().print(f"morphid: {said}", markup=False, soft_wrap=True)
+        notice = f"other users may list {home}, not read what MorphID writes there; chmod 700 closes it"
+    stderr().print(f"morphid: {notice}", markup=False, soft_wrap=True)
 
 
 def _api_port(host: str, port: int) -> int:
-    if port == 0:
-        return free_port(0, host)
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise CommandError(
-                f"cannot listen on {host} port {port}: {error.strerror}",
-                code=Exit.ENVIRONMENT,
-                hint="another program may use it; take any free port with `morphid serve --port 0`",
-            ) from None
-    return port
-
-
-def _in_url(host: str) -> str:
-    everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}  # noqa: S104 - recognised here, not bound
-    return everywhere.get(host, f"[{host}]" if ":" in host else host)
+    try:
+        return bound_port(host, port)
+    except OSError as error:
+        raise CommandError(
+            f"cannot listen on {host} port {port}: {error.strerror}",
+            code=Exit.ENVIRONMENT,
+            hint="another program may use it; take any free port with `morphid serve --port 0`",
+        ) from None
 
 
 def _alive(host: str, port: int) -> bool:
     try:
-        with closing(HTTPConnection(_in_url(host), port, timeout=1.0)) as link:  # which knows no proxies
+        with closing(HTTPConnection(in_url(host), port, timeout=1.0)) as link:  # which knows no proxies
             link.request("GET", "/livez")
             return link.getresponse().status == HTTPStatus.OK
     except (HTTPException, OSError):

@@ -27,10 +27,6 @@ class Service:
     url : base address, such as ``http://127.0.0.1:8000``.
     api_key : for services that demand one.
     transport : handed in by tests.
-
-    Raises
-    ------
-    CommandError : the key cannot stand in a header.
     """
 
     def __init__(
@@ -79,7 +75,7 @@ class Service:
         return self._document("GET", f"/jobs/{job_id}/result")
 
     def request(self, job_id: str) -> Document:
-        """Give what was asked for when a job was posted."""
+        """Give the request of a job."""
         return self._document("GET", f"/jobs/{job_id}/request")
 
     def watch(self, job_id: str, *, poll_s: float = POLL_S) -> Iterator[Document]:
@@ -150,7 +146,7 @@ def _refusal(answer: httpx.Response) -> CommandError:
 
 
 def _further_faults(problem: Document) -> Iterator[str]:
-    """Give what else is wrong in the request, a line each; the first fault is the problem's own."""
+    """Give the further faults of the request, a line each; the first fault is the problem's own."""
     for fault in (problem.get("errors") or [])[1:]:
         hint = f" ({fault['hint']})" if fault.get("hint") else ""
         yield f"{fault.get('pointer', '')}: {fault.get('detail', '')}{hint}"

@@ -147,12 +147,12 @@ class Child:
 
 
 class Supervisor:
-    """Start children in order, tend them until told to stop, end them in reverse order.
+    """Start children in order, tend them until the end is requested, end them in reverse order.
 
     Parameters
     ----------
     log_dir : where each child's output goes.
-    report : called with a sentence for every event worth telling.
+    report : called with a sentence for every event that the user should know.
     clock, sleep : handed in so that tests need not wait.
     """
 
@@ -169,22 +169,13 @@ class Supervisor:
         self._report = report
         self._clock = clock
         self._sleep = sleep
-        self._stopping = False
-
-    @property
-    def stopping(self) -> bool:
-        """Whether a signal or `request_stop` asked for the end."""
-        return self._stopping
-
-    def request_stop(self) -> None:
-        """Let `watch` return."""
-        self._stopping = True
+        self.stopping = False  # whether a signal requested the end; `watch` then returns
 
     def on_signals(self) -> None:
         """Take SIGINT, SIGTERM and SIGHUP as the wish to end."""
 
         def stop(_number: int, _frame: FrameType | None) -> None:
-            self.request_stop()
+            self.stopping = True
 
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, stop)
@@ -204,7 +195,7 @@ class Supervisor:
         False when it died, time ran out, or the end was requested.
         """
         deadline = self._clock() + within_s
-        while self._clock() < deadline and not self._stopping:
+        while self._clock() < deadline and not self.stopping:
             if child.exit_code is not None:
                 return False
             if ready():
@@ -214,7 +205,7 @@ class Supervisor:
 
     def watch(self) -> None:
         """Tend the children until the end is requested."""
-        while not self._stopping:
+        while not self.stopping:
             self.tend()
             self._sleep(POLL_S)
 
@@ -227,7 +218,7 @@ class Supervisor:
 
     def stop(self) -> None:
         """End all children, the last started first."""
-        self._stopping = True
+        self.stopping = True
         for child in reversed(self.children.values()):
             child.stop()
 

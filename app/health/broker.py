@@ -1,4 +1,4 @@
-"""Is the broker there? A real PING, with its password: an open port alone says little."""
+"""Health of the broker: the answer to a PING with our password; an open port alone proves little."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BROKER_GOOD = frozenset({"ok", NOT_CHECKED})
 
 @lru_cache(maxsize=4)
 def broker_client(url: str) -> Any:
-    """Return a client that asks once and does not wait long."""
+    """Return a client that tries once and does not wait long."""
     from redis import Redis  # lazy: half a second of imports
     from redis.backoff import NoBackoff
     from redis.retry import Retry
@@ -32,7 +32,7 @@ def broker_client(url: str) -> Any:
 
 
 def broker_state(url: str) -> str:
-    """Ask the broker for a sign of life: ``ok``, or what is wrong."""
+    """``ok`` when the broker answers, or what is wrong."""
     if not is_redis(url):
         return NOT_CHECKED
     from redis import exceptions

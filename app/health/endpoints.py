@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
 from app.errors import InvalidRequest
 from app.health.metrics import MEDIA_TYPE
 from app.health.schemas import Liveness, Readiness
-from app.health.service import Health
-from app.http.context import demands
+from app.http.context import ServiceDep, demands
 from app.http.problems import documented
 from app.keys.records import Scope
 from morphdata.version import VERSION
@@ -19,13 +18,6 @@ from morphdata.version import VERSION
 router = APIRouter(tags=["health"])
 
 
-async def current_health(request: Request) -> Health:
-    """Return what the process that serves `request` tells of itself."""
-    health: Health = request.app.state.health
-    return health
-
-
-HealthDep = Annotated[Health, Depends(current_health)]
 Strict = Annotated[bool, Query(description="Answer 503 also when the service is `degraded`.")]
 
 
@@ -41,13 +33,13 @@ async def livez() -> Liveness:
     summary="Can requests be served?",
     responses={**documented(InvalidRequest), 503: {"model": Readiness, "description": "Not ready."}},
 )
-async def readyz(health: HealthDep, response: Response, *, strict: Strict = False) -> Readiness:
+async def readyz(app: ServiceDep, response: Response, *, strict: Strict = False) -> Readiness:
     """Report whether database, broker and workers are available.
 
-    A load balancer asks without `strict`: while broker or workers are away this process still takes jobs and
-    keeps them. Who watches over the whole service asks with it.
+    Load balancers check without `strict`: while broker or workers are away this process still takes jobs and
+    keeps them. Monitoring of the whole service checks with it.
     """
-    state = await health.readiness()
+    state = await app.health.readiness()
     if state.status == "not_ready" or (strict and state.status == "degraded"):
         response.status_code = 503
     return state
@@ -60,6 +52,6 @@ async def readyz(health: HealthDep, response: Response, *, strict: Strict = Fals
     response_class=PlainTextResponse,
     dependencies=[demands(Scope.METRICS)],
 )
-def metrics(health: HealthDep) -> Response:
-    """Jobs, queue, workers and counters as the rows tell them; requests as this process has served them."""
-    return Response(health.metrics.text(), media_type=MEDIA_TYPE)
+def metrics(app: ServiceDep) -> Response:
+    """Jobs, queue, workers and counters from the database; requests as this process has served them."""
+    return Response(app.health.metrics.text(), media_type=MEDIA_TYPE)

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: what the rows tell, the same from every API process, and this one's requests."""
+"""Metrics for Prometheus: what is in the rows, the same from every API process, and this one's requests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from app.health.records import Snapshot
+from app.health.repository import Snapshot
 from app.observability import job_counts
 from app.observability.counters import Counted
 from app.observability.request_metrics import REGISTRY
@@ -31,7 +31,7 @@ COUNTERS = {  # by the name of their rows
         (),
     ),
     job_counts.REAP_ROUNDS: ("morphid_reap_rounds", "Rounds of the reaper; the count must keep rising.", ()),
-    job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that were asked to end.", ()),
+    job_counts.RELEASED: ("morphid_jobs_released", "Jobs handed back by workers that shut down.", ()),
 }
 HISTOGRAMS = {
     job_counts.WAIT_TIME: ("morphid_job_wait_seconds", "From a job's creation to its first claim."),
@@ -40,17 +40,10 @@ HISTOGRAMS = {
 
 
 class Metrics:
-    """The page that Prometheus reads.
+    """The page that Prometheus reads; `look` reads the rows."""
 
-    Parameters
-    ----------
-    look : reads the rows.
-    clock : seconds that only rise.
-    """
-
-    def __init__(self, look: Callable[[], Snapshot], *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, look: Callable[[], Snapshot]) -> None:
         self._look = look
-        self._clock = clock
         self._lock = threading.Lock()
         self._seen: Snapshot | None = None
         self._seen_at = float("-inf")
@@ -58,9 +51,9 @@ class Metrics:
     def text(self) -> bytes:
         """Write the page in the text format of Prometheus (version 0.0.4)."""
         with self._lock:
-            if self._seen is None or self._clock() - self._seen_at > FRESH_S:
+            if self._seen is None or time.monotonic() - self._seen_at > FRESH_S:
                 self._seen = self._look()
-                self._seen_at = self._clock()
+                self._seen_at = time.monotonic()
             seen = self._seen
         registry = CollectorRegistry()
         registry.register(_Rows(seen))
@@ -72,26 +65,21 @@ class _Rows(Collector):
         self._seen = seen
 
     def collect(self) -> Iterator[Metric]:
-        """Give what the rows tell."""
+        """Give the families of metrics."""
         seen = self._seen
         yield _gauge("morphid_jobs", "Jobs by state.", "status", seen.jobs.items())
-        yield GaugeMetricFamily("morphid_queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"])
-        yield GaugeMetricFamily(
-            "morphid_oldest_queued_seconds", "Age of the oldest job that waits.", seen.oldest_queued_s
-        )
-        yield GaugeMetricFamily(
-            "morphid_flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s
-        )
         yield _gauge("morphid_chunks", "Chunks of distributed jobs.", "status", seen.chunks.items())
-        yield GaugeMetricFamily(
-            "morphid_webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting
-        )
         workers = {"alive": seen.workers.alive, "stalled": seen.workers.stalled}
         yield _gauge("morphid_workers", "Workers by state.", "status", workers.items())
-        yield GaugeMetricFamily(
-            "morphid_worker_slots", "Jobs that living workers can run at once.", seen.workers.slots
-        )
-        yield GaugeMetricFamily("morphid_worker_slots_busy", "Of these, in use.", seen.workers.busy)
+        for name, help_text, value in (
+            ("queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"]),
+            ("oldest_queued_seconds", "Age of the oldest job that waits.", seen.oldest_queued_s),
+            ("flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s),
+            ("webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting),
+            ("worker_slots", "Jobs that living workers can run at once.", seen.workers.slots),
+            ("worker_slots_busy", "Of these, in use.", seen.workers.busy),
+        ):
+            yield GaugeMetricFamily(f"morphid_{name}", help_text, value)
         yield _gauge("morphid_build_info", "Version of this API process.", "version", [(VERSION, 1)])
         yield from _counters(seen.counters)
         for name, (shown, help_text) in HISTOGRAMS.items():

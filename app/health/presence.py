@@ -1,41 +1,34 @@
-"""The table of workers as they write it: signs of life, and the sign that one ended as it should."""
+"""The table of workers as they write it: signs of life, and the sign that one ended as it should.
+
+A sign names its process uniquely: the system reuses process numbers, and containers each count from 1.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
 from sqlalchemy import delete, insert, update
 
 from app.database import Session, database_time
-from app.health.processes import own_identity
 from app.tables import workers
 
 REMEMBERED_S = 86_400.0  # a worker that is silent for longer is gone: its row is old news
+PROC = Path("/proc")
+START_TIME = 19  # place of the start time behind the program's name in /proc/<pid>/stat (proc(5))
+ENDED = frozenset("ZXx")
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """One sign of life.
+    """One sign of life."""
 
-    Attributes
-    ----------
-    name : str
-        Of the worker's parent process, ``host:process``.
-    version : str
-        Of the program.
-    slots : int
-        Its living pool children: jobs it can run at once.
-    busy : int
-        Of these, those that have a task.
-    process : str or None
-        Who signs, as `app.health.processes` names it: the process that makes the sign.
-    """
-
-    name: str
+    name: str  # of the worker's parent process, ``host:process``
     version: str
-    slots: int
-    busy: int
-    process: str | None = field(default_factory=own_identity)
+    slots: int  # its living pool children: jobs it can run at once
+    busy: int  # of these, those that have a task
+    process: str | None = field(default_factory=lambda: process_identity(os.getpid()))
 
 
 def note_started(session: Session, sign: Sign) -> None:
@@ -57,19 +50,51 @@ def note_seen(session: Session, sign: Sign) -> None:
 
 
 def note_stopped(session: Session, name: str) -> None:
-    """Write that a worker takes no more jobs because it was asked to end."""
+    """Write that a worker takes no more jobs because it is shutting down."""
     session.execute(update(workers).where(workers.c.name == name).values(stopped_at=database_time(), busy=0))
 
 
 def _insert(session: Session, sign: Sign) -> None:
-    session.execute(
-        insert(workers).values(
-            name=sign.name,
-            version=sign.version,
-            slots=sign.slots,
-            busy=sign.busy,
-            process=sign.process,
-            started_at=database_time(),
-            seen_at=database_time(),
-        )
-    )
+    now = database_time()
+    session.execute(insert(workers).values(**asdict(sign), started_at=now, seen_at=now))
+
+
+def process_identity(pid: int) -> str | None:
+    """Name a process of this machine uniquely; None where the system does not say.
+
+    The name has four parts: this boot, the space of process numbers (each container has its own), the
+    number and the moment of the process's start.
+    """
+    try:
+        return "/".join((*_here(), str(pid), _stat(pid)[START_TIME]))
+    except OSError:
+        return None
+
+
+def is_gone(identity: str | None) -> bool | None:
+    """Whether a process has ended; None when it cannot be seen from here."""
+    try:
+        boot, space, pid, started = (identity or "").split("/")
+        if (boot, space) != _here():
+            return None
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:
+        return False
+    except (OSError, ValueError):
+        return None
+    try:
+        stat = _stat(int(pid))
+    except OSError:
+        return False  # it is there; another user's, perhaps
+    return stat[START_TIME] != started or stat[0] in ENDED
+
+
+def _here() -> tuple[str, str]:
+    boot = (PROC / "sys/kernel/random/boot_id").read_text().strip()
+    return boot, str((PROC / "self/ns/pid").readlink())
+
+
+def _stat(pid: int) -> list[str]:
+    return (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()

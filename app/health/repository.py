@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 from sqlalchemy import func, select, true
 
 from app.database import Session, database_time
-from app.health.presence import REMEMBERED_S
-from app.health.processes import is_gone
-from app.health.records import Snapshot, WorkerCounts
+from app.health.presence import REMEMBERED_S, is_gone
+from app.health.schemas import WorkerState
 from app.jobs.records import HELD, JobStatus
-from app.observability.counters import read_counters
+from app.observability.counters import Counted, read_counters
 from app.tables import STATUSES, job_chunks, jobs, webhook_deliveries, workers
 
 SILENT_BEATS = 3  # a worker that missed so many of its signs of life is stalled
 GONE_S = 60.0  # one that is silent for longer, and whose process cannot be seen from here, is not there
 
 
-def snapshot(session: Session, beat_s: float) -> Snapshot:
-    """Count everything once.
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The rows of the service, counted."""
 
-    Parameters
-    ----------
-    beat_s : how often workers show that they are there.
-    """
+    jobs: Mapping[str, int]  # by state, each state there
+    oldest_queued_s: float
+    flights_per_s: float  # of all running jobs
+    chunks: Mapping[str, int]  # of spread jobs: open, running
+    deliveries_waiting: int  # of webhooks
+    workers: WorkerState
+    counters: Sequence[Counted]
+
+
+def snapshot(session: Session, beat_s: float) -> Snapshot:
+    """Count everything once; workers show every `beat_s` that they are there."""
     return Snapshot(
         jobs=_jobs(session),
         oldest_queued_s=_oldest_queued_s(session),
@@ -34,19 +44,15 @@ def snapshot(session: Session, beat_s: float) -> Snapshot:
     )
 
 
-def count_workers(session: Session, beat_s: float, *, host: str | None = None) -> WorkerCounts:
+def count_workers(session: Session, beat_s: float, *, host: str | None = None) -> WorkerState:
     """Count workers, of one host or of all; the time since their last sign of life is the database's.
 
     A worker whose process has ended is not counted: at once where its process can be looked for, else when
     it has been silent for `GONE_S`. One that is there and silent is stalled.
     """
+    silence = (database_time() - workers.c.seen_at).label("silent_s")
     rows = session.execute(
-        select(
-            (database_time() - workers.c.seen_at).label("silent_s"),
-            workers.c.slots,
-            workers.c.busy,
-            workers.c.process,
-        ).where(
+        select(silence, workers.c.slots, workers.c.busy, workers.c.process).where(
             workers.c.stopped_at.is_(None),
             workers.c.seen_at > database_time() - REMEMBERED_S,
             true() if host is None else workers.c.name.startswith(f"{host}:", autoescape=True),
@@ -62,7 +68,13 @@ def count_workers(session: Session, beat_s: float, *, host: str | None = None) -
             alive.append(row)
         elif not gone:
             stalled += 1
-    return WorkerCounts(len(alive), stalled, sum(row.slots for row in alive), sum(row.busy for row in alive))
+    return WorkerState(
+        status="ok" if alive else "stalled" if stalled else "none",
+        alive=len(alive),
+        stalled=stalled,
+        slots=sum(row.slots for row in alive),
+        busy=sum(row.busy for row in alive),
+    )
 
 
 def _jobs(session: Session) -> dict[str, int]:
@@ -73,7 +85,7 @@ def _jobs(session: Session) -> dict[str, int]:
 
 
 def _oldest_queued_s(session: Session) -> float:
-    # ids rise with time: the least id stands in the index, the least time of creation does not
+    # ids rise with time: the smallest id is in the index, the earliest time of creation is not
     oldest = select(func.min(jobs.c.id)).where(jobs.c.status == JobStatus.QUEUED.value).scalar_subquery()
     age = session.scalar(select(database_time() - jobs.c.created_at).where(jobs.c.id == oldest))
     return max(age or 0.0, 0.0)
@@ -95,11 +107,5 @@ def _chunks(session: Session) -> dict[str, int]:
 
 
 def _deliveries_waiting(session: Session) -> int:
-    return int(
-        session.scalar(
-            select(func.count())
-            .select_from(webhook_deliveries)
-            .where(webhook_deliveries.c.status == "waiting")
-        )
-        or 0
-    )
+    waiting = webhook_deliveries.c.status == "waiting"
+    return int(session.scalar(select(func.count()).select_from(webhook_deliveries).where(waiting)) or 0)

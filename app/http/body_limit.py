@@ -5,75 +5,55 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter
-from dataclasses import dataclass
 
+from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import BodyTooLarge, ServiceBusy, ServiceError, SlowBody
 from app.http.context import caller_of
-from app.http.early_answer import answer_early
+from app.http.middleware import HttpMiddleware
+from app.http.problems import answer_early
 from app.keys.watch import KeyInUse
+from app.settings import Settings
+
+MIN_RATE = 16_384.0  # bytes per second that a body must arrive with once its grace time is over
+BODIES_AT_ONCE = 16  # of the largest size: all bodies together that are being received or read
 
 
-@dataclass(frozen=True, slots=True)
-class BodyLimits:
-    """What a body may take.
+class BodyLimit(HttpMiddleware):
+    """ASGI middleware: a problem document as soon as a body is too large, too slow, or one too many."""
 
-    Attributes
-    ----------
-    max_bytes : int
-        Largest body that is let through.
-    grace_s : float
-        Time to send a body of any size.
-    min_rate : float
-        Bytes per second that a larger one must arrive with on top.
-    max_total_bytes : int
-        All bodies together that are being received or read; beyond it requests are told to come again.
-    max_owner_bytes : int
-        The same of one owner, which leaves room for the others.
-    """
-
-    max_bytes: int
-    grace_s: float = 20.0
-    min_rate: float = 16_384.0
-    max_total_bytes: int = 2**30
-    max_owner_bytes: int = 2**30
-
-
-class BodyLimit:
-    """ASGI middleware: a problem document as soon as a body is too large, too slow, or one too many.
-
-    Parameters
-    ----------
-    app : ASGI application
-    limits : BodyLimits
-    """
-
-    def __init__(self, app: ASGIApp, limits: BodyLimits) -> None:
-        self.app = app
-        self.limits = limits
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        super().__init__(app)
+        self.max_bytes = settings.max_body_bytes
+        self.grace_s = settings.body_grace_s
+        self.max_total_bytes = BODIES_AT_ONCE * self.max_bytes
+        # one owner of several leaves room for the others
+        self.max_owner_bytes = self.max_total_bytes // (2 if settings.demands_keys else 1)
         self.total = 0  # bytes of all bodies whose requests are not yet answered
         self.of_owners: Counter[str] = Counter()  # the same of each owner's
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        if _announced(scope) > self.limits.max_bytes:
-            await answer_early(_too_large(self.limits), scope, receive, send)
+        announced = Headers(scope=scope).get("content-length", "")
+        if announced.isdigit() and int(announced) > self.max_bytes:
+            await answer_early(self.too_large(), scope, receive, send)
             return
         body = _Body(self, scope, receive, send)
         try:
             await self.app(scope, body.receive, body.send)
         except ClientDisconnect:
-            return  # nobody to tell
+            return  # nobody waits for an answer
         except Exception:
             if not body.refused:
                 raise
         finally:
-            body.forget()
+            body.release()
+
+    def too_large(self) -> BodyTooLarge:
+        """Make the error of a body that is too large."""
+        return BodyTooLarge(f"The body has more than {self.max_bytes} bytes.")
 
 
 class _Body:
@@ -116,13 +96,10 @@ class _Body:
 
     async def _in_time(self) -> Message:
         """Wait for the next piece as long as the pieces until now have earned."""
-        limits = self.limit.limits
         start = time.monotonic()
+        patience_s = self.limit.grace_s + self.counted / MIN_RATE - self.waited_s
         try:
-            async with (
-                asyncio.timeout(limits.grace_s + self.counted / limits.min_rate - self.waited_s),
-                self.key.while_it_opens(),
-            ):
+            async with asyncio.timeout(patience_s), self.key.while_valid():
                 message = await self.from_client()
         except TimeoutError:
             raise SlowBody from None
@@ -130,35 +107,21 @@ class _Body:
         return message
 
     def _count(self, message: Message) -> None:
-        size = len(message.get("body", b""))
+        limit, size = self.limit, len(message.get("body", b""))
         self.counted += size
-        self.limit.total += size
-        self.limit.of_owners[self.owner] += size
+        limit.total += size
+        limit.of_owners[self.owner] += size
         self.complete = not message.get("more_body", False)
-        if self.counted > self.limit.limits.max_bytes:
-            raise _too_large(self.limit.limits)
-        if self.limit.total > self.limit.limits.max_total_bytes:
+        if self.counted > limit.max_bytes:
+            raise limit.too_large()
+        if limit.total > limit.max_total_bytes:
             raise ServiceBusy("Too many large bodies are being received at the moment.")
-        if self.limit.of_owners[self.owner] > self.limit.limits.max_owner_bytes:
+        if limit.of_owners[self.owner] > limit.max_owner_bytes:
             raise ServiceBusy("Too many large bodies of yours are being received at the moment.")
 
-    def forget(self) -> None:
+    def release(self) -> None:
         """Give back what the body took of the limits."""
         self.limit.total -= self.counted
         self.limit.of_owners[self.owner] -= self.counted
         if not self.limit.of_owners[self.owner]:
             del self.limit.of_owners[self.owner]
-
-
-def _announced(scope: Scope) -> int:
-    for name, value in scope["headers"]:
-        if name == b"content-length":
-            return int(value) if value.isdigit() else 0
-    return 0
-
-
-def _too_large(limits: BodyLimits) -> BodyTooLarge:
-    return BodyTooLarge(
-        f"The body has more than {limits.max_bytes} bytes.",
-        hint="Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories.",
-    )

@@ -12,19 +12,18 @@ from starlette.types import Scope as AsgiScope
 from app.background_writer import BackgroundWriter
 from app.database import Database
 from app.errors import MissingScope, Unauthorized
+from app.health.service import Health
 from app.jobs.queue import Publisher
 from app.jobs.waiting import QueueView
 from app.jobs.watch import JobWatcher
 from app.keys.keyring import KeyRing
 from app.keys.records import Quota, Scope
 from app.keys.watch import KeyInUse, KeyWatch
-from app.owner_limit import OwnerLimit
-from app.owner_turns import OwnerTurns
+from app.owner_turns import OwnerLimit, OwnerTurns
 from app.parsing.pool import ParserPool
 from app.settings import Settings
 from app.webhooks.addresses import AddressPolicy
 
-LOCAL_OWNER = "local"  # everyone, where no keys are demanded
 CALLER = "morphid.caller"  # where the gate leaves the caller in a request's scope
 BEARER = HTTPBearer(
     scheme_name="api_key",
@@ -35,15 +34,7 @@ BEARER = HTTPBearer(
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """The parts of one running API process.
-
-    Attributes
-    ----------
-    reads : OwnerTurns
-        Reads of the database for clients that follow jobs.
-    streams, waits : OwnerLimit
-        Event streams and waiting requests.
-    """
+    """The parts of one running API process."""
 
     settings: Settings
     database: Database
@@ -55,35 +46,18 @@ class Service:
     background: BackgroundWriter
     parsers: ParserPool
     webhook_policy: AddressPolicy
-    reads: OwnerTurns
-    streams: OwnerLimit
-    waits: OwnerLimit
+    health: Health
+    reads: OwnerTurns  # of the database, for clients that follow jobs
+    streams: OwnerLimit  # of events
+    waits: OwnerLimit  # requests with `Prefer: wait`
 
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who makes the request that is being served.
+    """Who makes the request that is being served."""
 
-    Attributes
-    ----------
-    owner : str
-        Whose things the request may see: those of every key of this owner.
-    key_id : str or None
-        None where no keys are demanded.
-    scopes : frozenset of Scope
-        What it may do.
-    request_id : str
-        Of this request.
-    address : str
-        Of the other end.
-    quota : Quota
-        How much it may use.
-    key : KeyInUse
-        Tells whether its key still opens.
-    """
-
-    owner: str
-    key_id: str | None
+    owner: str  # the request may see what belongs to any key of this owner
+    key_id: str | None  # None where no keys are required
     scopes: frozenset[Scope]
     request_id: str
     address: str
@@ -98,7 +72,7 @@ async def current_service(request: Request) -> Service:
 
 
 def caller_of(scope: AsgiScope) -> Caller | None:
-    """Return who makes a request; None on public paths and for whom the gate has refused."""
+    """Return who makes a request; None on public paths, and when the gate has refused the request."""
     caller: Caller | None = scope.get(CALLER)
     return caller
 
@@ -109,13 +83,12 @@ async def current_caller(request: Request) -> Caller:
     Raises
     ------
     Unauthorized
-        Nobody known: the path is a public one, or there is no gate. Or the key was revoked or has expired
-        while the body arrived.
+        The path is public or there is no gate; or the key was revoked or has expired while the body arrived.
     """
     caller = caller_of(request.scope)
     if caller is None:
         raise Unauthorized
-    caller.key.must_open()
+    caller.key.require_valid()
     return caller
 
 

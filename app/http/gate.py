@@ -1,7 +1,7 @@
 """The gate before every route: where a request comes from, and whose key it carries.
 
 It stands before bodies are read and paths are looked at, and is closed by default: what is not on the short
-public list needs a valid key. What a key may do is said by each route (`app.http.context.demands`).
+public list needs a valid key. Each route declares what a key may do (`app.http.context.demands`).
 """
 
 from __future__ import annotations
@@ -17,69 +17,57 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.audit import repository as audit
 from app.audit.records import Action
 from app.errors import DatabaseAway, ServiceError, TooManyRefusals, Unauthorized
-from app.http.context import CALLER, LOCAL_OWNER, Caller, Service
-from app.http.early_answer import answer_early
+from app.http.context import CALLER, Caller, Service
+from app.http.middleware import HttpMiddleware
 from app.http.origins import Boundary, refusal
-from app.http.request_id import current_request_id
+from app.http.problems import answer_early
 from app.keys.keyring import Refusal
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, ApiKey
 from app.keys.refusal_limit import RefusalLimit
 from app.keys.secret import KeyText
 from app.keys.watch import KeyInUse
+from app.observability.context import current_request_id
 from app.settings import Settings
 
 PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
 PUBLIC_FOLDER = "/static/"
+LOCAL_OWNER = "local"  # everyone, where no keys are required
 ADDRESS_LENGTH = 64  # a proxy may pass on anything
 
 logger = logging.getLogger(__name__)
 
 
-class Gate:
-    """ASGI middleware that knows the caller before anything else is done.
-
-    Parameters
-    ----------
-    app : ASGI application
-    settings : Settings
-    """
+class Gate(HttpMiddleware):
+    """ASGI middleware that knows the caller before anything else is done."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
-        self.app = app
+        super().__init__(app)
         self._boundary = Boundary.of(settings)
         self._demands_keys = settings.demands_keys
         self._limit = RefusalLimit()
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request, or refuse it."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        error = refusal(scope, self._boundary)
-        if error is not None:
+        path: str = scope["path"]
+        address = scope["client"][0][:ADDRESS_LENGTH] if scope.get("client") else ""
+        try:
+            if error := refusal(scope, self._boundary):
+                raise error
+            public = path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDER)
+            key = await self._key(scope, address) if self._demands_keys and not public else None
+        except ServiceError as error:
             await answer_early(error, scope, receive, send)
             return
-        path: str = scope["path"]
-        if path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDER):
-            await self.app(scope, receive, send)
+        about = (current_request_id(), address)
+        if key is not None:
+            service: Service = scope["app"].state.service
+            with service.key_watch.use(key) as in_use:
+                scope[CALLER] = Caller(key.owner, key.id, key.scopes, *about, key.quota, in_use)
+                await self.app(scope, receive, send)
             return
-        address = scope["client"][0][:ADDRESS_LENGTH] if scope.get("client") else ""
-        if not self._demands_keys:
-            request_id = current_request_id()
-            scope[CALLER] = Caller(LOCAL_OWNER, None, EVERY_SCOPE, request_id, address, NO_QUOTA, KeyInUse())
-            await self.app(scope, receive, send)
-            return
-        try:
-            key = await self._key(scope, address)
-        except ServiceError as refused:
-            await answer_early(refused, scope, receive, send)
-            return
-        service: Service = scope["app"].state.service
-        with service.key_watch.use(key) as in_use:
-            scope[CALLER] = Caller(
-                key.owner, key.id, key.scopes, current_request_id(), address, key.quota, in_use
-            )
-            await self.app(scope, receive, send)
+        if not public:
+            scope[CALLER] = Caller(LOCAL_OWNER, None, EVERY_SCOPE, *about, NO_QUOTA, KeyInUse())
+        await self.app(scope, receive, send)
 
     async def _key(self, scope: Scope, address: str) -> ApiKey:
         """Find the key that the request carries.
@@ -87,13 +75,13 @@ class Gate:
         Raises
         ------
         Unauthorized
-            It carries none, or one that does not open.
+            It carries none, or one that is not valid.
         TooManyRefusals
             The address has sent too many of those.
         """
         given = Headers(scope=scope).getlist("authorization")
         if not given:
-            raise Unauthorized  # not a guess: the page asks once without, to learn that keys are demanded
+            raise Unauthorized  # not a guess: the page tries once without, to learn that keys are required
         scheme, _, credentials = given[0].partition(" ")
         well_formed = len(given) == 1 and scheme.lower() == "bearer"
         text = KeyText.parsed(credentials.strip()) if well_formed else None
@@ -102,20 +90,15 @@ class Gate:
         wait_s = self._limit.wait_s(address, prefix)
         if wait_s > 0:
             raise TooManyRefusals(wait_s)
-        if text is None:
-            raise self._refused(service, address, "", Refusal.MALFORMED)
-        found = await _checked(service, text)
-        if isinstance(found, Refusal):
-            raise self._refused(service, address, prefix, found)
-        self._limit.note_opened(address, prefix)
-        return found
-
-    def _refused(self, service: Service, address: str, prefix: str, reason: Refusal) -> Unauthorized:
-        if reason in (Refusal.EXPIRED, Refusal.REVOKED):
+        found = Refusal.MALFORMED if text is None else await _checked(service, text)
+        if isinstance(found, ApiKey):
+            self._limit.note_valid(address, prefix)
+            return found
+        if found in (Refusal.EXPIRED, Refusal.REVOKED):
             self._limit.forget(address, prefix)
         if self._limit.note_refused(address):
-            _note_refused(service, address, prefix, reason)
-        return Unauthorized()
+            _note_refused(service, address, prefix, found)
+        raise Unauthorized
 
 
 def _note_refused(service: Service, address: str, prefix: str, refused: Refusal) -> None:

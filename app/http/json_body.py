@@ -89,7 +89,7 @@ class _ParsedRequest(Request):
     empty = True
 
     async def body(self) -> bytes:
-        return b"" if self.empty else b"parsed"  # FastAPI asks only whether there is one
+        return b"" if self.empty else b"parsed"  # FastAPI checks only whether there is one
 
     async def json(self) -> Any:
         return self.document

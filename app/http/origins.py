@@ -2,7 +2,7 @@
 
 A service on loopback is open to every program of its user, and a browser is one: any web page could have it
 post jobs (cross-site requests), or read answers after its own name has been pointed at 127.0.0.1 (DNS
-rebinding). Browsers tell where a request comes from (``Sec-Fetch-Site``, ``Origin``) and by which name
+rebinding). Browsers state where a request comes from (``Sec-Fetch-Site``, ``Origin``) and by which name
 (``Host``); pages cannot forge these. Programs that are not browsers send none or any, and are let through.
 """
 
@@ -31,7 +31,7 @@ class Boundary:
     hosts : frozenset of str or None
         Names that the service answers for, in addition to addresses and loopback names; None: any name.
     loopback_only : bool
-        Refuse whatever came over a network, however the server was told to listen.
+        Refuse whatever came over a network, even if the server listens there.
     """
 
     hosts: frozenset[str] | None
@@ -51,7 +51,7 @@ class Boundary:
 
 
 def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
-    """Return why a request is not even looked at; None when it may be."""
+    """Return why a request is refused unseen; None when it may pass."""
     headers = Headers(scope=scope)
     if boundary.loopback_only and not _came_over_loopback(scope):
         return WrongHost(
@@ -64,17 +64,11 @@ def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
             "#header/Host",
             "Use its address, or add the name to MORPHID_ALLOWED_HOSTS.",
         )
-    if _from_another_site(scope, headers):
-        return CrossSiteRequest(
-            "The request comes from a web page of another site.",
-            "#header/Origin",
-            "Open the service's own page, or call the API from a program.",
-        )
-    return None
+    return CrossSiteRequest() if _from_another_site(scope, headers) else None
 
 
 def _came_over_loopback(scope: Scope) -> bool:
-    # a Unix socket has no address; a proxy on this machine that tells the client's address is seen through
+    # a Unix socket has no address; a proxy on this machine that forwards the client's address is seen through
     return all(
         end is None or end[1] is None or not end[0] or is_loopback(end[0])
         for end in (scope.get("server"), scope.get("client"))
@@ -82,25 +76,19 @@ def _came_over_loopback(scope: Scope) -> bool:
 
 
 def _answers_for(host: str, names: frozenset[str]) -> bool:
-    name = _name_of(host)
-    if name is None:
+    try:
+        parts = urlsplit(f"//{host}")
+        _ = parts.port  # must be a number
+    except ValueError:
+        return False
+    name = parts.hostname
+    if name is None or parts.username is not None or parts.path or parts.query or parts.fragment:
         return False
     try:
         ipaddress.ip_address(name)
     except ValueError:
         return name in names or is_loopback(name) or name.endswith(".localhost")
     return True  # nobody can point an address elsewhere
-
-
-def _name_of(host: str) -> str | None:
-    try:
-        parts = urlsplit(f"//{host}")
-        _ = parts.port  # must be a number
-    except ValueError:
-        return None
-    if parts.username is not None or parts.path or parts.query or parts.fragment:
-        return None
-    return parts.hostname
 
 
 def _from_another_site(scope: Scope, headers: Headers) -> bool:

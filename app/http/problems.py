@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import http
 import json
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -16,16 +18,19 @@ from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
+from starlette.types import Receive, Scope, Send
 
 from app.database_errors import DatabaseTrouble, trouble_of
 from app.documents import finite
-from app.errors import DatabaseAway, InvalidRequest, ServiceError, StorageFull
-from app.http.request_id import current_request_id
-from app.schemas.problem import Problem
+from app.errors import DatabaseAway, HttpError, InvalidRequest, ServiceError, StorageFull
+from app.observability.context import current_request_id
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import MAX_FAULTS, faults_of
 
 MEDIA_TYPE = "application/problem+json"
+PROBLEM = {"$ref": "#/components/schemas/Problem"}
+LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
+HTTP_HINTS = {404: "GET /openapi.json lists every path.", 405: "See the Allow header or /docs."}
 
 logger = logging.getLogger(__name__)
 
@@ -42,10 +47,7 @@ def problem_document(error: ServiceError, instance: str) -> dict[str, Any]:
         "request_id": current_request_id(),
         "pointer": error.pointer,
         "hint": error.hint,
-        "errors": [
-            {"code": fault.code, "detail": fault.detail, "pointer": fault.pointer, "hint": fault.hint}
-            for fault in error.faults[:MAX_FAULTS]
-        ],
+        "errors": [asdict(fault) for fault in error.faults[:MAX_FAULTS]],
         **error.members,
     }
 
@@ -59,14 +61,36 @@ def problem_response(
     return Response(body, error.status, headers=headers, media_type=MEDIA_TYPE)
 
 
+def closing_answer(error: ServiceError, path: str) -> tuple[dict[str, str], bytes]:
+    """Headers and content of a problem document after which the connection closes."""
+    content = json.dumps(problem_document(error, path)).encode()
+    length = str(len(content))
+    headers = {"Content-Type": MEDIA_TYPE, "Content-Length": length, **error.headers, "Connection": "close"}
+    return headers, content
+
+
+async def answer_early(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer before any route has seen the request; what the client still sends is dropped for `LINGER_S`."""
+    headers, content = closing_answer(error, scope["path"])
+    start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+    await send({"type": "http.response.start", "status": error.status, "headers": start})
+    await send({"type": "http.response.body", "body": content, "more_body": True})
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(LINGER_S):
+            while (message := await receive())["type"] == "http.request" and message.get("more_body"):
+                pass
+    await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
 def documented(*errors: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
     """OpenAPI responses of an operation that may fail with `errors`."""
     found: dict[int | str, dict[str, Any]] = {}
     for error in errors:
-        entry = found.setdefault(error.status, {"model": Problem, "description": ""})
-        entry["description"] = "; ".join(
-            filter(None, (entry["description"], f"`{error.code}`: {error.title}"))
-        )
+        sentence = f"`{error.code}`: {error.title}"
+        if error.status in found:
+            found[error.status]["description"] += f"; {sentence}"
+        else:
+            found[error.status] = {"description": sentence, "content": {MEDIA_TYPE: {"schema": PROBLEM}}}
     return found
 
 
@@ -81,18 +105,6 @@ def _request_faults(request: Request, error: RequestValidationError) -> list[Fau
         replace(fault, pointer=f"#{fault.pointer.removeprefix('/')}")
         for fault in faults_of(errors, places, BaseModel)
     ]
-
-
-class HttpProblem(ServiceError):
-    """What the framework itself refuses: an unknown path, a wrong method."""
-
-    def __init__(self, error: HTTPException) -> None:
-        phrase = http.HTTPStatus(error.status_code).phrase
-        hints = {404: "GET /openapi.json lists every path.", 405: "See the Allow header or /docs."}
-        super().__init__(str(error.detail), hint=hints.get(error.status_code, ""))
-        self.status = error.status_code
-        self.code = phrase.lower().replace(" ", "_").replace("-", "_")
-        self.title = phrase
 
 
 def allowed_methods(document: Mapping[str, Any], path: str) -> str:
@@ -131,7 +143,11 @@ def install_problem_handlers(app: FastAPI) -> None:
             # the router names the methods of the first route only
             headers["allow"] = allowed_methods(app.openapi(), request.url.path)
             headers.pop("Allow", None)
-        return problem_response(HttpProblem(error), request, headers)
+        phrase = http.HTTPStatus(error.status_code).phrase
+        code = phrase.lower().replace(" ", "_").replace("-", "_")
+        hint = HTTP_HINTS.get(error.status_code, "")
+        problem = HttpError(error.status_code, code, phrase, str(error.detail), hint)
+        return problem_response(problem, request, headers)
 
     @app.exception_handler(SQLAlchemyError)
     async def _database(request: Request, error: SQLAlchemyError) -> Response:

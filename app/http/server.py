@@ -13,17 +13,15 @@ import re
 import resource
 import socket
 import sys
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import h11
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.server import ServerState
 
-from app.errors import ServiceBusy, ServiceError
-from app.http.early_answer import closing_answer
+from app.errors import HttpError, ServiceBusy, ServiceError
+from app.http.problems import closing_answer
 from app.observability.logs import configure_logging
 from app.settings import Settings, doubtful_variables, settings_or_exit
 
@@ -33,60 +31,36 @@ LINGER_S = 1.0  # to read an answer that came before the end of the request
 MIN_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
 DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
 KEEP_ALIVE_S = 5
-STOP_S = 5  # for open answers when the process is told to end
-DRAIN_S = 1.0  # then: for requests that are on their way through connections that wait
+STOP_S = 5  # for open answers when the process shuts down
+DRAIN_S = 1.0  # then: for requests that are on their way through idle connections
 SPARE_FILES = 200  # for databases, brokers, uploads, logs
 
-logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class ConnectionLimits:
-    """What one connection, and all together, may take.
-
-    Attributes
-    ----------
-    connections : int
-        Connections at once.
-    header_s : float
-        From the first byte of a request (or the connection's beginning) to the end of its headers.
-    write_s : float
-        After which it is looked whether a client reads the answer that waits for it.
-    """
-
-    connections: int = 4096
-    header_s: float = 10.0
-    write_s: float = 30.0
-
-
-class HttpError(ServiceError):
-    """What is refused before there is a request that the application could answer."""
-
-    def __init__(self, status: int, code: str, title: str, hint: str) -> None:
-        super().__init__(title + ".", hint=hint)
-        self.status = status
-        self.code = code
-        self.title = title
-
-
 SLOW_HEADERS = HttpError(
-    408, "slow_headers", "The headers of the request did not arrive in time", "Send the request in one go."
+    408,
+    "slow_headers",
+    "The headers of the request did not arrive in time",
+    hint="Send the request in one go.",
 )
 LARGE_HEADERS = HttpError(
     431,
     "headers_too_large",
     "The headers of the request are too large",
-    f"Send at most {MAX_HEADER_BYTES // 1024} KiB of headers, the line with the address included.",
+    hint=f"Send at most {MAX_HEADER_BYTES // 1024} KiB of headers, the line with the address included.",
 )
 LONG_ADDRESS = HttpError(
     414,
     "address_too_long",
     "The address of the request is too long",
-    f"Send at most {MAX_HEADER_BYTES // 1024} KiB; send long data in the body.",
+    hint=f"Send at most {MAX_HEADER_BYTES // 1024} KiB; send long data in the body.",
 )
 BAD_REQUEST = HttpError(
-    400, "bad_request", "This is not an HTTP request", "Escape the URL and send a valid HTTP/1.1 request."
+    400,
+    "bad_request",
+    "This is not an HTTP request",
+    hint="Escape the URL and send a valid HTTP/1.1 request.",
 )
+
+logger = logging.getLogger(__name__)
 
 
 class BoundedConnection(h11.Connection):
@@ -117,9 +91,9 @@ def _too_large(error: HttpError) -> h11.RemoteProtocolError:
 
 
 class GuardedConfig(uvicorn.Config):
-    """Uvicorn's settings with the limits of connections."""
+    """Uvicorn's configuration with the limits that `settings` put on connections."""
 
-    def __init__(self, app: Any, limits: ConnectionLimits, **others: Any) -> None:
+    def __init__(self, app: Any, settings: Settings, **others: Any) -> None:
         super().__init__(
             app,
             http=GuardedProtocol,
@@ -131,22 +105,18 @@ class GuardedConfig(uvicorn.Config):
             reset_contextvars=True,
             **others,
         )
-        self.limits = limits
+        self.max_connections = connection_limit(settings.max_connections)
+        self.header_timeout_s = settings.header_timeout_s
+        self.write_timeout_s = settings.write_timeout_s
 
 
 class GuardedProtocol(H11Protocol):
     """One connection with time limits for headers and readers."""
 
-    def __init__(
-        self,
-        config: GuardedConfig,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> None:
-        super().__init__(config, server_state, app_state, _loop)
+    def __init__(self, config: GuardedConfig, *others: Any, **named: Any) -> None:
+        super().__init__(config, *others, **named)
         self.conn = BoundedConnection(h11.SERVER, MAX_HEADER_BYTES)
-        self.limits = config.limits
+        self.config: GuardedConfig = config
         self._header_timer: asyncio.TimerHandle | None = None
         self._write_timer: asyncio.TimerHandle | None = None
         self._linger_timer: asyncio.TimerHandle | None = None
@@ -161,11 +131,11 @@ class GuardedProtocol(H11Protocol):
         """Take a connection, or turn it away when there are too many."""
         super().connection_made(transport)
         _notice_dead_peers(transport)
-        if len(self.connections) > self.limits.connections:
+        if len(self.connections) > self.config.max_connections:
             self._refuse(ServiceBusy("There are too many connections to this service."))
             self.transport.close()  # at once: each one that lingers is one more
         else:
-            self._header_timer = self.loop.call_later(self.limits.header_s, self._headers_late)
+            self._header_timer = self.loop.call_later(self.config.header_timeout_s, self._headers_late)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
@@ -192,7 +162,7 @@ class GuardedProtocol(H11Protocol):
         if self._refused or self.transport.is_closing():
             return
         if self._header_timer is None and self._between_requests():
-            self._header_timer = self.loop.call_later(self.limits.header_s, self._headers_late)
+            self._header_timer = self.loop.call_later(self.config.header_timeout_s, self._headers_late)
         super().data_received(data)
         if self._ending and self.cycle is not None:
             self.cycle.keep_alive = False
@@ -212,8 +182,8 @@ class GuardedProtocol(H11Protocol):
         """Answer what is no request with a problem document, where an answer has not begun."""
         # called where the parser's error is handled
         status = getattr(sys.exception(), "error_status_hint", None)
-        told = (error for error in (LARGE_HEADERS, LONG_ADDRESS) if error.status == status)
-        self._refuse(next(told, BAD_REQUEST))
+        found = (error for error in (LARGE_HEADERS, LONG_ADDRESS) if error.status == status)
+        self._refuse(next(found, BAD_REQUEST))
 
     def _refuse(self, error: ServiceError) -> None:
         """Answer and hang up; a client that is still sending gets to read the answer before."""
@@ -236,16 +206,16 @@ class GuardedProtocol(H11Protocol):
 
     def on_response_complete(self) -> None:
         """End the connection soon when the client still sends a request that was answered already."""
-        unasked = self.conn.their_state is h11.SEND_BODY
+        still_sending = self.conn.their_state is h11.SEND_BODY
         super().on_response_complete()
-        if unasked and not self.transport.is_closing():
+        if still_sending and not self.transport.is_closing():
             self._linger_timer = self.loop.call_later(LINGER_S, self.transport.close)
 
     def pause_writing(self) -> None:
         """Watch a client that does not read."""
         super().pause_writing()
         self._unread = self.transport.get_write_buffer_size()
-        self._write_timer = self.loop.call_later(self.limits.write_s, self._look_at_reader)
+        self._write_timer = self.loop.call_later(self.config.write_timeout_s, self._look_at_reader)
 
     def resume_writing(self) -> None:
         """The client has read."""
@@ -254,12 +224,12 @@ class GuardedProtocol(H11Protocol):
 
     def _look_at_reader(self) -> None:
         unread = self.transport.get_write_buffer_size()
-        if self._unread - unread < MIN_READ_RATE * self.limits.write_s:
+        if self._unread - unread < MIN_READ_RATE * self.config.write_timeout_s:
             logger.info("disconnected a client that does not read its response")
             self.transport.abort()
             return
         self._unread = unread
-        self._write_timer = self.loop.call_later(self.limits.write_s, self._look_at_reader)
+        self._write_timer = self.loop.call_later(self.config.write_timeout_s, self._look_at_reader)
 
     def _cancel(self, *timers: str) -> None:
         for name in timers:
@@ -286,30 +256,19 @@ def _notice_dead_peers(transport: asyncio.Transport) -> None:
             connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
-def connection_limit(asked: int) -> int:
+def connection_limit(requested: int) -> int:
     """Let the process open as many files as it may, and bound connections by that."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    needed = asked + SPARE_FILES
-    if soft != resource.RLIM_INFINITY and soft < needed:
-        soft = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    if soft == resource.RLIM_INFINITY:
-        return asked
-    return max(1, min(asked, soft - SPARE_FILES))
-
-
-def guarded_config(app: Any, settings: Settings, **others: Any) -> GuardedConfig:
-    """Uvicorn's configuration for `app` with the limits of `settings`; `others` as in `uvicorn.Config`."""
-    limits = ConnectionLimits(
-        connections=connection_limit(settings.max_connections),
-        header_s=settings.header_timeout_s,
-        write_s=settings.write_timeout_s,
-    )
-    return GuardedConfig(app, limits, **others)
+    needed = requested + SPARE_FILES
+    if soft == resource.RLIM_INFINITY or soft >= needed:
+        return requested
+    soft = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    return max(1, min(requested, soft - SPARE_FILES))
 
 
 def _application(settings: Settings) -> Any:
-    """Build the service in a process of its own, which therefore logs in the service's way."""
+    """Build the service in a process of its own, which therefore logs in the service's format."""
     from app.main import create_app
 
     configure_logging(settings.log_format, settings.log_level)
@@ -323,9 +282,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m app.http.server", description="Serve the API.")
     parser.add_argument("--host", help="MORPHID_HOST where it is left out")
     parser.add_argument("--port", type=int, help="MORPHID_PORT where it is left out")
-    chosen = parser.parse_args(arguments)
-    settings = settings_or_exit(host=chosen.host, port=chosen.port)
-    config = guarded_config(
+    options = parser.parse_args(arguments)
+    settings = settings_or_exit(host=options.host, port=options.port)
+    config = GuardedConfig(
         # the options too decide whether keys are demanded
         partial(_application, settings),
         settings,

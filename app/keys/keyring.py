@@ -5,22 +5,21 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 
 from app.background_writer import BackgroundWriter
 from app.database import Database
 from app.keys.records import ApiKey
+from app.keys.refusal_limit import remember
 from app.keys.repository import StoredKey, find_key, note_use
 from app.keys.secret import KeyText
 
-FRESH_S = 2.0  # a revoked key opens nothing after this long, in every process
-REMEMBERED = 10_000  # keys; further ones are read for each request
+FRESH_S = 2.0  # a revoked key is refused after this long, in every process
 
 
 class Refusal(StrEnum):
-    """Why a key does not open: for the audit log, never for the caller."""
+    """Why a key is not valid: for the audit log, never for the caller."""
 
     MALFORMED = "malformed"
     UNKNOWN = "unknown"
@@ -28,24 +27,8 @@ class Refusal(StrEnum):
     REVOKED = "revoked"
 
 
-@dataclass(slots=True)
-class _Remembered:
-    stored: StoredKey
-    read_at: float
-    use_is_due: bool
-
-
 class KeyRing:
-    """The keys of the database, remembered for a moment.
-
-    Parameters
-    ----------
-    database : Database
-    background : BackgroundWriter
-        Takes the note of a key's last use, which no request waits for.
-    clock
-        Seconds that only rise.
-    """
+    """The keys of the database, remembered for a moment; their last use is written in the background."""
 
     def __init__(
         self, database: Database, background: BackgroundWriter, clock: Callable[[], float] = time.monotonic
@@ -53,7 +36,7 @@ class KeyRing:
         self._database = database
         self._background = background
         self._clock = clock
-        self._remembered: OrderedDict[str, _Remembered] = OrderedDict()
+        self._remembered: OrderedDict[str, StoredKey] = OrderedDict()
 
     def is_fresh(self, text: KeyText) -> bool:
         """Whether `check` needs no look at the database."""
@@ -61,13 +44,13 @@ class KeyRing:
         return known is not None and self._clock() - known.read_at < FRESH_S
 
     def check(self, text: KeyText) -> ApiKey | Refusal:
-        """Return whose key it is, or why it opens nothing; reads the database unless it `is_fresh`."""
+        """Return whose key it is, or why it is not valid; reads the database unless it `is_fresh`."""
         known = self._remembered.get(text.prefix)
         if known is None or self._clock() - known.read_at >= FRESH_S:
             known = self._read(text.prefix)
-        if known is None or not text.opens(known.stored.secret_sha256):
+        if known is None or not text.matches(known.secret_sha256):
             return Refusal.UNKNOWN
-        key = known.stored.key
+        key = known.key
         if key.revoked_at is not None:
             return Refusal.REVOKED
         if key.expired:
@@ -81,17 +64,14 @@ class KeyRing:
         """Read a key anew at its next use: it is known to have changed."""
         self._remembered.pop(key.prefix, None)
 
-    def _read(self, prefix: str) -> _Remembered | None:
+    def _read(self, prefix: str) -> StoredKey | None:
         read_at = self._clock()  # before the read: what is remembered is never younger than it seems
         with self._database.read() as session:
-            stored = find_key(session, prefix)
-        if stored is None:
+            known = find_key(session, prefix)
+        if known is None:
             # unknown prefixes are not remembered: guesses must not push out keys that are in use
             self._remembered.pop(prefix, None)
-            return None
-        known = _Remembered(stored, read_at, stored.use_is_due)
-        self._remembered[prefix] = known
-        self._remembered.move_to_end(prefix)
-        if len(self._remembered) > REMEMBERED:
-            self._remembered.popitem(last=False)
+        else:
+            known.read_at = read_at
+            remember(self._remembered, prefix, known)
         return known

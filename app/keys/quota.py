@@ -6,7 +6,7 @@ locked until the commit. Both make charges of one key wait for one another, and 
 
 from __future__ import annotations
 
-from sqlalchemy import ColumnElement, case, func, select, update
+from sqlalchemy import case, func, select, update
 
 from app.database import Session, current_time, insert_new
 from app.errors import QuotaExceeded
@@ -39,19 +39,13 @@ def charge(
 ) -> None:
     """Take a share of a key's quota; call it before the rows are written that use it.
 
-    Parameters
-    ----------
-    key_id
-        None where keys are off: nothing is limited then.
-    new_jobs : int
-        Their rows do the counting, and so do the rows that hold the bytes.
-    flights : int
-        As estimated; `settle` corrects it when the job has ended.
+    Rows count jobs and bytes by themselves; flights are an estimate that `settle` corrects when the job has
+    ended. Where keys are off (`key_id` is None) nothing is limited.
 
     Raises
     ------
     QuotaExceeded
-        Naming limit and use.
+        With limit and use.
     """
     if key_id is None:
         return
@@ -69,7 +63,9 @@ def charge(
     if max_bytes is not None:
         _compare("stored_bytes", max_bytes, _stored(session, key_id), size_bytes, SOON_S)
     if flights:
-        _add_flights(session, key_id, usage_day(now), flights)
+        row = insert_new(session, key_usage).values(key_id=key_id, day=usage_day(now), flights=flights)
+        raised = {"flights": key_usage.c.flights + flights}
+        session.execute(row.on_conflict_do_update(index_elements=list(key_usage.primary_key), set_=raised))
 
 
 def settle(session: Session, job: LeasedRow, _note: Note) -> None:
@@ -91,9 +87,9 @@ def usage(session: Session, key_id: str) -> Usage:
     return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
 
 
-def _compare(name: str, limit: int, used: int, asked: int, retry_after_s: int) -> None:
-    if used + asked > limit:
-        raise QuotaExceeded(name, limit=limit, used=used, asked=asked, retry_after_s=retry_after_s)
+def _compare(name: str, limit: int, used: int, needed: int, retry_after_s: int) -> None:
+    if used + needed > limit:
+        raise QuotaExceeded(name, limit=limit, used=used, asked=needed, retry_after_s=retry_after_s)
 
 
 def _jobs_in_flight(session: Session, key_id: str) -> int:
@@ -108,36 +104,13 @@ def _flights(session: Session, key_id: str, day: int) -> int:
 
 def _stored(session: Session, key_id: str) -> int:
     """Bytes of the key's jobs, uploads and models, and of the state of its jobs that have not ended."""
-    total = 0
-    for table in (jobs, trajectories, models):
-        size = select(_sum(table.c.size_bytes)).where(table.c.key_id == key_id)
-        total += int(session.scalar(size) or 0)
-    # asked for as it is now: it changes twice a second, and is gone when the job ends
-    sizes = (
-        (job_checkpoints, func.length(job_checkpoints.c.data)),
-        (job_chunks, func.length(job_chunks.c.task) + func.coalesce(func.length(job_chunks.c.outcome), 0)),
-    )
-    for state, size_bytes in sizes:
-        live = (
-            select(_sum(size_bytes))
-            .select_from(state)
-            .join(jobs, jobs.c.id == state.c.job_id)
-            .where(jobs.c.key_id == key_id, jobs.c.status.in_(IN_FLIGHT))
-        )
-        total += int(session.scalar(live) or 0)
-    return total
-
-
-def _sum(size_bytes: ColumnElement[int]) -> ColumnElement[int]:
-    return func.coalesce(func.sum(size_bytes), 0)
-
-
-def _add_flights(session: Session, key_id: str, day: int, flights: int) -> None:
-    session.execute(
-        insert_new(session, key_usage)
-        .values(key_id=key_id, day=day, flights=flights)
-        .on_conflict_do_update(
-            index_elements=[key_usage.c.key_id, key_usage.c.day],
-            set_={"flights": key_usage.c.flights + flights},
-        )
-    )
+    sizes = [
+        select(func.sum(table.c.size_bytes)).where(table.c.key_id == key_id)
+        for table in (jobs, trajectories, models)
+    ]
+    # measured now: it changes twice a second, and is gone when the job ends
+    chunk_bytes = func.length(job_chunks.c.task) + func.coalesce(func.length(job_chunks.c.outcome), 0)
+    for state, bytes_ in ((job_checkpoints, func.length(job_checkpoints.c.data)), (job_chunks, chunk_bytes)):
+        live = select(func.sum(bytes_)).select_from(state).join(jobs, jobs.c.id == state.c.job_id)
+        sizes.append(live.where(jobs.c.key_id == key_id, jobs.c.status.in_(IN_FLIGHT)))
+    return sum(int(session.scalar(size) or 0) for size in sizes)

@@ -19,7 +19,7 @@ class Scope(StrEnum):
 
 
 EVERY_SCOPE = frozenset(Scope)
-USUAL_SCOPES = EVERY_SCOPE - {Scope.METRICS}  # metrics tell of all owners: for the operator
+USUAL_SCOPES = EVERY_SCOPE - {Scope.METRICS}  # metrics cover all owners: for the operator
 
 SCOPE_MEANINGS = {
     Scope.JOBS_READ: "look at jobs, their events, results and files",

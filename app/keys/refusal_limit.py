@@ -1,8 +1,8 @@
-"""A brake on guessing: an address that keeps sending keys that do not open has to wait.
+"""A rate limit on invalid keys: an address that keeps sending them has to wait.
 
-Nobody finds 256 random bits by trying; the brake keeps broken and hostile clients from filling the database's
-time and the audit log. Addresses often stand for many people (an office, a proxy), so a key that has opened
-from an address before is never held up there.
+Nobody finds 256 random bits by trying; the limit keeps broken and hostile clients from filling the database's
+time and the audit log. Addresses often stand for many people (an office, a proxy), so a key that was valid
+from an address before is never delayed there.
 """
 
 from __future__ import annotations
@@ -13,16 +13,21 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 BURST = 10  # refusals that an address has free
 REFILL_S = 6.0  # and one more after each such time
 NOTES_BURST = 200  # refusals that are written down, from all addresses together
 NOTES_REFILL_S = 1.0
-REMEMBERED = 10_000  # addresses, and keys that opened; the longest unused are forgotten first
+REMEMBERED = 10_000  # addresses, and valid keys; the longest unused are forgotten first
+
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 
 def network_of(address: str) -> str:
-    """Name whom an address stands for: itself, or the /64 that an IPv6 host changes its address in."""
+    """The address itself, or the /64 inside which an IPv6 host may change its address."""
     try:
         parsed = ipaddress.ip_address(address)
     except ValueError:
@@ -36,22 +41,11 @@ def network_of(address: str) -> str:
 
 @dataclass(slots=True)
 class TokenBucket:
-    """So many at once, then one more after each `refill_s`.
-
-    Attributes
-    ----------
-    burst : int
-        Most that it holds; it begins full.
-    refill_s : float
-        Time for one more, s.
-    at : float
-        When it held `left`, s.
-    left : float
-    """
+    """So many at once, then one more after each `refill_s`; it begins full."""
 
     burst: int
     refill_s: float
-    at: float
+    at: float  # when it held `left`, s
     left: float = math.inf
 
     def wait_s(self, now: float) -> int:
@@ -70,45 +64,41 @@ class TokenBucket:
 
 
 class RefusalLimit:
-    """Token buckets per address; used from one thread (the event loop's).
-
-    Parameters
-    ----------
-    clock
-        Seconds that only rise.
-    """
+    """Token buckets per address; used from one thread (the event loop's)."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
-        self._opened: OrderedDict[tuple[str, str], None] = OrderedDict()
+        self._valid: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._notes = TokenBucket(NOTES_BURST, NOTES_REFILL_S, clock())
 
     def wait_s(self, address: str, prefix: str) -> int:
         """Whole seconds until this key may be tried from this address; 0: now."""
         place = network_of(address)
         bucket = self._buckets.get(place)
-        if bucket is None or (place, prefix) in self._opened:
+        if bucket is None or (place, prefix) in self._valid:
             return 0
         return bucket.wait_s(self._clock())
 
     def note_refused(self, address: str) -> bool:
-        """Count a key that did not open; False when so many were that none should be written down."""
+        """Count an invalid key; False when there were so many that this one should not be written down."""
         place, now = network_of(address), self._clock()
-        bucket = self._buckets.setdefault(place, TokenBucket(BURST, REFILL_S, now))
-        self._buckets.move_to_end(place)
-        if len(self._buckets) > REMEMBERED:
-            self._buckets.popitem(last=False)
+        bucket = self._buckets.get(place) or TokenBucket(BURST, REFILL_S, now)
+        remember(self._buckets, place, bucket)
         return bucket.take(now) and self._notes.take(now)
 
-    def note_opened(self, address: str, prefix: str) -> None:
-        """Remember a key that opened, so that others' guesses from the same address do not hold it up."""
-        pair = (network_of(address), prefix)
-        self._opened[pair] = None
-        self._opened.move_to_end(pair)
-        if len(self._opened) > REMEMBERED:
-            self._opened.popitem(last=False)
+    def note_valid(self, address: str, prefix: str) -> None:
+        """Remember a valid key, so that others' guesses from the same address do not delay it."""
+        remember(self._valid, (network_of(address), prefix), None)
 
     def forget(self, address: str, prefix: str) -> None:
-        """Hold up a key like any other again: its holder was told that it expired or was revoked."""
-        self._opened.pop((network_of(address), prefix), None)
+        """Treat a key like any other again: it has expired or was revoked."""
+        self._valid.pop((network_of(address), prefix), None)
+
+
+def remember(known: OrderedDict[Key, Value], key: Key, value: Value) -> None:
+    """Put a value into a cache of bounded size; the longest unused one gives way."""
+    known[key] = value
+    known.move_to_end(key)
+    if len(known) > REMEMBERED:
+        known.popitem(last=False)

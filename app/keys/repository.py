@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from sqlalchemy import Row, insert, or_, select, update
@@ -22,25 +23,29 @@ COLUMNS = (
     *(column for column in api_keys.c if column.name != "secret_sha256"),
     (database_time() >= api_keys.c.expires_at).label("expired"),
 )
+USE_IS_DUE = or_(
+    api_keys.c.last_used_at.is_(None), api_keys.c.last_used_at < database_time() - USE_NOTED_EVERY_S
+)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class StoredKey:
     """A key with what is needed to check it."""
 
     key: ApiKey
     secret_sha256: str
     use_is_due: bool  # the noted last use is older than `USE_NOTED_EVERY_S`
+    read_at: float = -math.inf  # when it was read, by the clock of the reader
 
 
 def _key(row: Row[*tuple[Any, ...]]) -> ApiKey:
-    known = {scope.value for scope in Scope}  # a later version may have stored scopes of its own
     return ApiKey(
         id=row.id,
         owner=row.owner,
         name=row.name,
         prefix=row.prefix,
-        scopes=frozenset(Scope(name) for name in row.scopes if name in known),
+        # a later version may have stored scopes of its own
+        scopes=frozenset(scope for scope in Scope if scope.value in row.scopes),
         quota=Quota(row.max_jobs_in_flight, row.max_flights_per_day, row.max_stored_bytes),
         created_at=moment(row.created_at),
         expires_at=optional_moment(row.expires_at),
@@ -50,44 +55,26 @@ def _key(row: Row[*tuple[Any, ...]]) -> ApiKey:
     )
 
 
-def insert_key(
-    session: Session,
-    text: KeyText,
-    *,
-    owner: str,
-    name: str,
-    scopes: Sequence[Scope],
-    quota: Quota,
-    expires_at: float | None,
-) -> ApiKey:
+def insert_key(session: Session, text: KeyText, quota: Quota, **columns: Any) -> ApiKey:
     """Store a key: its prefix, and a digest of its secret."""
     key_id = new_identifier("key")
     session.execute(
         insert(api_keys).values(
             id=key_id,
-            owner=owner,
-            name=name,
             prefix=text.prefix,
             secret_sha256=text.digest(),
-            scopes=sorted(scope.value for scope in scopes),
-            max_jobs_in_flight=quota.max_jobs_in_flight,
-            max_flights_per_day=quota.max_flights_per_day,
-            max_stored_bytes=quota.max_stored_bytes,
             created_at=database_time(),
-            expires_at=expires_at,
+            **asdict(quota),
+            **columns,
         )
     )
-    return _key(session.execute(select(*COLUMNS).where(api_keys.c.id == key_id)).one())
+    return key_by_id(session, key_id)
 
 
 def find_key(session: Session, prefix: str) -> StoredKey | None:
     """Find the key with this prefix, whatever its state."""
-    due = or_(
-        api_keys.c.last_used_at.is_(None), api_keys.c.last_used_at < database_time() - USE_NOTED_EVERY_S
-    )
-    row = session.execute(
-        select(*COLUMNS, api_keys.c.secret_sha256, due.label("use_is_due")).where(api_keys.c.prefix == prefix)
-    ).one_or_none()
+    columns = (*COLUMNS, api_keys.c.secret_sha256, USE_IS_DUE.label("use_is_due"))
+    row = session.execute(select(*columns).where(api_keys.c.prefix == prefix)).one_or_none()
     return None if row is None else StoredKey(_key(row), row.secret_sha256, bool(row.use_is_due))
 
 
@@ -123,12 +110,5 @@ def revoke_key(session: Session, name: str) -> ApiKey | None:
 
 def note_use(session: Session, key_id: str) -> None:
     """Write down that the key is in use, unless another process just did."""
-    now = database_time()
-    session.execute(
-        update(api_keys)
-        .where(
-            api_keys.c.id == key_id,
-            or_(api_keys.c.last_used_at.is_(None), api_keys.c.last_used_at < now - USE_NOTED_EVERY_S),
-        )
-        .values(last_used_at=now)
-    )
+    used = update(api_keys).where(api_keys.c.id == key_id, USE_IS_DUE)
+    session.execute(used.values(last_used_at=database_time()))

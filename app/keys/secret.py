@@ -23,18 +23,10 @@ FORM = re.compile(rf"mid_([0-9a-z]{{{PREFIX_CHARACTERS}}})_([0-9a-z]{{{SECRET_CH
 
 @dataclass(frozen=True, slots=True, repr=False)
 class KeyText:
-    """A key as its user holds it; only `prefix` may be shown or logged.
+    """A key as its user holds it; only `prefix` may be shown or logged."""
 
-    Attributes
-    ----------
-    prefix : str
-        Finds the row.
-    secret : str
-        Proves that the key is held.
-    """
-
-    prefix: str
-    secret: str
+    prefix: str  # finds the row
+    secret: str  # proves that the key is held
 
     @classmethod
     def new(cls) -> Self:
@@ -58,7 +50,7 @@ class KeyText:
         """What is stored of the secret."""
         return hashlib.sha256(self.secret.encode()).hexdigest()
 
-    def opens(self, digest: str) -> bool:
+    def matches(self, digest: str) -> bool:
         """Whether `digest` is this secret's; takes the same time wherever they differ."""
         return hmac.compare_digest(self.digest(), digest)
 

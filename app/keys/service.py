@@ -38,15 +38,9 @@ def create_key(
     quota: Quota,
     expires_at: float | None,
 ) -> NewKey:
-    """Make a key for `owner`.
+    """Make a key for `owner`; it expires at a time in s since 1970 UTC, or never.
 
-    Parameters
-    ----------
-    owner
-        Keys of one owner see the same jobs, flights and models. ``local`` is who everyone is where keys are
-        not demanded.
-    expires_at : float or None
-        Seconds since 1970 UTC.
+    Keys of one owner see the same jobs, flights and models. Without keys everyone is ``local``.
 
     Raises
     ------
@@ -60,22 +54,17 @@ def create_key(
     if not scopes:
         raise KeyRefused("a key needs at least one scope")
     text = KeyText.new()
+    named = sorted(scope.value for scope in scopes)
     key = repository.insert_key(
-        session, text, owner=owner, name=name, scopes=scopes, quota=quota, expires_at=expires_at
+        session, text, quota, owner=owner, name=name, scopes=named, expires_at=expires_at
     )
-    detail = {"prefix": key.prefix, "name": name, "scopes": sorted(key.scopes)}
+    detail = {"prefix": key.prefix, "name": name, "scopes": named}
     audit.insert_entry(session, Action.KEY_CREATE, owner=owner, target=key.id, detail=detail)
     return NewKey(key, text.text())
 
 
 def revoke_key(session: Session, name: str) -> ApiKey:
-    """Revoke a key by its id or prefix; running services refuse it within `app.keys.keyring.FRESH_S`.
-
-    Raises
-    ------
-    KeyRefused
-        There is no such key.
-    """
+    """Revoke a key by its id or prefix; running services refuse it within `app.keys.keyring.FRESH_S`."""
     key = repository.revoke_key(session, name)
     if key is None:
         raise KeyRefused(f"there is no key {name!r}")

@@ -1,4 +1,4 @@
-"""Keys of requests that are under way: whoever waits is broken off when the key opens no more.
+"""Keys of requests that are under way: a waiting request is ended when its key is no longer valid.
 
 A request is let in by its key once, and may then wait for a minute or stream for hours. One query a second
 looks at the keys of all requests under way, however many there are.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -29,7 +29,7 @@ class KeyInUse:
     Parameters
     ----------
     key : ApiKey or None
-        As it was when the request was let in; None where no keys are demanded.
+        As it was when the request was let in; None where no keys are required.
     """
 
     def __init__(self, key: ApiKey | None = None) -> None:
@@ -37,27 +37,15 @@ class KeyInUse:
         self.lost = False
         self._waits: set[asyncio.Timeout] = set()
 
-    def must_open(self) -> None:
-        """Go on only while the key opens.
-
-        Raises
-        ------
-        Unauthorized
-            It was revoked, has expired, or may do less than before.
-        """
+    def require_valid(self) -> None:
+        """Raise `Unauthorized` when the key was revoked, has expired, or may do less than before."""
         if self.lost:
             raise Unauthorized
 
     @asynccontextmanager
-    async def while_it_opens(self) -> AsyncIterator[None]:
-        """Wait for something in the block; it is broken off as soon as the key opens no more.
-
-        Raises
-        ------
-        Unauthorized
-            As `must_open` does.
-        """
-        self.must_open()
+    async def while_valid(self) -> AsyncIterator[None]:
+        """Wait for something in the block; as soon as the key is not valid, raise as `require_valid` does."""
+        self.require_valid()
         try:
             async with asyncio.timeout(None) as wait:
                 self._waits.add(wait)
@@ -66,11 +54,11 @@ class KeyInUse:
                 finally:
                     self._waits.discard(wait)
         except TimeoutError:
-            self.must_open()
+            self.require_valid()
             raise
 
-    def opens_as(self, now: ApiKey | None) -> bool:
-        """Whether the key still lets its request do all that it did."""
+    def is_valid_as(self, now: ApiKey | None) -> bool:
+        """Whether the key as it is `now` still lets its request do all that it did."""
         began = self.key
         if began is None:
             return True
@@ -79,7 +67,7 @@ class KeyInUse:
         return began.scopes <= now.scopes
 
     def lose(self) -> None:
-        """Break off whatever the request waits for."""
+        """End whatever the request waits for."""
         self.lost = True
         now = asyncio.get_running_loop().time()
         for wait in self._waits:
@@ -93,15 +81,12 @@ class KeyWatch:
     ----------
     database : Database
     on_lost : callable
-        Called with a key that opens no more, before its requests are broken off.
-    look_s : float
-        Time between two looks, s.
+        Called with a key that is no longer valid, before its requests are ended.
     """
 
-    def __init__(self, database: Database, on_lost: Callable[[ApiKey], None], look_s: float = LOOK_S) -> None:
+    def __init__(self, database: Database, on_lost: Callable[[ApiKey], None]) -> None:
         self._database = database
         self._on_lost = on_lost
-        self._look_s = look_s
         self._in_use: dict[str, set[KeyInUse]] = {}
         self._task: asyncio.Task[None] | None = None
 
@@ -126,11 +111,11 @@ class KeyWatch:
             yield in_use
         finally:
             requests.discard(in_use)
-            if not requests and self._in_use.get(key.id) is requests:
+            if not requests:
                 del self._in_use[key.id]
 
     async def look(self) -> None:
-        """Break off the requests whose keys open no more."""
+        """End the requests whose keys are no longer valid."""
         ids = list(self._in_use)
         try:
             found = await asyncio.to_thread(self._read, ids)
@@ -139,17 +124,17 @@ class KeyWatch:
             return
         for key_id in ids:
             for in_use in tuple(self._in_use.get(key_id, ())):
-                if not in_use.lost and not in_use.opens_as(found.get(key_id)):
+                if not in_use.lost and not in_use.is_valid_as(found.get(key_id)):
                     if in_use.key is not None:
                         self._on_lost(in_use.key)
                     in_use.lose()
 
     async def _run(self) -> None:
         while True:
-            await asyncio.sleep(self._look_s)
+            await asyncio.sleep(LOOK_S)
             if self._in_use:
                 await self.look()
 
-    def _read(self, ids: Sequence[str]) -> dict[str, ApiKey]:
+    def _read(self, ids: list[str]) -> dict[str, ApiKey]:
         with self._database.read() as session:
             return {key.id: key for key in keys_by_id(session, ids)}

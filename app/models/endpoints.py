@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 from fastapi import APIRouter
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
 from app.errors import InvalidRequest, ModelNotFound
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
@@ -15,13 +17,12 @@ from app.keys.records import Scope
 from app.models import repository
 from app.models.schemas import IdentifiedModel, ModelPage
 
-router = APIRouter(tags=["models"])
+router = APIRouter(tags=["models"], generate_unique_id_function=attrgetter("name"))
 
 
 @router.get(
     "/models",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="list_models",
     summary="List identified models",
     responses=documented(InvalidRequest),
 )
@@ -39,7 +40,6 @@ def list_models(
 @router.get(
     "/models/{model_id}",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="get_model",
     summary="Get an identified model",
     responses=documented(InvalidRequest, ModelNotFound),
 )
@@ -53,7 +53,6 @@ def get_model(app: ServiceDep, owner: OwnerDep, model_id: IdPath) -> IdentifiedM
 @router.delete(
     "/models/{model_id}",
     dependencies=[demands(Scope.DATA_WRITE)],
-    operation_id="delete_model",
     summary="Delete an identified model",
     status_code=204,
     responses=documented(InvalidRequest, ModelNotFound),

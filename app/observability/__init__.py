@@ -1,1 +1,1 @@
-"""What the service tells about itself: logs, metrics, traces. Shared by the API and the workers."""
+"""What the service reports about itself: logs, metrics, traces. Shared by the API and the workers."""

@@ -26,3 +26,8 @@ def bound(**facts: str | int | None) -> Iterator[dict[str, str | int]]:
 def current_facts() -> dict[str, str | int]:
     """What the lines that are logged here carry; a copy."""
     return dict(_facts.get({}))
+
+
+def current_request_id() -> str:
+    """Id of the request that is being served here; empty outside of requests."""
+    return str(_facts.get({}).get("request_id", ""))

@@ -20,18 +20,13 @@ from app.observability.tracing import current_trace_id
 
 # those of others have handlers of their own: they go through ours instead
 GATHERED = (
-    "uvicorn",
-    "uvicorn.error",
-    "uvicorn.access",
-    "celery",
-    "celery.task",
-    "celery.redirected",
-    "alembic",
+    *("uvicorn", "uvicorn.error", "uvicorn.access"),
+    *("celery", "celery.task", "celery.redirected", "alembic"),
 )
 NOISY = {
-    "uvicorn.access": logging.WARNING,  # ours tells route, owner and duration, and no query strings
+    "uvicorn.access": logging.WARNING,  # ours has route, owner and duration, and no query strings
     "celery.worker.strategy": logging.WARNING,  # "received": a message is only a hint
-    "celery.app.trace": logging.WARNING,  # "succeeded": the runner tells what became of the job
+    "celery.app.trace": logging.WARNING,  # "succeeded": the runner logs what became of the job
     "kombu": logging.WARNING,
     "httpx": logging.WARNING,
     "opentelemetry": logging.WARNING,
@@ -57,24 +52,18 @@ def printable(text: str) -> str:
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
-class FactsFilter(logging.Filter):
-    """Writes down the facts of the moment: a line may be formatted in another thread."""
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """Complete a record; every one passes."""
-        facts = current_facts()
-        facts.update(getattr(record, "facts", {}))
-        trace_id = current_trace_id()
-        if trace_id:
-            facts["trace_id"] = trace_id
-        record.facts = facts
-        return True
+def _add_facts(record: logging.LogRecord) -> bool:
+    """Complete a record with the facts of the moment: it may be formatted in another thread."""
+    facts = {**current_facts(), **getattr(record, "facts", {})}
+    if trace_id := current_trace_id():
+        facts["trace_id"] = trace_id
+    record.facts = facts
+    return True
 
 
 def _time(record: logging.LogRecord) -> str:
-    return (
-        datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    )
+    moment = datetime.fromtimestamp(record.created, UTC)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _message(record: logging.LogRecord) -> str:
@@ -109,9 +98,8 @@ class TextFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line of a record."""
-        facts = " ".join(
-            f"{name}={printable(str(value))}" for name, value in getattr(record, "facts", {}).items()
-        )
+        found = getattr(record, "facts", {})
+        facts = " ".join(f"{name}={printable(str(value))}" for name, value in found.items())
         message = "\n  ".join(printable(line) for line in _message(record).splitlines())
         line = f"{_time(record)} {record.levelname.lower():8}{record.name}: {message}"
         if facts:
@@ -124,19 +112,13 @@ class TextFormatter(logging.Formatter):
 def make_handler(kind: str, stream: IO[str] | None = None) -> logging.Handler:
     """Return a handler that writes lines of `kind` to `stream` (standard error)."""
     handler = logging.StreamHandler(stream or sys.stderr)
-    handler.addFilter(FactsFilter())
+    handler.addFilter(_add_facts)
     handler.setFormatter(JsonFormatter() if kind == "json" else TextFormatter())
     return handler
 
 
 def configure_logging(kind: str, level: str) -> None:
-    """Make this process log in one way, whichever library speaks.
-
-    Parameters
-    ----------
-    kind : "text" or "json"
-    level : least severity that is told, "INFO"
-    """
+    """Make this process log `kind` ("text" or "json") from `level` up, whichever library logs."""
     root = logging.getLogger()
     for handler in root.handlers[:]:
         root.removeHandler(handler)
@@ -147,6 +129,6 @@ def configure_logging(kind: str, level: str) -> None:
         logger.handlers.clear()
         logger.propagate = True
         logger.setLevel(logging.NOTSET)
-    for name, least in NOISY.items():
-        logging.getLogger(name).setLevel(max(least, root.level))
+    for name, minimum in NOISY.items():
+        logging.getLogger(name).setLevel(max(minimum, root.level))
     logging.captureWarnings(capture=True)

@@ -1,6 +1,6 @@
 """Latency and number of HTTP requests of this API process.
 
-Several API processes each tell their own; Prometheus adds them up by scraping each.
+Each of several API processes reports its own; Prometheus adds them up by scraping each.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Traces from the request to the worker (OpenTelemetry), where the operator asks for them.
+"""Traces from the request to the worker (OpenTelemetry), where the operator configures them.
 
-Asked for by ``MORPHID_TRACES=http://collector:4318`` or by OpenTelemetry's ``OTEL_EXPORTER_OTLP_ENDPOINT``.
+``MORPHID_TRACES=http://collector:4318`` or OpenTelemetry's own ``OTEL_EXPORTER_OTLP_ENDPOINT`` does so.
 Otherwise nothing of OpenTelemetry's SDK is imported, and its API's tracer records nothing.
 """
 
@@ -42,26 +42,30 @@ class _Tracing:
 _tracing = _Tracing()
 
 
-def asked_for(traces: str) -> bool:
-    """Whether the settings (`traces`: the one of MORPHID_TRACES) or the environment ask for traces."""
-    return bool(traces) or any(os.environ.get(name) for name in ENDPOINT_VARIABLES)
+def collector_address(traces: str) -> str:
+    """Address from the settings (`traces`: that of MORPHID_TRACES) or the environment; empty: no traces."""
+    return traces or next(filter(None, map(os.environ.get, ENDPOINT_VARIABLES)), "")
 
 
 def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
-    """Begin to trace in this process, if asked to; in a forked child, after the fork.
+    """Begin to trace in this process, if configured; in a forked child, after the fork.
 
     Parameters
     ----------
-    service : name of this kind of process, "morphid-api".
-    traces : address of an OTLP collector that takes HTTP; empty: as OpenTelemetry's own variables say.
-    exporter : takes the place of the collector, in tests.
+    service : str
+        Name of this kind of process, "morphid-api".
+    traces : str
+        Address of an OTLP collector that takes HTTP; empty: as OpenTelemetry's own variables say.
+    exporter : SpanExporter, optional
+        Takes the place of the collector, in tests.
 
     Returns
     -------
     bool
         Whether this process traces now.
     """
-    if exporter is None and not asked_for(traces):
+    address = collector_address(traces)
+    if exporter is None and not address:
         return False
     try:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
@@ -69,7 +73,7 @@ def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
         from opentelemetry.sdk.trace import TracerProvider
         from opentelemetry.sdk.trace.export import BatchSpanProcessor, SimpleSpanProcessor
     except ImportError:
-        log.warning("traces are asked for but OpenTelemetry is missing: pip install 'morphid[telemetry]'")
+        log.warning("traces are configured but OpenTelemetry is missing: pip install 'morphid[telemetry]'")
         return False
     from morphdata.version import VERSION
 
@@ -80,19 +84,18 @@ def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
     provider = TracerProvider(resource=resource, shutdown_on_exit=False)
     if exporter is None:
         endpoint = traces.rstrip("/") + TRACES_PATH if traces and TRACES_PATH not in traces else traces
-        sent_by = OTLPSpanExporter(endpoint=endpoint or None, session=_session_for(traces))
-        provider.add_span_processor(BatchSpanProcessor(sent_by))
+        own = OTLPSpanExporter(endpoint=endpoint or None, session=_session_for(address))
+        provider.add_span_processor(BatchSpanProcessor(own))
     else:
         provider.add_span_processor(SimpleSpanProcessor(exporter))
     _tracing.provider, _tracing.tracer = provider, provider.get_tracer("morphid", VERSION)
     return True
 
 
-def _session_for(traces: str) -> Any:
-    """An HTTP session that asks for no proxy, for a collector on this machine; None: the exporter's own."""
+def _session_for(address: str) -> Any:
+    """An HTTP session that uses no proxy, for a collector on this machine; None: the exporter's own."""
     from requests import Session  # which the exporter brings
 
-    address = traces or next(filter(None, map(os.environ.get, ENDPOINT_VARIABLES)), "")
     if not is_loopback(urlsplit(address).hostname or ""):
         return None
     session = Session()
@@ -121,13 +124,7 @@ def span(
     traceparent: str | None = None,
     attributes: Attributes | None = None,
 ) -> AbstractContextManager[Span]:
-    """Trace a block of work.
-
-    Parameters
-    ----------
-    traceparent : W3C context of another process's span that this one belongs to; else it belongs to the span
-        that is current here.
-    """
+    """Trace a block of work, as part of another process's span (`traceparent`) or of the current one."""
     return _tracing.tracer.start_as_current_span(
         name, context=_context_of(traceparent), kind=SpanKind[kind.upper()], attributes=dict(attributes or {})
     )

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 from html import escape
-from importlib.util import find_spec
 from pathlib import Path
 
 from fastapi import APIRouter
-from fastapi.responses import FileResponse, HTMLResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse
 from starlette.applications import Starlette
 from starlette.staticfiles import StaticFiles
 
@@ -16,10 +15,6 @@ from morphdata.operations import OPERATIONS
 
 STATIC = Path(__file__).parent / "static"
 PAGE = Path(__file__).parent / "page.html"
-PLAIN_DOCS = (
-    "<!doctype html><title>MorphID API</title><p>The interactive documentation needs the package "
-    "<code>fastapi-offline</code>. The OpenAPI document is at <a href='/openapi.json'>/openapi.json</a>."
-)
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -46,24 +41,12 @@ def _page_text() -> str:
 
 
 @router.get("/docs")
-async def docs() -> Response:
+async def docs() -> FileResponse:
     """Return the documentation page: Swagger UI from an installed package, nothing from other hosts."""
-    if swagger_folder() is None:
-        return HTMLResponse(PLAIN_DOCS)
     return FileResponse(STATIC / "docs.html", headers={"Content-Security-Policy": DOCS_POLICY})
-
-
-def swagger_folder() -> Path | None:
-    """Find the files of Swagger UI; None where their package is not installed."""
-    spec = find_spec("fastapi_offline")
-    if spec is None or spec.origin is None:
-        return None
-    return Path(spec.origin).parent / "static"
 
 
 def mount_static(app: Starlette) -> None:
     """Serve the page's files and Swagger UI's."""
-    swagger = swagger_folder()
-    if swagger is not None:
-        app.mount("/static/swagger", StaticFiles(directory=swagger), name="swagger")
+    app.mount("/static/swagger", StaticFiles(packages=[("fastapi_offline", "static")]), name="swagger")
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -1,1 +1,1 @@
-"""Webhooks: a job's end is told to an address of its owner."""
+"""Webhooks: messages to an address of the owner when a job ends."""

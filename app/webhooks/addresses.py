@@ -1,7 +1,7 @@
 """Which addresses a webhook may have: nothing inside this machine or its networks is ever connected to.
 
-A name is looked up once per try; the connection then goes to the very address that was checked, so that a
-name that changes its mind between check and use gains nothing.
+A name is looked up once per try and the connection goes to the address that was checked, so that a name whose
+address changes between check and use gains nothing.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 Resolver = Callable[[str, int], list[str]]
 
 MAX_URL = 2000
+DEFAULT_PORTS = {"https": 443, "http": 80}
 LOWEST_PORT = 1024  # below are mail, SSH and the like; of those only HTTPS's own
 LOOKUP_S = 3.0  # at creation; the sender has its own limit
 MAX_LOOKUPS = 32  # at once; a name server that does not answer must not eat the process's threads
 HOST = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,251}[A-Za-z0-9_])?\.?")
-NUMBER = re.compile(
-    r"(?:\d+|0[xX][0-9A-Fa-f]*)"
-)  # as a last label: an address in disguise, 127.1 or 0x7f000001
+# as a last label: an address in disguise, 127.1 or 0x7f000001
+NUMBER = re.compile(r"(?:\d+|0[xX][0-9A-Fa-f]*)")
 NAT64 = ipaddress.ip_network("64:ff9b::/96")
 GLOBAL_UNICAST_6 = ipaddress.ip_network("2000::/3")
 NEVER = tuple(
@@ -44,22 +44,15 @@ NEVER = tuple(
 
 
 class AddressRefused(Exception):
-    """The address is not one that webhooks are sent to; the message says why.
+    """The address is not one that webhooks are sent to; the message says why."""
 
-    Parameters
-    ----------
-    hint : str
-        What to do about it.
-    """
+    hint = "Give an https address that can be reached from the public internet."
 
-    def __init__(
-        self, sentence: str, hint: str = "Give an https address that can be reached from the public internet."
-    ) -> None:
-        super().__init__(sentence, hint)
-        self.hint = hint
 
-    def __str__(self) -> str:
-        return str(self.args[0])
+class HostNotListed(AddressRefused):
+    """The operator has listed the hosts that webhooks may go to, and this is not one of them."""
+
+    hint = "Ask the operator to name the host in MORPHID_WEBHOOK_DIAL_ONLY."
 
 
 def is_public(address: Address) -> bool:
@@ -81,7 +74,7 @@ def is_public(address: Address) -> bool:
 
 
 def look_up(host: str, port: int) -> list[str]:
-    """Every address of `host`, as the system's resolver tells them."""
+    """Every address of `host` that the system's resolver knows."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return list(dict.fromkeys(str(entry[4][0]) for entry in found))
 
@@ -89,53 +82,23 @@ def look_up(host: str, port: int) -> list[str]:
 _lookups = threading.BoundedSemaphore(MAX_LOOKUPS)
 
 
-def _in_own_thread(resolve: Resolver, host: str, port: int) -> Future[list[str]]:
-    """Look up in a daemon thread: the system's resolver cannot be told to hurry; nobody waits for it."""
-    future: Future[list[str]] = Future()
-    if not _lookups.acquire(blocking=False):
-        future.set_exception(OSError("too many names are being looked up"))
-        return future
-
-    def run() -> None:
-        found: list[str] = []
-        failure: Exception | None = None
-        try:
-            found = resolve(host, port)
-        except (OSError, UnicodeError) as error:
-            failure = OSError(str(error))
-        finally:
-            _lookups.release()
-        if not future.set_running_or_notify_cancel():
-            return  # nobody waits for it any more
-        if failure is not None:
-            future.set_exception(failure)
-        else:
-            future.set_result(found)
-
-    threading.Thread(target=run, name="webhook-lookup", daemon=True).start()
-    return future
-
-
 def destination_of(url: str) -> str:
     """Scheme, host and port of a URL that was checked: what is reached or not, whatever the path."""
     parts = urlsplit(url)
-    port = parts.port or (443 if parts.scheme == "https" else 80)
-    return f"{parts.scheme}://{(parts.hostname or '').rstrip('.')}:{port}"
+    return f"{parts.scheme}://{(parts.hostname or '').rstrip('.')}:{_port(parts)}"
+
+
+def _port(parts: SplitResult) -> int:
+    return DEFAULT_PORTS.get(parts.scheme, 0) if parts.port is None else parts.port
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """An address that may be connected to.
-
-    Attributes
-    ----------
-    addresses : tuple of str
-        Of the host, all checked.
-    """
+    """A URL whose host may be connected to."""
 
     url: str
     host: str
-    addresses: tuple[str, ...]
+    addresses: tuple[str, ...]  # of the host, all checked
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,17 +120,12 @@ class AddressPolicy:
     dial_only: frozenset[str] = frozenset()
 
     def check_url(self, url: str) -> SplitResult:
-        """Check what can be seen without a look-up.
-
-        Raises
-        ------
-        AddressRefused
-        """
+        """Check what can be seen without a look-up."""
         if len(url) > MAX_URL or not url.isascii() or re.search(r"[\x00-\x20\x7f\\]", url):
             raise AddressRefused(f"A URL has at most {MAX_URL} characters, all ASCII, without spaces.")
         try:
             parts = urlsplit(url)
-            port = parts.port
+            port = _port(parts)
         except ValueError:
             raise AddressRefused("The URL cannot be read.") from None
         host = parts.hostname or ""
@@ -178,19 +136,15 @@ class AddressPolicy:
             raise AddressRefused("The URL must not hold a user name or password.")
         if parts.fragment:
             raise AddressRefused("The URL must not have a fragment (#...).")
-        if port is not None and port < LOWEST_PORT and port != (443 if parts.scheme == "https" else 80):
+        if port < LOWEST_PORT and port != DEFAULT_PORTS[parts.scheme]:
             raise AddressRefused(f"The port must be 443, or {LOWEST_PORT} and above.")
         self._check_host(host)
-        self._check_named(host, port or (443 if parts.scheme == "https" else 80))
-        return parts
-
-    def _check_named(self, host: str, port: int) -> None:
         name = f"[{host}]" if ":" in host else host
         if self.dial_only and not self.dial_only & {name, f"{name}:{port}"}:
-            raise AddressRefused(
-                "This service sends webhooks only to certain hosts, and this is not one of them.",
-                "Ask the operator to name the host in MORPHID_WEBHOOK_DIAL_ONLY.",
+            raise HostNotListed(
+                "This service sends webhooks only to certain hosts, and this is not one of them."
             )
+        return parts
 
     def _check_host(self, host: str) -> None:
         try:
@@ -225,17 +179,12 @@ class AddressPolicy:
         return Target(parts.geturl(), (parts.hostname or "").rstrip("."), tuple(addresses))
 
     def check_now(self, url: str) -> None:
-        """Check a URL with what its name resolves to now; a name that is not known yet passes.
-
-        Raises
-        ------
-        AddressRefused
-        """
+        """Check a URL with what its name resolves to now; a name that is not known yet passes."""
         parts = self.check_url(url)
         try:
-            found = _in_own_thread(self.resolve, parts.hostname or "", parts.port or 443).result(LOOKUP_S)
+            found = self._look_up(parts).result(LOOKUP_S)
         except OSError:  # also that it took too long
-            return  # the first try will tell: see the webhook's deliveries
+            return  # the first try will show: see the webhook's deliveries
         self._checked(parts, found)
 
     async def target(self, url: str) -> Target:
@@ -244,10 +193,33 @@ class AddressPolicy:
         Raises
         ------
         AddressRefused
-            When any of its addresses is not allowed.
+            Not all of its addresses are allowed.
         OSError
-            When the name is not known.
+            The name is not known.
         """
         parts = self.check_url(url)
-        lookup = _in_own_thread(self.resolve, parts.hostname or "", parts.port or 443)
-        return self._checked(parts, await asyncio.wrap_future(lookup))
+        return self._checked(parts, await asyncio.wrap_future(self._look_up(parts)))
+
+    def _look_up(self, parts: SplitResult) -> Future[list[str]]:
+        """Look up in a daemon thread, which nobody waits for: the system's resolver has no time limit."""
+        future: Future[list[str]] = Future()
+        if not _lookups.acquire(blocking=False):
+            future.set_exception(OSError("too many names are being looked up"))
+            return future
+
+        def run() -> None:
+            try:
+                found: list[str] | OSError = self.resolve(parts.hostname or "", _port(parts))
+            except (OSError, UnicodeError) as error:
+                found = OSError(str(error))
+            finally:
+                _lookups.release()
+            if not future.set_running_or_notify_cancel():
+                return  # nobody waits for it any more
+            if isinstance(found, OSError):
+                future.set_exception(found)
+            else:
+                future.set_result(found)
+
+        threading.Thread(target=run, name="webhook-lookup", daemon=True).start()
+        return future

@@ -64,15 +64,7 @@ class Due:
 
 @dataclass(frozen=True, slots=True)
 class Dispatch:
-    """A sender's right to try one delivery until its lease runs out.
-
-    Attributes
-    ----------
-    tries : int
-        With the one that this claim is for.
-    at : float
-        Of the claim, s since 1970 UTC.
-    """
+    """A sender's right to try one delivery until its lease runs out."""
 
     id: str
     webhook_id: str
@@ -81,9 +73,9 @@ class Dispatch:
     url: str
     secret: str
     payload: Document
-    tries: int
+    tries: int  # with the one that this claim is for
     fence: int
-    at: float
+    at: float  # of the claim, s since 1970 UTC
 
     @property
     def key(self) -> tuple[str]:
@@ -93,8 +85,9 @@ class Dispatch:
     @property
     def challenge(self) -> str | None:
         """What the receiver must answer with; None where any 2xx will do."""
-        asked = self.payload["type"] == CHALLENGE_EVENT
-        return str(self.payload["data"]["challenge"]) if asked else None
+        if self.payload["type"] != CHALLENGE_EVENT:
+            return None
+        return str(self.payload["data"]["challenge"])
 
 
 def due(
@@ -106,12 +99,8 @@ def due(
 ) -> list[Due]:
     """Deliveries whose time has come, the longest waiting of each free destination.
 
-    Parameters
-    ----------
-    per_owner : int
-        At most so many of one owner: many slow receivers do not hold up the others.
-    under_way
-        Number of deliveries that are of those already, by owner.
+    There are at most `per_owner` of one owner, those `under_way` (number by owner) included: many slow
+    receivers do not hold up the others.
     """
     table, now = webhook_deliveries, clock()
     its_time = (table.c.status == WAITING, table.c.next_at <= now)
@@ -188,10 +177,7 @@ def settle(
 ) -> str | None:
     """Write what became of a try: delivered, to be tried again, or given up; and free the destination.
 
-    Returns
-    -------
-    str or None
-        The delivery's status now; None when the claim is stale, and nothing was written.
+    Returns the delivery's status now; None when the claim is stale, and nothing was written.
     """
     hooks = _locked(session, dispatch.owner, dispatch.destination)
     hook = hooks.get(dispatch.webhook_id)
@@ -271,13 +257,9 @@ def _count_failure(
     """
     failed = {tried.id}
     if answer.status is None:
-        failed |= set(
-            session.scalars(
-                select(webhook_deliveries.c.webhook_id)
-                .distinct()
-                .where(webhook_deliveries.c.webhook_id.in_(hooks), webhook_deliveries.c.status == WAITING)
-            )
-        )
+        table = webhook_deliveries.c
+        waiting = select(table.webhook_id).where(table.webhook_id.in_(hooks), table.status == WAITING)
+        failed |= set(session.scalars(waiting.distinct()))
     _set_hooks(session, failed, failures=webhooks.c.failures + 1)
     for hook in (hooks[name] for name in sorted(failed)):
         if hook.disabled_at is not None:
@@ -307,14 +289,9 @@ def _set_hooks(session: Session, ids: Iterable[str], **values: object) -> None:
 
 def lock_waiting(session: Session, webhook_id: str) -> list[str]:
     """Ids of a webhook's waiting deliveries, locked in the order in which senders claim."""
-    return list(
-        session.scalars(
-            select(webhook_deliveries.c.id)
-            .where(webhook_deliveries.c.webhook_id == webhook_id, webhook_deliveries.c.status == WAITING)
-            .order_by(webhook_deliveries.c.id)
-            .with_for_update()
-        )
-    )
+    table = webhook_deliveries.c
+    waiting = select(table.id).where(table.webhook_id == webhook_id, table.status == WAITING)
+    return list(session.scalars(waiting.order_by(table.id).with_for_update()))
 
 
 def _give_up(session: Session, which: ColumnElement[bool], error: str, clock: Clock) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.errors import (
     BodyTooLarge,
     InvalidRequest,
@@ -104,7 +104,7 @@ def delete_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) ->
 def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> Webhook:
     """Challenge the receiver of a disabled or pending webhook anew; with its answer the webhook is enabled.
 
-    Jobs that ended meanwhile are not told: list them.
+    Jobs that ended meanwhile are not reported: list them.
     """
     with app.database.write() as session:
         enabled = service.enable(session, caller.owner, webhook_id)

@@ -23,11 +23,12 @@ GIVEN_UP = "given_up"
 TEST_EVENT = "webhook.test"
 CHALLENGE_EVENT = "webhook.challenge"
 CHALLENGE_BYTES = 24
+ERROR_MEMBERS = ("code", "detail", "hint")
 MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
 
 
 def note_end(session: Session, row: LeasedRow, _note: Note) -> None:
-    """Write one delivery for each of the owner's webhooks that wants to know how the job ended."""
+    """Write one delivery for each of the owner's webhooks that has subscribed to this end of a job."""
     event = f"job.{row.status}"
     # key share: a webhook that is being deleted at this moment must not take the job's end down with it
     hooks = session.execute(
@@ -65,17 +66,14 @@ def new_delivery(webhook_id: str, event: str, payload: Document, *, job_id: str 
     }
 
 
-def note_test(session: Session, webhook_id: str) -> str:
-    """Write a test delivery and return its id."""
-    return _note(session, webhook_id, TEST_EVENT, {})
-
-
 def note_challenge(session: Session, webhook_id: str) -> str:
     """Write a delivery that the receiver must answer before it is sent anything else; return its id."""
-    return _note(session, webhook_id, CHALLENGE_EVENT, {"challenge": secrets.token_urlsafe(CHALLENGE_BYTES)})
+    challenge = secrets.token_urlsafe(CHALLENGE_BYTES)
+    return note_message(session, webhook_id, CHALLENGE_EVENT, challenge=challenge)
 
 
-def _note(session: Session, webhook_id: str, event: str, data: Document) -> str:
+def note_message(session: Session, webhook_id: str, event: str, **data: str) -> str:
+    """Write a delivery that is about the webhook itself, and return its id."""
     at = moment(current_time(session))
     payload = {"type": event, "timestamp": at.isoformat(), "data": {"webhook_id": webhook_id, **data}}
     values = new_delivery(webhook_id, event, payload)
@@ -95,6 +93,7 @@ def forget_ended(session: Session, older_than_s: float) -> int:
 
 def _ended(session: Session, event: str, row: LeasedRow) -> Document:
     at = f"/jobs/{row.id}"
+    error = row.error and {name: str(row.error.get(name, ""))[:MAX_DETAIL] for name in ERROR_MEMBERS}
     return {
         "type": event,
         "timestamp": moment(row.finished_at).isoformat(),
@@ -102,15 +101,8 @@ def _ended(session: Session, event: str, row: LeasedRow) -> Document:
             "id": row.id,
             "operation": row.operation,
             "status": row.status,
-            "error": _small(row.error),
+            "error": error or None,
             "model_id": session.scalar(select(models.c.id).where(models.c.job_id == row.id)),
             "links": {"self": at, "result": f"{at}/result", "artifacts": f"{at}/artifacts"},
         },
     }
-
-
-def _small(error: Document | None) -> Document | None:
-    """Give code, sentence and hint of a job's error."""
-    if error is None:
-        return None
-    return {name: str(error.get(name, ""))[:MAX_DETAIL] for name in ("code", "detail", "hint")}

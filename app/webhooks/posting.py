@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import ssl
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 from app.webhooks.addresses import AddressPolicy, AddressRefused, Target
 from app.webhooks.retries import parse_retry_after
@@ -36,21 +37,11 @@ class Timeouts:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of one try.
+    """What came of one try."""
 
-    Attributes
-    ----------
-    status : int or None
-        HTTP status; None when there was no answer.
-    error : str or None
-        Why the try failed, in one short sentence that holds nothing of what the receiver said.
-    retry_after_s : float or None
-        What the receiver asked for.
-    """
-
-    status: int | None
-    error: str | None = None
-    retry_after_s: float | None = None
+    status: int | None  # of HTTP; None when there was no answer
+    error: str | None = None  # why the try failed, in a sentence that holds nothing of what the receiver said
+    retry_after_s: float | None = None  # as the receiver requested
 
     @property
     def delivered(self) -> bool:
@@ -63,108 +54,67 @@ class Answer:
         return self.status == GONE
 
 
+NO_ANSWER = Answer(None, "No address was tried.")
+
+
 @dataclass(slots=True)
 class _Heard:
     """What a receiver has said so far."""
 
-    answer: Answer | None = None
+    answer: Answer = NO_ANSWER
     content: bytearray = field(default_factory=bytearray)
 
 
+@dataclass(frozen=True)
 class Poster:
-    """Posts messages; an asynchronous context that owns its client.
+    """Posts messages to addresses that `policy` allows.
 
-    Parameters
-    ----------
-    policy : AddressPolicy
-        Which addresses may be connected to.
-    trust : ssl.SSLContext, optional
-        Whom to believe; the usual authorities when None.
+    Certificates are checked against `trust`, by default the usual authorities.
     """
 
-    def __init__(
-        self, policy: AddressPolicy, trust: ssl.SSLContext | None = None, timeouts: Timeouts | None = None
-    ) -> None:
-        self._policy = policy
-        self._trust = trust
-        self._timeouts = timeouts or Timeouts()
-        self._client: httpx.AsyncClient | None = None
+    policy: AddressPolicy
+    trust: ssl.SSLContext | None = None
+    timeouts: Timeouts = field(default_factory=Timeouts)
 
-    async def __aenter__(self) -> Self:
-        return self
+    @cached_property
+    def _trust(self) -> ssl.SSLContext:
+        import httpx  # lazy, here and below: most processes have nothing to send
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._client is not None:
-            await self._client.aclose()
-            self._client = None
-
-    def _opened(self) -> httpx.AsyncClient:
-        if self._client is None:
-            import httpx  # lazy: most processes have nothing to send
-
-            # its lines would hold the receivers' addresses, with what is secret in their queries
-            logging.getLogger("httpx").setLevel(logging.WARNING)
-            self._client = httpx.AsyncClient(
-                verify=self._trust or httpx.create_ssl_context(),
-                trust_env=False,  # a proxy would connect to an address that nobody checked
-                follow_redirects=False,
-                timeout=httpx.Timeout(self._timeouts.read_s, connect=self._timeouts.connect_s),
-                # no connection outlives its message: the next one is looked up and checked anew
-                limits=httpx.Limits(max_keepalive_connections=0),
-            )
-        return self._client
+        # its lines would hold the receivers' addresses, with what is secret in their queries
+        logging.getLogger("httpx").setLevel(logging.WARNING)
+        return self.trust or httpx.create_ssl_context()
 
     async def post(
         self, url: str, headers: Mapping[str, str], body: bytes, *, challenge: str | None = None
     ) -> Answer:
         """Send one message; every failure is an answer, never an exception.
 
-        Parameters
-        ----------
-        challenge : str, optional
-            The message is taken only by a receiver that answers ``{"challenge": "..."}`` with this text.
+        A message with a `challenge` is delivered only to a receiver that answers ``{"challenge": "..."}``.
         """
         import httpx
 
         heard = _Heard()
-        failure: Exception | None = None
         try:
-            async with asyncio.timeout(self._timeouts.total_s):
-                target = await self._policy.target(url)
-                await self._to_first(target, headers, body, heard)
+            async with asyncio.timeout(self.timeouts.total_s):
+                await self._exchange(await self.policy.target(url), headers, body, heard)
         except (AddressRefused, OSError, ValueError, httpx.HTTPError, httpx.InvalidURL) as error:
-            failure = error
-        if heard.answer is None:
-            return Answer(None, "No address was tried." if failure is None else _why(failure))
-        # also of a receiver that said its status, and then dripped or broke off
+            if heard.answer is NO_ANSWER:
+                return Answer(None, _why(error))
+        # also of a receiver that sent its status, and then dripped or broke off
         if challenge is not None and heard.answer.delivered and not _echoes(heard.content, challenge):
             return replace(heard.answer, error=NOT_ECHOED)
         return heard.answer
 
-    async def _to_first(self, target: Target, headers: Mapping[str, str], body: bytes, heard: _Heard) -> None:
-        """Send to the first of the checked addresses that lets itself be connected to."""
-        import httpx
-
-        chosen = target.addresses[:MAX_ADDRESSES]
-        for position, address in enumerate(chosen):
-            try:
-                return await self._exchange(target, address, headers, body, heard)
-            except (httpx.ConnectError, httpx.ConnectTimeout):
-                if position == len(chosen) - 1:
-                    raise
-        return None
-
-    async def _exchange(
-        self, target: Target, address: str, headers: Mapping[str, str], body: bytes, heard: _Heard
-    ) -> None:
+    async def _exchange(self, target: Target, headers: Mapping[str, str], body: bytes, heard: _Heard) -> None:
+        """Send to the first of the checked addresses that accepts a connection."""
         import httpx
 
         url = httpx.URL(target.url)
-        request = self._opened().build_request(
-            "POST",
-            url.copy_with(host=address),
+        client = httpx.AsyncClient(  # for this message only: the next one is looked up and checked anew
+            verify=self._trust,
+            trust_env=False,  # a proxy would connect to an address that nobody checked
+            follow_redirects=False,
+            timeout=httpx.Timeout(self.timeouts.read_s, connect=self.timeouts.connect_s),
             headers={
                 "host": url.netloc.decode("ascii"),
                 "content-type": "application/json",
@@ -172,30 +122,37 @@ class Poster:
                 "accept-encoding": "identity",
                 **headers,
             },
-            content=body,
-            extensions={"sni_hostname": target.host},  # the certificate is the name's, not the address's
         )
-        response = await self._opened().send(request, stream=True)
-        try:
-            status = response.status_code
-            asked = parse_retry_after(response.headers.get("retry-after"), time.time())
-            error = None if 200 <= status < 300 else f"The receiver answered {status}."
-            heard.answer = Answer(status, error, asked)
-            async for piece in response.aiter_raw():
-                heard.content += piece
-                if len(heard.content) > MAX_ANSWER_BYTES:
-                    break
-        finally:
-            await response.aclose()
+        sni = {"sni_hostname": target.host}  # the certificate is the name's, not the address's
+        async with client:
+            *others, last = target.addresses[:MAX_ADDRESSES]
+            for address in others:
+                with contextlib.suppress(httpx.ConnectError, httpx.ConnectTimeout):
+                    return await _hear(client, url.copy_with(host=address), body, sni, heard)
+            return await _hear(client, url.copy_with(host=last), body, sni, heard)
+
+
+async def _hear(
+    client: httpx.AsyncClient, url: httpx.URL, body: bytes, extensions: dict[str, str], heard: _Heard
+) -> None:
+    async with client.stream("POST", url, content=body, extensions=extensions) as response:
+        status = response.status_code
+        retry_after_s = parse_retry_after(response.headers.get("retry-after"), time.time())
+        error = None if 200 <= status < 300 else f"The receiver answered {status}."
+        heard.answer = Answer(status, error, retry_after_s)
+        async for piece in response.aiter_raw():
+            heard.content += piece
+            if len(heard.content) > MAX_ANSWER_BYTES:
+                break
 
 
 def _echoes(content: bytearray, challenge: str) -> bool:
     """Whether an answer is a JSON object with the challenge in it."""
     try:
-        told = json.loads(content)
+        answer = json.loads(content)
     except (ValueError, RecursionError):
         return False
-    return isinstance(told, dict) and told.get("challenge") == challenge
+    return isinstance(answer, dict) and answer.get("challenge") == challenge
 
 
 def _why(failure: Exception) -> str:

@@ -9,13 +9,12 @@ from sqlalchemy import Column, ColumnElement, Row, delete, func, insert, select,
 from app.database import Session, database_time, insert_new
 from app.errors import WebhookNotFound
 from app.identifiers import new_identifier
-from app.jobs.records import moment, optional_moment
 from app.pages import read_page
 from app.tables import owners, webhook_deliveries, webhooks
 from app.webhooks.addresses import destination_of
 from app.webhooks.deliveries import give_up_waiting, lock_waiting
 from app.webhooks.outbox import WAITING
-from app.webhooks.schemas import Delivery, DeliveryPage, Webhook, WebhookStatus
+from app.webhooks.schemas import Delivery, DeliveryPage, Webhook
 
 REOPENED = "Replaced by a new challenge."
 
@@ -32,20 +31,11 @@ COLUMNS = (
 
 
 def _webhook(row: Row[*tuple[Any, ...]]) -> Webhook:
-    status: WebhookStatus = "pending" if row.verified_at is None else "enabled"
+    status = "pending" if row.verified_at is None else "enabled"
     if row.disabled_at is not None:
         status = "disabled"
-    return Webhook(
-        id=row.id,
-        url=row.url,
-        events=row.events,
-        status=status,
-        enabled=status == "enabled",
-        disabled_at=optional_moment(row.disabled_at),
-        disabled_reason=row.disabled_reason,
-        failures=row.failures,
-        created_at=moment(row.created_at),
-    )
+    columns = dict(row._mapping)  # noqa: SLF001 - SQLAlchemy's documented name
+    return Webhook.model_validate({**columns, "status": status, "enabled": status == "enabled"})
 
 
 def insert_webhook(session: Session, owner: str, url: str, events: list[str], secret: str) -> Webhook:
@@ -90,13 +80,7 @@ def list_webhooks(session: Session, owner: str) -> list[Webhook]:
 
 
 def get_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """Read one webhook.
-
-    Raises
-    ------
-    WebhookNotFound
-        When `owner` has no such webhook.
-    """
+    """Read one webhook, or raise `WebhookNotFound`."""
     row = session.execute(
         select(*COLUMNS).where(webhooks.c.id == webhook_id, webhooks.c.owner == owner)
     ).one_or_none()
@@ -106,30 +90,16 @@ def get_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
 
 
 def delete_webhook(session: Session, owner: str, webhook_id: str) -> None:
-    """Delete a webhook with its deliveries.
-
-    Raises
-    ------
-    WebhookNotFound
-        When `owner` has no such webhook.
-    """
-    found = session.execute(
-        select(webhooks.c.id).where(webhooks.c.id == webhook_id, webhooks.c.owner == owner).with_for_update()
-    ).one_or_none()
-    if found is None:
+    """Delete a webhook with its deliveries, or raise `WebhookNotFound`."""
+    mine = (webhooks.c.id == webhook_id, webhooks.c.owner == owner)
+    if session.scalar(select(webhooks.c.id).where(*mine).with_for_update()) is None:
         raise WebhookNotFound(webhook_id)
     lock_waiting(session, webhook_id)  # as senders do it: no two wait for each other
-    session.execute(delete(webhooks).where(webhooks.c.id == webhook_id, webhooks.c.owner == owner))
+    session.execute(delete(webhooks).where(*mine))
 
 
 def reopen_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """Forget a webhook's failures and its receiver's answer; what still waits for it is given up.
-
-    Raises
-    ------
-    WebhookNotFound
-        When `owner` has no such webhook.
-    """
+    """Forget a webhook's failures and its receiver's answer; what still waits for it is given up."""
     row = session.execute(
         update(webhooks)
         .where(webhooks.c.id == webhook_id, webhooks.c.owner == owner)
@@ -145,13 +115,7 @@ def reopen_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
 def list_deliveries(
     session: Session, owner: str, webhook_id: str, *, cursor: str | None, limit: int
 ) -> DeliveryPage:
-    """One page of a webhook's deliveries.
-
-    Raises
-    ------
-    WebhookNotFound
-        When `owner` has no such webhook.
-    """
+    """One page of a webhook's deliveries, or raise `WebhookNotFound`."""
     get_webhook(session, owner, webhook_id)
     query = select(webhook_deliveries).where(webhook_deliveries.c.webhook_id == webhook_id)
     rows, next_cursor = read_page(session, query, webhook_deliveries.c.id, cursor=cursor, limit=limit)
@@ -165,15 +129,6 @@ def get_delivery(session: Session, delivery_id: str) -> Delivery:
 
 
 def _delivery(row: Row[*tuple[Any, ...]]) -> Delivery:
-    return Delivery(
-        id=row.id,
-        type=row.type,
-        job_id=row.job_id,
-        status=row.status,
-        tries=row.attempt,
-        response_status=row.response_status,
-        error=row.error,
-        created_at=moment(row.created_at),
-        next_try_at=optional_moment(row.next_at) if row.status == WAITING else None,
-        finished_at=optional_moment(row.finished_at),
-    )
+    next_try_at = row.next_at if row.status == WAITING else None
+    columns = dict(row._mapping)  # noqa: SLF001 - SQLAlchemy's documented name
+    return Delivery.model_validate({**columns, "tries": row.attempt, "next_try_at": next_try_at})

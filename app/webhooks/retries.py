@@ -18,14 +18,9 @@ MAX_RETRY_AFTER_S = 600.0  # a receiver may ask for patience, but not for ever
 
 
 def next_delay_s(tries: int, retry_after_s: float | None, rng: Random) -> float | None:
-    """Time to the next try, s; None when there is none.
+    """Time to the next try, s, after `tries` tries (at least one); None when there is none.
 
-    Parameters
-    ----------
-    tries : int
-        How often the delivery was tried, or its destination failed in a row, at least 1.
-    retry_after_s : float or None
-        What the receiver asked for; it can only make the time longer.
+    What the receiver requested (`retry_after_s`) can only make the time longer.
     """
     if tries >= MAX_TRIES:
         return None
@@ -34,13 +29,7 @@ def next_delay_s(tries: int, retry_after_s: float | None, rng: Random) -> float 
 
 
 def parse_retry_after(value: str | None, now: float) -> float | None:
-    """Seconds that a Retry-After header asks for, as a number or as a date (RFC 9110); None if unreadable.
-
-    Parameters
-    ----------
-    now : float
-        s since 1970 UTC.
-    """
+    """Seconds that a Retry-After header requests, as a number or as a date (RFC 9110); None if unreadable."""
     if value is None:
         return None
     text = value.strip()

@@ -20,7 +20,7 @@ EVERY_EVENT: list[JobEvent] = ["job.succeeded", "job.failed", "job.cancelled", "
 
 
 class WebhookRequest(Document):
-    """Where to tell which ends of jobs."""
+    """Where to report which ends of jobs."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"url": EXAMPLE_URL, "events": ["job.succeeded", "job.failed"]}]}
@@ -41,14 +41,14 @@ class WebhookRequest(Document):
 
 
 class Webhook(BaseModel):
-    """An address that is told of ends of jobs."""
+    """An address to which ends of jobs are reported."""
 
     id: str = Field(examples=[EXAMPLE_WEBHOOK])
     url: str = Field(examples=[EXAMPLE_URL])
     events: list[JobEvent]
     status: WebhookStatus = Field(
-        description="`pending` until the receiver has answered the challenge; only `enabled` ones are told "
-        "of jobs."
+        description="`pending` until the receiver has answered the challenge; only `enabled` webhooks are "
+        "sent messages about jobs."
     )
     enabled: bool = Field(description="Whether `status` is `enabled`.")
     disabled_at: datetime | None
@@ -142,7 +142,7 @@ class Challenge(BaseModel):
 
 
 class ChallengeAnswer(BaseModel):
-    """What a receiver answers that wants the messages."""
+    """The answer of a receiver that accepts the messages."""
 
     challenge: str = Field(examples=[EXAMPLE_CHALLENGE])
 

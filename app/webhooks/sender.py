@@ -11,9 +11,11 @@ import ssl
 import threading
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from random import Random, SystemRandom
 
 from sqlalchemy.exc import SQLAlchemyError
+from standardwebhooks import Webhook
 
 from app.database import Database, database_time
 from app.documents import json_bytes
@@ -21,7 +23,6 @@ from app.webhooks import deliveries
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.deliveries import Clock, Dispatch
 from app.webhooks.posting import Answer, Poster, Timeouts
-from app.webhooks.signature import signed_headers
 
 STOP_S = 1.0  # what is under way may end; then it is given back and sent again by the next process
 
@@ -30,39 +31,40 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class SenderSettings:
-    """How a sender goes about it.
-
-    Attributes
-    ----------
-    poll_s : float
-        Time between two looks at the table, s.
-    max_at_once, max_per_owner : int
-        Deliveries under way, in all and of one owner.
-    """
+    """How a sender works."""
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
     trust: ssl.SSLContext | None = None
     timeouts: Timeouts = field(default_factory=Timeouts)
-    poll_s: float = 1.0
-    max_at_once: int = 16
-    max_per_owner: int = 4
+    poll_s: float = 1.0  # between two looks at the table
+    max_at_once: int = 16  # deliveries under way
+    max_per_owner: int = 4  # of these
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
 
 
-class WebhookSender:
-    """Sends what waits in the outbox.
+def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
+    """Headers by which the receiver knows sender, message and time (https://www.standardwebhooks.com).
 
-    Parameters
-    ----------
-    database : Database
-    settings : SenderSettings
+    The message's id is the same in every try, so that the receiver can skip what it has seen; the timestamp
+    (s since 1970 UTC) is that of the try.
     """
+    signature = Webhook(secret).sign(message_id, datetime.fromtimestamp(int(timestamp), UTC), body.decode())
+    return {
+        "webhook-id": message_id,
+        "webhook-timestamp": str(int(timestamp)),
+        "webhook-signature": signature,
+    }
+
+
+class WebhookSender:
+    """Sends what waits in the outbox."""
 
     def __init__(self, database: Database, settings: SenderSettings) -> None:
         self._database = database
         self._settings = settings
+        self._poster = Poster(settings.policy, settings.trust, settings.timeouts)
         self._under_way: dict[asyncio.Task[None], Dispatch] = {}
         self._stopping = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -71,7 +73,9 @@ class WebhookSender:
 
     def start(self) -> None:
         """Begin to send, in a thread of its own."""
-        self._thread = threading.Thread(target=self._main, name="webhook-sender", daemon=True)
+        self._thread = threading.Thread(
+            target=asyncio.run, args=(self.run(),), name="webhook-sender", daemon=True
+        )
         self._thread.start()
 
     def stop(self, patience_s: float = 2 * STOP_S + 1.0) -> None:
@@ -83,36 +87,31 @@ class WebhookSender:
         if self._thread is not None:
             self._thread.join(patience_s)
 
-    def _main(self) -> None:
-        asyncio.run(self.run())
-
     async def run(self) -> None:
         """Send until `stop` is called."""
         self._loop, self._wake = asyncio.get_running_loop(), asyncio.Event()
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
-            waiting = asyncio.create_task(self._wake.wait())
-            try:
-                while not self._stopping.is_set():
-                    await self._begin(poster)
-                    await asyncio.wait(
-                        {waiting, *self._under_way},
-                        timeout=self._settings.poll_s,
-                        return_when=asyncio.FIRST_COMPLETED,
-                    )
-            finally:
-                waiting.cancel()
-                await self._wind_down()
+        waiting = asyncio.create_task(self._wake.wait())
+        try:
+            while not self._stopping.is_set():
+                await self._begin()
+                await asyncio.wait(
+                    {waiting, *self._under_way},
+                    timeout=self._settings.poll_s,
+                    return_when=asyncio.FIRST_COMPLETED,
+                )
+        finally:
+            waiting.cancel()
+            await self._wind_down()
 
     async def send_due(self) -> int:
         """Send what is due now, once each, and return how many tries were made."""
-        async with Poster(self._settings.policy, self._settings.trust, self._settings.timeouts) as poster:
-            tries = 0
-            while begun := await self._begin(poster):
-                tries += begun
-                await asyncio.wait(set(self._under_way))
-            return tries
+        tries = 0
+        while begun := await self._begin():
+            tries += begun
+            await asyncio.wait(set(self._under_way))
+        return tries
 
-    async def _begin(self, poster: Poster) -> int:
+    async def _begin(self) -> int:
         """Claim as many deliveries as there is room for, and begin to send them."""
         room = self._settings.max_at_once - len(self._under_way)
         if room <= 0:
@@ -124,7 +123,7 @@ class WebhookSender:
             logger.warning("cannot look for webhook deliveries: %s", error)
             return 0
         for dispatch in taken:
-            task = asyncio.create_task(self._deliver(poster, dispatch))
+            task = asyncio.create_task(self._deliver(dispatch))
             self._under_way[task] = dispatch
             task.add_done_callback(self._ended)
         return len(taken)
@@ -144,11 +143,11 @@ class WebhookSender:
         with self._database.write() as session:
             return deliveries.claim(session, found, chosen.lease_s, chosen.clock)
 
-    async def _deliver(self, poster: Poster, dispatch: Dispatch) -> None:
+    async def _deliver(self, dispatch: Dispatch) -> None:
         body = json_bytes(dispatch.payload)
         headers = signed_headers(dispatch.secret, dispatch.id, dispatch.at, body)
         try:
-            answer = await poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
+            answer = await self._poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
             status = await asyncio.to_thread(self._settle, dispatch, answer)
         except SQLAlchemyError as error:
             # the claim's lease ends, and the delivery is sent again under the same id
@@ -158,13 +157,8 @@ class WebhookSender:
 
     def _settle(self, dispatch: Dispatch, answer: Answer) -> str | None:
         with self._database.write() as session:
-            return deliveries.settle(
-                session,
-                dispatch,
-                answer,
-                rng=self._settings.rng,
-                clock=self._settings.clock,
-            )
+            chosen = self._settings
+            return deliveries.settle(session, dispatch, answer, rng=chosen.rng, clock=chosen.clock)
 
     async def _wind_down(self) -> None:
         """Let what is under way end, for a moment; give the rest back."""

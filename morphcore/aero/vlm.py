@@ -48,7 +48,7 @@ class RingTable:
     edge_surface, leg_surface : (e,), (l,) surface of each edge and leg.
     panel_size_m, mean_chord_m : (s,) of each surface, to which the two laws of the core are referred.
     ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
-    panel_surface, panel_row, panel_strip : (r,) surface, row and strip (within the surface) of each panel.
+    panel_surface, panel_row : (r,) surface and row of each panel.
     panel_side : (r,) +1 on right surfaces, -1 on left ones.
     corners : number c of corners.
     """
@@ -68,7 +68,6 @@ class RingTable:
     ring_corner: IntArray
     panel_surface: IntArray
     panel_row: IntArray
-    panel_strip: IntArray
     panel_side: Array
     corners: int
 
@@ -204,7 +203,6 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
     start = np.concatenate([corners[:-1, :-1].ravel(), corners[:-1].ravel()])
     end = np.concatenate([corners[:-1, 1:].ravel(), corners[1:].ravel()])
     quarters = (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
-    row, strip = np.divmod(np.arange(rows * strips), strips)
     return {
         "edge_start": start,
         "edge_end": end,
@@ -220,7 +218,6 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
         "mean_chord_m": np.array([lattice.mean_chord_m]),
         "ring_corner": np.stack([quarter.ravel() for quarter in quarters], axis=1),
         "panel_surface": np.full(rows * strips, index),
-        "panel_row": row,
-        "panel_strip": strip,
+        "panel_row": np.repeat(np.arange(rows), strips),
         "panel_side": np.full(rows * strips, lattice.span_sign),
     }

@@ -1,11 +1,11 @@
-"""Time histories of an identification as CSV tables, and file names for its samples."""
+"""Results as CSV tables, UTF-8 text by file name: time histories of flights and schedules, a study."""
 
 from __future__ import annotations
 
 import io
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from morphdata.samplefiles.csv_table import write_table
@@ -13,10 +13,22 @@ from morphdata.samplefiles.csv_table import write_table
 Document = dict[str, Any]
 
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SWEEPS = ("sweep_left", "sweep_right")  # of samples that do not name their drives
+SWEEPS = ("sweep_left", "sweep_right")  # of documents that do not name their drives
 MODELS = ("measured", "rigid", "initial", "identified")
 LONGEST_STEM = 100  # characters: with prefix and ending a file name stays below the limits of file systems
 DEFAULT_STEM = "sample"
+CURVE_DIGITS = 9  # a nanoradian of an attitude of one radian
+SCHEDULE_DIGITS = 12  # a schedule's second differences stay right when it is flown from the file
+STUDY_COLUMNS = (
+    "links_per_wing",
+    "bodies",
+    "parameters",
+    "J_train",
+    "J_held_out",
+    "flight_s",
+    "identify_s",
+    "flights",
+)
 
 
 def file_stems(names: Iterable[str]) -> list[str]:
@@ -37,7 +49,7 @@ def file_stems(names: Iterable[str]) -> list[str]:
 
 
 def curve_tables(curves: Document) -> dict[str, bytes]:
-    """Write each sample's time histories as CSV.
+    """Write the time histories of an identification, ``curves_<sample>.csv`` for each sample.
 
     Parameters
     ----------
@@ -47,29 +59,55 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Returns
     -------
-    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, the drives, then ``<model>_<angle>_rad``. Where
-    a flight diverged its cells are empty.
+    Columns time_s, the drives, then ``<model>_<angle>_rad``. Where a flight diverged its cells are empty.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)
-    return {
-        f"curves_{stem}.csv": curve_table(sample).encode()
-        for stem, sample in zip(stems, samples, strict=True)
-    }
+    return {f"curves_{stem}.csv": curve_table(sample) for stem, sample in zip(stems, samples, strict=True)}
 
 
-def curve_table(sample: Document) -> str:
-    """One sample's time histories as CSV text; see `curve_tables`."""
-    columns: dict[str, Sequence[float | None]] = {"time_s": sample["time_s"]}
-    columns |= {name: sample[name] for name in drive_columns(sample)}
+def curve_table(sample: Document) -> bytes:
+    """Write one sample's time histories; see `curve_tables`."""
+    columns = {name: sample[name] for name in ("time_s", *drive_columns(sample))}
     columns |= {
         f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
     }
-    text = io.StringIO()
-    write_table(
-        text, columns, ([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
-    )
-    return text.getvalue()
+    return _table(columns, CURVE_DIGITS)
+
+
+def schedule_tables(curves: Document) -> dict[str, bytes]:
+    """Write the time histories of an optimisation.
+
+    Parameters
+    ----------
+    curves : ``{"time_s", "drives": [names], "schedules": {name: {"sweep_rad", "rate_rad_s",
+        "acceleration_rad_s2"}}, "flights": {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``, these
+        as departures from the start.
+
+    Returns
+    -------
+    ``schedule.csv``, the optimum with the columns of a schedule file (t and the drives that move; s, rad),
+    which the simulation flies; ``schedules.csv``, angle, rate and acceleration of all; ``departures.csv``,
+    ``<schedule>_in_<model>_<angle>`` of all flights.
+    """
+    time_s, schedules = curves["time_s"], curves["schedules"]
+    all_schedules = {
+        f"{name}_{quantity}": values
+        for name, motion in schedules.items()
+        for quantity, values in motion.items()
+    }
+    departures = {
+        f"{name}_in_{model}_{angle}": flown[angle]
+        for model, flights in curves["flights"].items()
+        for name, flown in flights.items()
+        for angle in ANGLES
+    }
+    optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
+    return {
+        "schedule.csv": _table({"t": time_s, **optimum}, SCHEDULE_DIGITS),
+        "schedules.csv": _table({"time_s": time_s, **all_schedules}, SCHEDULE_DIGITS),
+        "departures.csv": _table({"time_s": time_s, **departures}, SCHEDULE_DIGITS),
+    }
 
 
 def drive_columns(document: Document) -> list[str]:
@@ -78,6 +116,23 @@ def drive_columns(document: Document) -> list[str]:
     return [name for name in names if name in document]
 
 
-def _cell(value: float | None) -> str:
-    # nine digits: a nanoradian of an attitude of one radian
-    return "" if value is None or not math.isfinite(value) else f"{value:.9g}"
+def study_table(document: Document) -> bytes:
+    """Write a study's rows with the units of the document; what is not known is empty."""
+    rows = document["rows"]
+    recommended = (document.get("recommended") or {}).get("links_per_wing")
+    columns = {name: [row.get(name) for row in rows] for name in STUDY_COLUMNS}
+    for angle in ("phi", "theta", "psi"):
+        columns[f"rms_{angle}_rad"] = [(row.get("rms_rad") or {}).get(angle) for row in rows]
+    columns["recommended"] = ["yes" if row["links_per_wing"] == recommended else "" for row in rows]
+    return _table(columns, CURVE_DIGITS)
+
+
+def _table(columns: Mapping[str, Sequence[float | str | None]], digits: int) -> bytes:
+    def cell(value: float | str | None) -> str:
+        if value is None or isinstance(value, str):
+            return value or ""
+        return f"{value:.{digits}g}" if math.isfinite(value) else ""
+
+    text = io.StringIO()
+    write_table(text, columns, (map(cell, row) for row in zip(*columns.values(), strict=True)))
+    return text.getvalue().encode()

@@ -148,14 +148,16 @@ def headline(figure: Figure, text: str) -> None:
     figure.text(0.5, 1.0 - 0.1 / inches, text, ha="center", va="top", fontsize=10, parse_math=False)
 
 
-def legend_above(figure: Figure, handles: Sequence[Line2D]) -> None:
-    """One legend for all panels, in a row below the headline."""
+def legend_above(
+    figure: Figure, handles: Sequence[Line2D], *, columns: int = 4, below_top_in: float = 0.27
+) -> None:
+    """One legend for all panels, below the headline or, where there is none, at the very top."""
     inches = float(figure.get_figheight())
     figure.legend(
         handles=list(handles),
         loc="upper center",
-        bbox_to_anchor=(0.5, 1.0 - 0.27 / inches),
-        ncols=4,
+        bbox_to_anchor=(0.5, 1.0 - below_top_in / inches),
+        ncols=columns,
         frameon=False,
         fontsize=8.5,
         handlelength=2.6,

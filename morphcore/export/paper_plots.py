@@ -24,6 +24,7 @@ from morphcore.export.figure import (
     is_cost,
     is_silent,
     label_axis,
+    legend_above,
     light_grid,
     power_of_ten,
     printable,
@@ -31,19 +32,15 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
+from morphcore.export.plots import STYLES, angle_error
 from morphcore.frames import wrap_angle
 
 WIDTH_IN = 7.2
 LEGEND_IN, TWO_ROWS_IN = 0.38, 0.56  # left free above the panels for names in one row, in two
 FLIGHT_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, "0.35")
 DASHED = (0, (5, 2))
-TRUTH: dict[str, Any] = {"color": "0.72", "linewidth": 4.5, "solid_capstyle": "butt"}
-RIGID: dict[str, Any] = {"color": VERMILION, "linewidth": 1.4, "linestyle": DASHED}
-EQUIVALENT: dict[str, Any] = {"color": BLUE, "linewidth": 1.5}
-OTHERS: tuple[dict[str, Any], ...] = (
-    {"color": BLUE, "linewidth": 1.5},
-    {"color": ORANGE, "linewidth": 1.5, "linestyle": DASHED},
-)
+TRUTH, RIGID, EQUIVALENT = (STYLES[name] for name in ("measured", "rigid", "identified"))
+OTHERS: tuple[dict[str, Any], ...] = (EQUIVALENT, {"color": ORANGE, "linewidth": 1.5, "linestyle": DASHED})
 MRAD = 1e3  # of a radian
 LEAST_ERROR_MRAD = 1e-3  # half the height of the axis of an error that is round-off
 
@@ -74,7 +71,7 @@ def truth_figure(flights: Sequence[Document]) -> Figure:
     for axes, label in zip(rows, ("pitch θ, deg", "tip above root, m", "sweep, deg"), strict=True):
         label_axis(axes, label)
     time_axis(figure, rows, longest)
-    _legend(figure, rows[0], columns=3)
+    legend_above(figure, rows[0].get_lines(), columns=3, below_top_in=0.0)
     return figure
 
 
@@ -99,7 +96,7 @@ def verification_figure(curves: Document) -> Figure:
             ("rigid", "rigid model", RIGID),
             ("identified", "equivalent model", EQUIVALENT),
         ):
-            error = wrap_angle(series(curves[model][key]) - series(curves["measured"][key]))
+            error = angle_error(curves, model, key)
             draw(axes, time_s, np.degrees(measured[key] + error), label=name, **style)
             if model == "identified":
                 draw(errors, time_s, MRAD * error, **EQUIVALENT)
@@ -109,7 +106,7 @@ def verification_figure(curves: Document) -> Figure:
     (panel,) = drive_panels(curves)
     draw_drive(rows[-1], time_s, panel)
     time_axis(figure, rows, time_s)
-    _legend(figure, rows[0])
+    legend_above(figure, rows[0].get_lines(), below_top_in=0.0)
     return figure
 
 
@@ -209,16 +206,8 @@ def independent_figure(samples: Sequence[Document], laws: Sequence[Document]) ->
             axes.set_xlim(time_s[0], time_s[-1])
             if row == len(shown) - 1:
                 axes.set_xlabel("time, s", fontsize=9)
-    _legend(figure, figure.axes[0])
+    legend_above(figure, figure.axes[0].get_lines(), below_top_in=0.0)
     return figure
-
-
-def _legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
-    """Names at the very top: captions stand below the figure, so there is no title above them."""
-    figure.legend(
-        handles=axes.get_lines(), loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=columns,
-        frameon=False, fontsize=8.5, handlelength=2.6, columnspacing=1.4,
-    )  # fmt: skip
 
 
 def _widened(axes: Axes, least: float) -> None:

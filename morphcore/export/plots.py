@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -90,7 +89,7 @@ def attitude_figure(sample: Document) -> Figure:
     time_s = series(sample["time_s"])
     measured = {key: np.unwrap(series(sample["measured"][key])) for key, _ in ANGLES}
     flown = {
-        model: {key: measured[key] + _error(sample, model, key) for key, _ in ANGLES}
+        model: {key: measured[key] + angle_error(sample, model, key) for key, _ in ANGLES}
         for model in ("rigid", "initial", "identified")
         if sample.get(model)
     }
@@ -107,7 +106,8 @@ def attitude_figure(sample: Document) -> Figure:
             quiet(axes, SILENT_SPAN_DEG)
     for axes, panel in zip(rows[len(ANGLES) :], drives, strict=True):
         draw_drive(axes, time_s, panel)
-    _finish(figure, rows, time_s, _title(sample, "attitude"), list(flown))
+    time_axis(figure, rows, time_s)
+    _legend(figure, ["measured", *flown], _title(sample, "attitude"))
     return figure
 
 
@@ -118,7 +118,7 @@ def residual_figure(sample: Document) -> Figure:
     figure = Figure(figsize=(9.0, 6.2))
     grid = figure.add_gridspec(3, 2, hspace=0.22, wspace=0.2, left=0.085, right=0.985, top=0.85, bottom=0.085)
     for row, (key, label) in enumerate(ANGLES):
-        errors = {model: _error(sample, model, key) for model in models}
+        errors = {model: angle_error(sample, model, key) for model in models}
         for column, shown in enumerate((models, ["identified"])):
             axes = figure.add_subplot(grid[row, column])
             label_axis(axes, f"{label} error, mrad" if column == 0 else "")
@@ -143,7 +143,7 @@ def residual_figure(sample: Document) -> Figure:
 
 
 def convergence_figure(document: Document) -> Figure:
-    """Least cost J so far against flights flown (or generations, if flights are not told), logarithmic."""
+    """Least cost J so far against flights flown (or generations, if flights are not counted), logarithmic."""
     history = [row for row in document.get("search", {}).get("history", []) if is_cost(row.get("best_cost"))]
     figure = Figure(figsize=(7.2, 3.8))
     axes = figure.add_axes((0.115, 0.13, 0.865, 0.77))
@@ -191,11 +191,6 @@ def _line(model: str) -> dict[str, Any]:
     return {"label": LABELS[model], **STYLES[model]}
 
 
-def _finish(figure: Figure, rows: Sequence[Axes], time_s: Array, title: str, models: Sequence[str]) -> None:
-    time_axis(figure, rows, time_s)
-    _legend(figure, ["measured", *models], title)
-
-
 def _legend(figure: Figure, models: Sequence[str], title: str) -> None:
     headline(figure, title)
     wanted = {LABELS[model] for model in models}
@@ -211,7 +206,7 @@ def _title(sample: Document, subject: str) -> str:
 # numbers
 
 
-def _error(sample: Document, model: str, key: str) -> Array:
+def angle_error(sample: Document, model: str, key: str) -> Array:
     """Wrapped difference of a model's angle to the sample's, rad."""
     return wrap_angle(series(sample[model][key]) - series(sample["measured"][key]))
 

@@ -94,7 +94,7 @@ def schedule_figure(document: Document, curves: Document) -> Figure:
         times, np.degrees(angles), linestyle="none", marker="o", markersize=3.5, color=BLUE, clip_on=False
     )
     time_axis(figure, rows, time_s[inside])
-    headline(figure, f"morph of {_rounded(end_s)} s: schedules")
+    headline(figure, f"morph of {end_s:.3g} s: schedules")
     legend_above(figure, [_handle(name, LABELS[name]) for name in shown])
     return figure
 
@@ -118,14 +118,16 @@ def departure_figure(document: Document, curves: Document) -> Figure:
             quiet(axes, SILENT_SPAN_DEG)
     time_axis(figure, rows, time_s)
     headline(figure, f"departure from the attitude at the start, {model} model (its variation in rad²)")
-    variation = document["variation"]
-    handles = [_handle(name, LABELS[name] + _told(variation[name].get(model))) for name in flown]
+    handles = []
+    for name in flown:
+        value = document["variation"][name].get(model)
+        handles.append(_handle(name, LABELS[name] + ("" if value is None else f" ({value:.3g})")))
     legend_above(figure, handles)
     return figure
 
 
 def front_figure(document: Document) -> Figure:
-    """Variation (rad²) against duration (s): the front, what was searched beside it, the constant rates."""
+    """Variation (rad²) against duration (s): the front, the other durations searched, the constant rates."""
     front, searched = document["pareto"], document.get("searched") or document["pareto"]
     figure = Figure(figsize=(7.2, 4.0))
     axes = figure.add_axes((0.1, 0.13, 0.875, 0.76))
@@ -176,11 +178,3 @@ def _points(rows: Sequence[Document], key: str) -> list[tuple[float, float]]:
 
 def _handle(name: str, label: str) -> Line2D:
     return Line2D([], [], label=label, **STYLES[name])
-
-
-def _told(value: float | None) -> str:
-    return "" if value is None else f" ({value:.3g})"
-
-
-def _rounded(value: float) -> str:
-    return f"{value:.3g}"

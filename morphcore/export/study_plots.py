@@ -1,9 +1,7 @@
-"""A study as a picture and as a table: accuracy and cost against the number of links per wing."""
+"""A study as a picture: accuracy and cost against the number of links per wing."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from typing import Any
 
@@ -37,17 +35,6 @@ HELD_OUT = {
 }
 RIGID = {"color": VERMILION, "linewidth": 1.1, "linestyle": (0, (1, 1.4))}
 CHOSEN_COLOUR = "#FBEBC8"  # of a light band behind the recommended number of links
-COLUMNS = (
-    "links_per_wing",
-    "bodies",
-    "parameters",
-    "J_train",
-    "J_held_out",
-    "flight_s",
-    "identify_s",
-    "flights",
-)
-ANGLES = ("phi", "theta", "psi")
 
 
 def study_plots(document: Document) -> dict[str, bytes]:
@@ -87,20 +74,6 @@ def study_figure(document: Document) -> Figure:
     figure.align_ylabels([accuracy, price])
     headline(figure, _title(document))
     return figure
-
-
-def study_table(document: Document) -> bytes:
-    """Write a study's rows as CSV, UTF-8, with the units of the document; what is not known is empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*COLUMNS, *(f"rms_{angle}_rad" for angle in ANGLES), "recommended"))
-    chosen = _recommended(document)
-    for row in document["rows"]:
-        rms = row.get("rms_rad") or {}
-        values = [*(row.get(name) for name in COLUMNS), *(rms.get(angle) for angle in ANGLES)]
-        cells = ["" if value is None else f"{value:.9g}" for value in values]
-        writer.writerow((*cells, "yes" if row["links_per_wing"] == chosen else ""))
-    return text.getvalue().encode()
 
 
 # pieces

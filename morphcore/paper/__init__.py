@@ -5,12 +5,13 @@ from __future__ import annotations
 from morphcore.paper.paper import paper_runner
 from morphcore.paper.report.report import summary_document, write_report
 from morphcore.paper.settings import PaperSettings
-from morphcore.paper.stages import StageRunner, StageStep
+from morphcore.paper.stages import Progress, Stage, StageRunner
 
 __all__ = [
     "PaperSettings",
+    "Progress",
+    "Stage",
     "StageRunner",
-    "StageStep",
     "paper_runner",
     "summary_document",
     "write_report",

@@ -2,7 +2,7 @@
 
 The models take turns, flight by flight, so that a machine that slows down slows all of them; medians are
 kept. What is compared is the time that the processor spends on the flight's thread, which other programs on
-the machine hardly change; the wall's stands beside it. ``flight_steps`` of any model reports once before it
+the machine hardly change; the wall time is reported too. ``flight_steps`` of any model reports once before it
 begins to fly: what comes before is called preparation (lattice along the morph, or its first one, and trim),
 what comes after flight.
 """
@@ -31,7 +31,6 @@ from morphcore.threads import one_blas_thread, thread_count, use_threads
 
 Document = dict[str, Any]
 
-MODELS = ("rigid", "equivalent", "flexible")
 BATCH_ROUNDS = 3
 TIMES = ("prepare_s", "fly_s", "total_s", "wall_s")
 SWARM_SEED = 1
@@ -51,50 +50,28 @@ def benchmark_swarm(model: ChainModel, particles: int, seed: int = SWARM_SEED) -
     return batch.changed(stiffness_nm_rad=stiffness * factor)
 
 
-def computation_inputs(settings: PaperSettings) -> Document:
-    """What decides what is timed."""
-    effort = settings.effort
-    return {
-        "rounds": effort.timing_rounds,
-        "batch": effort.batch,
-        "flights": [each.name for each in timed_flights(settings)],
-        "lattice": settings.lattice.to_document(),
-        "elements": settings.elements,
-    }
-
-
-def timed_flights(settings: PaperSettings) -> tuple[PaperFlight, ...]:
-    """The flight of two seconds, and the paper's six where there is time."""
-    more = paper_flights() if settings.effort.all_flights_timed else ()
-    return (two_second_flight(), *more)
-
-
 def time_models(settings: PaperSettings, results: Results, _checkpoint: bytes | None) -> Work:
     """Time every model on every flight, then the equivalent one in a batch."""
     identified = parameters_from_document(results["identification"]["model"])
-    rounds, flights = settings.effort.timing_rounds, timed_flights(settings)
+    rounds = settings.effort.timing_rounds
+    flights = (two_second_flight(), *(paper_flights() if settings.effort.all_flights_timed else ()))
+    models: dict[str, ModelChoice] = {"rigid": "rigid", "equivalent": identified, "flexible": "flexible"}
     rows: list[Document] = []
     trajectory: Trajectory | None = None
     with _one_core():
         for number, each in enumerate(flights):
-            taken: dict[str, list[Document]] = {name: [] for name in MODELS}
+            taken: dict[str, list[Document]] = {name: [] for name in models}
             for turn in range(rounds + 1):  # the first turn loads and compiles, and is not counted
-                for name in MODELS:
+                for name, model in models.items():
                     share = (number + turn / (rounds + 1)) / (1 + len(flights))
                     yield Progress(share, f"{each.label}, {name} model, turn {turn} of {rounds}")
-                    times, flown = _timed(settings, each, _choice(name, identified))
+                    times, flown = _timed(settings, each, model)
                     taken[name].append(times)
                     trajectory = flown if trajectory is None else trajectory
             rows.append(_row(each, taken))
         yield Progress(len(flights) / (1 + len(flights)), "equivalent models in a batch")
         batch = _timed_batch(settings, trajectory)
     return {"flights": rows, "batch": batch, "links_per_wing": LINKS}
-
-
-def _choice(name: str, identified: ParameterBatch) -> ModelChoice:
-    if name == "equivalent":
-        return identified
-    return "rigid" if name == "rigid" else "flexible"
 
 
 def _timed(

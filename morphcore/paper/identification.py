@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
-from dataclasses import asdict
-from typing import Any, Protocol
+from collections.abc import Generator
+from typing import Any
 
 from morphcore.identify.identification import Identification
 from morphcore.identify.settings import SearchSettings
 from morphcore.identify.study import Study
+from morphcore.optimise import ScheduleOptimisation
 from morphcore.paper.scenario import LINKS, aircraft, flight
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
@@ -18,50 +18,15 @@ from morphdata.identify import EquivalentModel
 Document = dict[str, Any]
 
 
-class SearchStep(Protocol):
-    """What a step of any search tells."""
-
-    @property
-    def fraction(self) -> float:
-        """Of the whole search, 0..1."""
-        ...
-
-    @property
-    def message(self) -> str:
-        """For people."""
-        ...
-
-    @property
-    def checkpoint(self) -> bytes:
-        """Complete state."""
-        ...
-
-
-class Search(Protocol):
-    """A search of the library: steps, each with a checkpoint to go on from."""
-
-    def steps(self, checkpoint: bytes | None = None) -> Iterator[SearchStep]:
-        """One step after the other."""
-        ...
-
-
-def searched(search: Search, checkpoint: bytes | None) -> Generator[Progress, None, bytes]:
-    """Work a search off; gives the checkpoint of its last step."""
+def searched(
+    search: Identification | Study | ScheduleOptimisation, checkpoint: bytes | None
+) -> Generator[Progress, None, bytes]:
+    """Run a search to its end; returns the checkpoint of its last step."""
     last = checkpoint or b""
     for step in search.steps(checkpoint):
         last = step.checkpoint
         yield Progress(step.fraction, step.message, last)
     return last
-
-
-def study_inputs(settings: PaperSettings) -> Document:
-    """What decides the study."""
-    return {"links": list(settings.effort.links), **search_inputs(settings, settings.search)}
-
-
-def search_inputs(settings: PaperSettings, search: SearchSettings) -> Document:
-    """What decides an identification."""
-    return {"lattice": settings.lattice.to_document(), "links_per_wing": LINKS, "search": asdict(search)}
 
 
 def study_links(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:

@@ -33,16 +33,10 @@ TIP = "tip_left_z"
 SILENT_RAD = 1e-6  # an angle that stays below does not move, and has no range to compare with
 
 
-def independent_inputs(settings: PaperSettings) -> Document:
-    """What decides the comparison: the files' content."""
-    files = (
-        [] if settings.samples is None else [*settings.samples.glob("*.json"), *_flights(settings.samples)]
-    )
-    return {
-        "files": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(files)},
-        "elements": settings.elements,
-        "step_s": settings.effort.flexible_step_s,
-    }
+def sample_digests(folder: Path | None) -> dict[str, str]:
+    """The digest of every file of another program's flights, which decide the comparison."""
+    files = [] if folder is None else [*folder.glob("*.json"), *_flights(folder)]
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(files)}
 
 
 def compare_independent(settings: PaperSettings, _results: Results, _checkpoint: bytes | None) -> Work:

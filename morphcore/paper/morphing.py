@@ -1,7 +1,7 @@
 """The stages of the optimised morph (Table 3, figures 10 and 11), and what goes beyond the paper.
 
 "morph" is our search and is verified by the optimisation itself; "swarm_morph" the paper's swarm of 50;
-"free_morph" seeks the angles too; "unsettled_morph" leaves the settling window out, as the paper does;
+"free_morph" also searches the angles; "unsettled_morph" leaves the settling window out, as the paper does;
 "fastest_morph" is the quickest that moves the attitude no more than the constant rate does; "front" trades
 duration against variation. "flown_morphs" flies what these found in the flexible model. Wherever durations
 differ, attitudes are compared over the same `WINDOW_S`: a window that ended sooner for the quicker morph
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -69,23 +68,6 @@ def paper_search(settings: PaperSettings) -> ScheduleSettings:
     return ScheduleSettings(method="pso", seed=settings.seed, swarm=swarm)
 
 
-def morph_inputs(settings: PaperSettings, morph: Morph, search: Search) -> Document:
-    """What decides an optimisation, beside the model."""
-    return {
-        "morph": morph.model_dump(),
-        "limits": LIMITS.model_dump(),
-        "search": asdict(search(settings)),
-        "lattice": settings.lattice.to_document(),
-        "elements": settings.elements,
-    }
-
-
-def front_inputs(settings: PaperSettings) -> Document:
-    """What decides the front."""
-    durations = list(settings.effort.front_durations_s)
-    return morph_inputs(settings, MORPH, our_search) | {"durations_s": durations}
-
-
 def optimise_morph(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
     """Our search, its optimum, the rigid model's and the constant rate all flown in the flexible model."""
     run = _optimisation(settings, results, MORPH, our_search(settings), verify=True)
@@ -136,7 +118,7 @@ def search_front(settings: PaperSettings, results: Results, checkpoint: bytes | 
 
 
 def fly_morphs(settings: PaperSettings, results: Results, _checkpoint: bytes | None) -> Work:
-    """Every schedule that was found beside the main one, flown in the flexible model over the window."""
+    """Every schedule of the other searches, flown in the flexible model over the window."""
     waiting = _found_schedules(results)
     used = Resolution("flexible", settings.elements, settings.effort.flexible_step_s, settings.lattice)
     rows: list[Document] = []
@@ -192,7 +174,7 @@ def _checked(schedule: Spline) -> Document:
 
 
 def _found_schedules(results: Results) -> list[tuple[str, float, Document]]:
-    """Name, duration and schedule of what the searches beside the main one found."""
+    """Name, duration and schedule of what the other searches found."""
     found = [
         (name, float(results[name]["duration_s"]), results[name]["schedules"]["optimum"])
         for name in OTHER_SEARCHES

@@ -14,7 +14,8 @@ from morphcore.threads import thread_count
 Document = dict[str, Any]
 
 PACKAGES = ("numpy", "scipy", "numba", "pyswarms", "matplotlib")
-PRESENTATION = ("export", "paper/report")  # rooms that show figures and do not change them
+PACKAGES_OF_OURS = ("morphcore", "morphdata")
+PRESENTATION = ("morphcore/export", "morphcore/paper/report")  # shows figures and does not change them
 UNKNOWN = "unknown"
 
 
@@ -38,11 +39,11 @@ def machine() -> Document:
 
 
 def code_digest() -> str:
-    """A digest of the library's source, but for the rooms that only show: other code, other figures."""
-    library = Path(__file__).resolve().parent.parent
+    """A digest of the source that decides the figures: library and documents without what only shows them."""
+    root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
-    for path in sorted(library.rglob("*.py")):
-        name = path.relative_to(library).as_posix()
+    for path in sorted(path for package in PACKAGES_OF_OURS for path in (root / package).rglob("*.py")):
+        name = path.relative_to(root).as_posix()
         if not name.startswith(PRESENTATION):
             digest.update(f"{name}\n".encode())
             digest.update(path.read_bytes())
@@ -61,7 +62,6 @@ def processor_name() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
-        return platform.processor() or "unknown"
-    return next(
-        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "unknown"
-    )
+        return platform.processor() or UNKNOWN
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, UNKNOWN)

@@ -29,7 +29,6 @@ PAPER_OPTIMUM = -4.23  # attitude variation of the optimised morph against const
 PAPER_RIGID_OPTIMUM = 4.12  # of the morph optimised with the rigid model
 
 LINKS = 3  # a wing, of the equivalent model whose flights are shown
-SWARM_PARTICLES = 2500  # of the paper's identification
 
 # how each sample flight begins and ends: held, and rates ramped, as the independent program's flights
 HELD_BEFORE_S = 0.2
@@ -100,10 +99,6 @@ class PaperFlight:
         """What both hinges do."""
         return Schedules.parse({"both": self.schedule})
 
-    def to_document(self) -> Document:
-        """JSON form."""
-        return dict(vars(self))
-
 
 def aircraft() -> Aircraft:
     """The aircraft."""
@@ -119,7 +114,8 @@ def paper_flights() -> tuple[PaperFlight, ...]:
     """Three flights to identify on, then three to check with: between, beyond, and of another shape."""
     fitted = [_constant_rate(rate, "train") for rate in (0.2, 0.5, 0.8)]
     checks = [_constant_rate(rate, "held_out") for rate in (0.4, 1.0)]
-    return (*fitted, *checks, _quadratic())
+    quadratic = {"kind": "quadratic", "duration_s": MORPH_S}
+    return (*fitted, *checks, _held("quadratic", "quadratic, 1 rad in 2 s", "held_out", quadratic))
 
 
 def two_second_flight() -> PaperFlight:
@@ -129,24 +125,11 @@ def two_second_flight() -> PaperFlight:
 
 
 def _constant_rate(rate_rad_s: float, role: Role) -> PaperFlight:
-    duration_s = FINAL_RAD / rate_rad_s
-    schedule = {
-        "kind": "constant_rate",
-        "final_rad": FINAL_RAD,
-        "duration_s": duration_s,
-        "start_s": HELD_BEFORE_S,
-        "ramp_s": RAMP_S,
-    }
-    total_s = HELD_BEFORE_S + duration_s + HELD_AFTER_S
-    return PaperFlight(f"rate_{rate_rad_s}", f"{rate_rad_s} rad/s", role, schedule, total_s)
+    morph = {"kind": "constant_rate", "duration_s": FINAL_RAD / rate_rad_s, "ramp_s": RAMP_S}
+    return _held(f"rate_{rate_rad_s}", f"{rate_rad_s} rad/s", role, morph)
 
 
-def _quadratic() -> PaperFlight:
-    schedule = {
-        "kind": "quadratic",
-        "final_rad": FINAL_RAD,
-        "duration_s": MORPH_S,
-        "start_s": HELD_BEFORE_S,
-    }
-    total_s = HELD_BEFORE_S + MORPH_S + HELD_AFTER_S
-    return PaperFlight("quadratic", "quadratic, 1 rad in 2 s", "held_out", schedule, total_s)
+def _held(name: str, label: str, role: Role, morph: Document) -> PaperFlight:
+    """A flight that holds its shape before and after its morph."""
+    schedule = {"final_rad": FINAL_RAD, "start_s": HELD_BEFORE_S, **morph}
+    return PaperFlight(name, label, role, schedule, HELD_BEFORE_S + morph["duration_s"] + HELD_AFTER_S)

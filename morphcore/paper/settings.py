@@ -21,7 +21,7 @@ class Effort:
     timing_rounds : repetitions of every timed flight. all_flights_timed : not only that of two seconds.
     batch : parameter sets that fly together. finer_lattice : whether the truth's convergence in the lattice
     is shown. schedule_generations : of the paper's swarm of schedules. front_durations_s : of morphs on the
-    Pareto front. free_values : whether the angles at the knots are sought too.
+    Pareto front. free_values : whether the angles at the knots are free too.
     """
 
     flexible_step_s: float

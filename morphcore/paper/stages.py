@@ -11,7 +11,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -77,8 +77,8 @@ class Stage:
 class Finished:
     """A stage's result and how it came about.
 
-    wall_s : time spent on it, in all runs that it took. finished_at : UTC. where : as the runner was told, on
-    what machine. reused : whether it was there already.
+    wall_s : time spent on it, in all runs that it took. finished_at : UTC. where : the machine, as the runner
+    got it. reused : whether it was there already.
     """
 
     key: str
@@ -87,16 +87,6 @@ class Finished:
     finished_at: str
     where: Document
     reused: bool = False
-
-
-@dataclass(frozen=True)
-class StageStep:
-    """What one step of the runner leaves; ``fraction`` is of all stages, by their expected times."""
-
-    stage: str
-    title: str
-    fraction: float
-    message: str
 
 
 class StageRunner:
@@ -139,8 +129,11 @@ class StageRunner:
         """The key of a stage."""
         return self._keys[name]
 
-    def steps(self) -> Generator[StageStep]:
-        """Do what is not done yet. A step that is interrupted leaves its last checkpoint behind."""
+    def steps(self) -> Generator[tuple[Stage, Progress]]:
+        """Do what is not done yet; yields the stage at work, and the progress of all by their expected times.
+
+        A step that is interrupted leaves its last checkpoint behind.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
         total = sum(stage.expected_s for stage in self.stages)
         before = 0.0
@@ -149,12 +142,12 @@ class StageRunner:
             if known is None:
                 for progress in self._work(stage):
                     share = (before + progress.fraction * stage.expected_s) / total
-                    yield StageStep(stage.name, stage.title, share, progress.message)
+                    yield stage, Progress(share, progress.message)
             else:
                 self.finished[stage.name] = known
             before += stage.expected_s
             how = "done" if known is None else "was there"
-            yield StageStep(stage.name, stage.title, before / total, how)
+            yield stage, Progress(before / total, how)
 
     # one stage
 
@@ -167,12 +160,12 @@ class StageRunner:
         work = stage.run(needed, state)
         result: Document | None = None
         try:
-            while result is None:
+            while True:
                 try:
                     progress = next(work)
                 except StopIteration as end:
                     result = end.value
-                    continue
+                    break
                 state = state if progress.checkpoint is None else progress.checkpoint
                 if state is not None and self._clock() - last_kept >= CHECKPOINT_EVERY_S:
                     place.write(state, spent_s + self._clock() - begin)
@@ -181,18 +174,17 @@ class StageRunner:
         finally:
             if result is None and state is not None:  # interrupted
                 place.write(state, spent_s + self._clock() - begin)
-        done = Finished(
-            key=key,
-            result=result or {},
-            wall_s=spent_s + self._clock() - begin,
-            finished_at=datetime.now(UTC).isoformat(timespec="seconds"),
-            where=self._where,
-        )
-        self._store(stage, done)
+        wall_s, finished_at = spent_s + self._clock() - begin, datetime.now(UTC).isoformat(timespec="seconds")
+        done = Finished(key, result or {}, wall_s, finished_at, self._where)
+        document = {"stage": stage.name, "title": stage.title, "inputs": stage.inputs, **vars(done)}
+        _replace(self._file(stage), json.dumps(document, indent=1, allow_nan=False).encode())
         self.finished[stage.name] = done
-        place.remove()
+        place.path.unlink(missing_ok=True)
 
     # files
+
+    def _file(self, stage: Stage) -> Path:
+        return self.folder / f"{stage.name}.json"
 
     def _key(self, stage: Stage) -> str:
         missing = [name for name in stage.needs if name not in self._keys]
@@ -201,67 +193,42 @@ class StageRunner:
                 f"the stage {stage.name} needs {', '.join(missing)}, which does not come before it",
                 hint="put the stages in order",
             )
-        told = {
+        inputs = {
             "format": FORMAT,
             "stage": stage.name,
             "inputs": stage.inputs,
             "needs": {name: self._keys[name] for name in stage.needs},
         }
-        return hashlib.sha256(json.dumps(told, sort_keys=True, allow_nan=False).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(inputs, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
     def _load(self, stage: Stage) -> Finished | None:
         try:
-            stored = json.loads((self.folder / f"{stage.name}.json").read_text(encoding="utf-8"))
-            known = Finished(
-                key=stored["key"],
-                result=stored["result"],
-                wall_s=float(stored["wall_s"]),
-                finished_at=stored["finished_at"],
-                where=stored["where"],
-                reused=True,
-            )
+            stored = json.loads(self._file(stage).read_text(encoding="utf-8")) | {"reused": True}
+            known = Finished(**{each.name: stored[each.name] for each in fields(Finished)})
         except (OSError, ValueError, KeyError, TypeError):
             return None  # not there, or damaged: made anew
         return known if known.key == self.key(stage.name) else None
 
-    def _store(self, stage: Stage, done: Finished) -> None:
-        document = {
-            "stage": stage.name,
-            "title": stage.title,
-            "key": done.key,
-            "inputs": stage.inputs,
-            "wall_s": done.wall_s,
-            "finished_at": done.finished_at,
-            "where": done.where,
-            "result": done.result,
-        }
-        text = json.dumps(document, indent=1, allow_nan=False)
-        _replace(self.folder / f"{stage.name}.json", text.encode())
 
-
+@dataclass(frozen=True)
 class _Checkpoint:
     """The file of an unfinished stage: its key, the seconds spent so far, and the state."""
 
-    def __init__(self, path: Path, key: str) -> None:
-        self._path = path
-        self._key = key
+    path: Path
+    key: str
 
     def read(self) -> tuple[bytes | None, float]:
         """The state and the seconds spent on it; (None, 0) where there is none for this key."""
         try:
-            key, spent, state = self._path.read_bytes().split(b"\n", 2)
+            key, spent, state = self.path.read_bytes().split(b"\n", 2)
             spent_s = float(spent)
         except (OSError, ValueError):
             return None, 0.0
-        return (state, spent_s) if key.decode("ascii", "replace") == self._key else (None, 0.0)
+        return (state, spent_s) if key.decode("ascii", "replace") == self.key else (None, 0.0)
 
     def write(self, state: bytes, spent_s: float) -> None:
         """Keep a state."""
-        _replace(self._path, b"%s\n%r\n%s" % (self._key.encode(), spent_s, state))
-
-    def remove(self) -> None:
-        """Forget it: the stage is done."""
-        self._path.unlink(missing_ok=True)
+        _replace(self.path, b"%s\n%r\n%s" % (self.key.encode(), spent_s, state))
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -52,14 +52,6 @@ def resolutions(settings: PaperSettings) -> tuple[Resolution, ...]:
     return (used, *finer)
 
 
-def truth_inputs(settings: PaperSettings) -> Document:
-    """What decides the truth."""
-    return {
-        "flights": [each.to_document() for each in paper_flights()],
-        "resolutions": [each.to_document() for each in resolutions(settings)],
-    }
-
-
 def fly_truth(settings: PaperSettings, _results: Results, _checkpoint: bytes | None) -> Work:
     """Fly all six, then one of them at finer resolutions."""
     used, *finer = resolutions(settings)

@@ -1,7 +1,7 @@
 """Covariance matrix adaptation (CMA-ES, Hansen & Ostermeier 2001) by the package cma, resumable to the bit.
 
-The strategy's own state is spread over many objects. Ours is what it was told: the costs of all generations.
-Asked and told the same again it goes through the same states, which takes about a millisecond a generation
+The strategy's own state is spread over many objects. Ours is what it received: the costs of all generations.
+Given the same again it goes through the same states, which takes about a millisecond a generation
 and no flights. Its normal numbers come from a generator of its own, and numpy's global one is put back after
 each call.
 """
@@ -73,7 +73,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
     def __init__(self, problem: Problem[Any], settings: EvolutionSettings, seed: int) -> None:
         self._box = problem.box
         self._settings, self._seed = settings, seed
-        # the package's strategy as it was last used: what it was told, and the generation that it asks for
+        # the package's strategy as it was last used: what it received, and the generation that it asks for
         self._strategy: Any = None
         self._told = EvolutionState(np.empty(0), np.empty((0, 0)))
         self._asked: Array | None = None
@@ -111,7 +111,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
         return {"mean_cost": float(outcome.cost.mean())}
 
     def _go_to(self, state: EvolutionState) -> None:
-        """Tell the strategy what it has not been told yet; begin again where it was told something else."""
+        """Give the strategy the costs that it has not received yet; begin again where it received others."""
         known = self._told.generation
         if (
             self._strategy is None

@@ -1,4 +1,4 @@
-"""What every search method is: a value that asks for batches of points and is told what they cost.
+"""What every search method is: a value that asks for batches of points and receives their costs.
 
 A solver holds settings only. All that a search knows lies in its state, a plain value: dataclasses marked
 `stored`, tuples, dictionaries, arrays, numbers and texts. So whoever reads the state can go on with it, in
@@ -118,7 +118,7 @@ class Solver(ABC, Generic[State, Result]):
     def best(self, state: State, outcome: Result) -> tuple[Array, float]:
         """Return the best point (d,) that the last outcome led to, and its cost; infinite where to none.
 
-        ``state`` : after that outcome was told.
+        ``state`` : after that outcome.
         """
         del state
         least = int(np.argmin(outcome.cost))

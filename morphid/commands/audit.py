@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from morphid.commands import options
-from morphid.screen import print_json, reports_errors, stdout
+from morphid.database import service_database
+from morphid.screen import new_table, print_json, reports_errors, stdout
 
 audit = typer.Typer(help="Look at the audit log.", no_args_is_help=True, epilog=options.EXIT_CODES)
+
+COLUMNS = ("at UTC", "action", "outcome", "owner", "target", "address")
 
 
 @audit.command("ls")
@@ -24,10 +29,15 @@ def list_entries(
     as_json: options.AsJson = False,
 ) -> None:
     """List the newest deeds: jobs posted, cancelled and deleted, keys made and refused."""
-    from morphid import audit as work
+    from app.audit import repository
 
-    found = work.listed(data_dir, owner=owner, action=action, limit=limit)
+    with service_database(data_dir) as database, database.read() as session:
+        found = repository.list_entries(session, owner=owner, action=action, limit=limit)
     if as_json:
-        print_json([work.document(entry) for entry in found])
-    else:
-        stdout().print(work.table(found))
+        print_json([{**asdict(each), "at": each.at.isoformat(timespec="milliseconds")} for each in found])
+        return
+    table = new_table(*COLUMNS, left=len(COLUMNS), wrapped=COLUMNS)
+    for entry in found:
+        cells = (entry.outcome, entry.owner, entry.target, entry.address)
+        table.add_row(f"{entry.at:%m-%d %H:%M:%S}", entry.action, *(escape(cell or "") for cell in cells))
+    stdout().print(table)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from morphid.commands import options
+from morphid.configured import settings_for
+from morphid.database import migrate
 from morphid.screen import print_json, reports_errors, stdout
 
 if TYPE_CHECKING:
@@ -22,9 +24,9 @@ def upgrade_database(
     revision: Annotated[str, typer.Argument()] = "head", data_dir: options.DataDir = None
 ) -> None:
     """Migrate the database up: MORPHID_DATABASE_URL's, else the one in the data directory."""
-    from morphid.migrate import configured_url, upgrade_to
+    from app.database import upgrade
 
-    upgrade_to(configured_url(data_dir), revision)
+    migrate(upgrade, settings_for(data_dir=data_dir).database_url, revision)
 
 
 @database.command("downgrade")
@@ -34,9 +36,9 @@ def downgrade_database(
     data_dir: options.DataDir = None,
 ) -> None:
     """Migrate the database down."""
-    from morphid.migrate import configured_url, downgrade_to
+    from app.database import downgrade
 
-    downgrade_to(configured_url(data_dir), revision)
+    migrate(downgrade, settings_for(data_dir=data_dir).database_url, revision)
 
 
 @database.command("backup")
@@ -48,9 +50,8 @@ def backup_database(
 ) -> None:
     """Copy the SQLite database to FILE while the service goes on."""
     from morphid.backup import backup
-    from morphid.migrate import configured_url
 
-    _say("copied to", backup(configured_url(data_dir), target), as_json=as_json)
+    _show("copied to", backup(settings_for(data_dir=data_dir).database_url, target), as_json=as_json)
 
 
 @database.command("restore")
@@ -62,23 +63,14 @@ def restore_database(
 ) -> None:
     """Restore the SQLite database from FILE; the service must be stopped."""
     from morphid.backup import restore
-    from morphid.migrate import configured_url
 
-    _say("put back to", restore(configured_url(data_dir), source), as_json=as_json)
+    _show("put back to", restore(settings_for(data_dir=data_dir).database_url, source), as_json=as_json)
 
 
-def _say(what: str, copy: Backup, *, as_json: bool) -> None:
+def _show(what: str, copy: Backup, *, as_json: bool) -> None:
     if as_json:
-        print_json(
-            {
-                "file": str(copy.path),
-                "size_bytes": copy.size_bytes,
-                "jobs": copy.jobs,
-                "revision": copy.revision,
-            }
-        )
-    else:
-        stdout().print(
-            f"{copy.jobs} jobs, {copy.size_bytes} bytes, revision {copy.revision}: {what} {copy.path}",
-            soft_wrap=True,
-        )
+        facts = {"size_bytes": copy.size_bytes, "jobs": copy.jobs, "revision": copy.revision}
+        print_json({"file": str(copy.path), **facts})
+        return
+    sentence = f"{copy.jobs} jobs, {copy.size_bytes} bytes, revision {copy.revision}: {what} {copy.path}"
+    stdout().print(sentence, soft_wrap=True)

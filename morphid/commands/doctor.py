@@ -1,7 +1,8 @@
-"""``morphid doctor`` and ``morphid ready``: what is wrong here, and may work begin."""
+"""``morphid doctor``: what is wrong here."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -51,20 +52,6 @@ def doctor(
                 console.print(f"       -> {finding.remedy}", markup=False, soft_wrap=True)
     failed = [finding for finding in found if finding.state is State.FAIL]
     if as_json:
-        print_json(
-            {"status": "fail" if failed else "ok", "findings": [finding.to_document() for finding in found]}
-        )
+        print_json({"status": "fail" if failed else "ok", "findings": [asdict(each) for each in found]})
     if failed:
         raise typer.Exit(int(Exit.ENVIRONMENT))
-
-
-@reports_errors
-def ready(
-    worker: Annotated[bool, typer.Option("--worker", help="Check only this machine's worker.")] = False,
-    wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
-    data_dir: options.DataDir = None,
-) -> None:
-    """Exit with 0 if jobs submitted now will run, otherwise with 6."""
-    from morphid.ready import wait_until_ready
-
-    stdout().print(wait_until_ready(data_dir, worker_here=worker, within_s=wait), soft_wrap=True)

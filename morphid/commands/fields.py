@@ -19,7 +19,7 @@ from morphdata.options import Option
 from morphid.exits import CommandError, Exit
 from morphid.files import read_json
 
-MAX_SHOWN = 10_000  # larger limits tell nobody anything
+MAX_SHOWN = 10_000  # larger limits help nobody
 
 
 @dataclass(frozen=True)
@@ -132,14 +132,18 @@ def _form(flag: str, field: FieldInfo) -> Form:
     members = {member for inner in kind.model_fields.values() for member in _kinds(inner.annotation)}
     if members == {float}:
         example = ",".join("1" for _ in names)
-        return Form(str, ",".join(names), lambda text: _object(names, _numbers(flag, text, float, example)))
+
+        def read(text: str) -> dict[str, float]:
+            return dict(zip(names, _numbers(flag, text, float, example), strict=True))
+
+        return Form(str, ",".join(names), read)
     if members and all(get_origin(member) is list for member in members):
         return Form(list[str], "NAME=LOW:HIGH", lambda texts: _ranges(flag, texts))
     return Form(Path, "FILE", read_json)
 
 
 def _limits(field: FieldInfo) -> str | None:
-    """Show the least and the greatest whole number that a field takes, where both are known."""
+    """Show the smallest and the largest whole number that a field takes, where both are known."""
     low, high = (
         next((getattr(item, name) for item in field.metadata if hasattr(item, name)), None)
         for name in ("ge", "le")
@@ -159,10 +163,6 @@ def _numbers(flag: str, text: str, kind: Callable[[str], Any], example: str) -> 
             f"{flag} {text}: not {what} with commas between", code=Exit.USAGE, hint=f"write {flag} {example}"
         )
     return found
-
-
-def _object(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
-    return dict(zip(names, values, strict=True))
 
 
 def _ranges(flag: str, texts: Sequence[str]) -> dict[str, list[float]]:

@@ -69,9 +69,9 @@ def show_job(
         print_json({**found, "result": result})
         return
     stdout().print(jobs_table([found]))
-    beside = progress_detail(found.get("progress") or {})
-    if beside:
-        stdout().print(beside, markup=False)
+    detail = progress_detail(found.get("progress") or {})
+    if detail:
+        stdout().print(detail, markup=False)
     if found.get("error"):
         print_job_error(found["error"])
     if result is not None:

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
+from rich.table import Table
 
 from morphid.commands import options
-from morphid.screen import print_json, reports_errors, stderr, stdout
+from morphid.database import service_database
+from morphid.exits import CommandError, Exit
+from morphid.screen import new_table, print_json, reports_errors, stderr, stdout
+
+if TYPE_CHECKING:
+    from app.keys.records import ApiKey, Scope
 
 keys = typer.Typer(help="Make, list and revoke API keys.", no_args_is_help=True, epilog=options.EXIT_CODES)
 
-quota_option = "Quotas"
+QUOTAS = "Quotas"  # group of options
+AFTER = re.compile(r"(\d{1,5})\s*([dh])")
+STATE_COLOURS = {"active": "green", "expired": "yellow", "revoked": "red"}
+COLUMNS = ("prefix", "owner", "name", "state", "scopes", "last use UTC", "expires UTC")
 
 
 @keys.command("create")
@@ -27,31 +41,29 @@ def create_key(
     ] = None,
     expires: Annotated[str | None, typer.Option(help="When: `90d`, `12h`, or a date in UTC.")] = None,
     max_jobs: Annotated[
-        int | None, typer.Option(min=1, help="Unfinished jobs at a time.", rich_help_panel=quota_option)
+        int | None, typer.Option(min=1, help="Unfinished jobs at a time.", rich_help_panel=QUOTAS)
     ] = None,
     max_flights_per_day: Annotated[
-        int | None, typer.Option(min=1, help="Flights a day, UTC.", rich_help_panel=quota_option)
+        int | None, typer.Option(min=1, help="Flights a day, UTC.", rich_help_panel=QUOTAS)
     ] = None,
     max_bytes: Annotated[
-        int | None, typer.Option(min=1, help="Stored bytes.", rich_help_panel=quota_option)
+        int | None, typer.Option(min=1, help="Stored bytes.", rich_help_panel=QUOTAS)
     ] = None,
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
     """Create a key and show it once; only a digest is stored."""
+    from app.keys import service
     from app.keys.records import Quota
-    from morphid import keys as work
 
-    made = work.create(
-        data_dir,
-        owner=owner,
-        name=name,
-        scopes=work.scopes_of(scope or []),
-        quota=Quota(max_jobs, max_flights_per_day, max_bytes),
-        expires_at=None if expires is None else work.moment_of(expires),
-    )
+    scopes, quota = _scopes(scope or []), Quota(max_jobs, max_flights_per_day, max_bytes)
+    expires_at = None if expires is None else moment_of(expires)
+    with service_database(data_dir) as database, _refusals(), database.write() as session:
+        made = service.create_key(
+            session, owner=owner, name=name, scopes=scopes, quota=quota, expires_at=expires_at
+        )
     if as_json:
-        print_json({"key": made.text, **work.document(made.key)})
+        print_json({"key": made.text, **_document(made.key)})
         return
     stdout().print(made.text, markup=False, soft_wrap=True)
     stderr().print(
@@ -69,13 +81,14 @@ def list_keys(
     as_json: options.AsJson = False,
 ) -> None:
     """List the keys: whose, what for, what they may do, when they were used; never their secrets."""
-    from morphid import keys as work
+    from app.keys import repository
 
-    found = work.listed(data_dir, owner)
+    with service_database(data_dir) as database, database.read() as session:
+        found = repository.list_keys(session, owner=owner)
     if as_json:
-        print_json([work.document(key) for key in found])
+        print_json([_document(key) for key in found])
     else:
-        stdout().print(work.table(found))
+        stdout().print(_table(found))
 
 
 @keys.command("revoke")
@@ -86,13 +99,14 @@ def revoke_key(
     as_json: options.AsJson = False,
 ) -> None:
     """Revoke a key; running services refuse it two seconds later."""
-    from morphid import keys as work
+    from app.keys import service
 
-    revoked = work.revoke(data_dir, key)
+    with service_database(data_dir) as database, _refusals(), database.write() as session:
+        revoked = service.revoke_key(session, key)
     if as_json:
-        print_json(work.document(revoked))
+        print_json(_document(revoked))
     else:
-        stdout().print(work.table([revoked]))
+        stdout().print(_table([revoked]))
 
 
 @keys.command("scopes")
@@ -105,3 +119,79 @@ def list_scopes(as_json: options.AsJson = False) -> None:
         return
     for scope, meaning in SCOPE_MEANINGS.items():
         stdout().print(f"{scope.value:<12} {meaning}", markup=False)
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    from app.keys.service import KeyRefused
+
+    try:
+        yield
+    except KeyRefused as error:
+        raise CommandError(str(error), code=Exit.INVALID_INPUT, hint="see `morphid keys ls`") from None
+
+
+def _scopes(names: Sequence[str]) -> list[Scope]:
+    """Turn names into scopes; the usual ones when there are none."""
+    from app.keys.records import USUAL_SCOPES, Scope
+
+    known = {scope.value: scope for scope in Scope}
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise CommandError(
+            f"there is no scope {unknown[0]!r}", code=Exit.USAGE, hint=f"one of {', '.join(sorted(known))}"
+        )
+    return sorted({known[name] for name in names} or USUAL_SCOPES)
+
+
+def moment_of(text: str) -> float:
+    """Read ``90d``, ``12h`` or a date in the future (UTC unless it says otherwise), s since 1970 UTC."""
+    now = datetime.now(UTC)
+    after = AFTER.fullmatch(text.strip())
+    try:
+        if after is not None:
+            unit = timedelta(days=1) if after[2] == "d" else timedelta(hours=1)
+            moment = now + int(after[1]) * unit
+        else:
+            moment = datetime.fromisoformat(text.strip())
+            moment = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    except (ValueError, OverflowError):
+        raise CommandError(
+            f"{text!r} is no time", code=Exit.USAGE, hint="say `90d`, `12h` or `2027-01-31`"
+        ) from None
+    if moment <= now:
+        raise CommandError(f"{text!r} has passed", code=Exit.USAGE, hint="a key needs a future")
+    return moment.timestamp()
+
+
+def _document(key: ApiKey) -> dict[str, Any]:
+    """Give a key as JSON, without its secret, which nobody knows."""
+    moments = ("created_at", "expires_at", "revoked_at", "last_used_at")
+    return {
+        **{name: getattr(key, name) for name in ("id", "owner", "name", "prefix", "state")},
+        "scopes": sorted(key.scopes),
+        "max_jobs_in_flight": key.quota.max_jobs_in_flight,
+        "max_flights_per_day": key.quota.max_flights_per_day,
+        "max_stored_bytes": key.quota.max_stored_bytes,
+        **{
+            name: None if (moment := getattr(key, name)) is None else moment.isoformat(timespec="seconds")
+            for name in moments
+        },
+    }
+
+
+def _table(found: Sequence[ApiKey]) -> Table:
+    from app.keys.records import EVERY_SCOPE, USUAL_SCOPES
+
+    shown_scopes = {EVERY_SCOPE: "all", USUAL_SCOPES: "all but metrics"}
+    table = new_table(*COLUMNS, left=len(COLUMNS), wrapped=("scopes",))
+    for key in found:
+        table.add_row(
+            key.prefix,
+            key.owner,
+            escape(key.name),
+            f"[{STATE_COLOURS[key.state]}]{key.state}[/]",
+            shown_scopes.get(key.scopes) or " ".join(sorted(key.scopes)),
+            *(f"{at:%y-%m-%d %H:%M}" if at else "never" for at in (key.last_used_at, key.expires_at)),
+        )
+    return table

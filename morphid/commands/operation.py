@@ -55,7 +55,7 @@ def nothing(*_given: Any) -> None:
 
 @dataclass(frozen=True)
 class Particulars:
-    """What a command has beside the fields of its request.
+    """What a command has besides the fields of its request.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What ``morphid optimize`` has beside its request: the known model, the written schedule, the tables."""
+"""What ``morphid optimize`` has besides its request: the known model, the written schedule, the tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from morphdata.drives import SWEEPS, label
@@ -14,7 +13,7 @@ from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.files import writing
 from morphid.request import Request
-from morphid.screen import short, stdout
+from morphid.screen import new_table, short, stdout
 
 if TYPE_CHECKING:
     from morphid.running import Answer
@@ -68,19 +67,11 @@ def show_schedule(result: Mapping[str, Any]) -> None:
 def variation_table(result: Mapping[str, Any]) -> Table:
     """Compare the schedules: attitude variation (rad^2) in the models that flew them, and what they reach."""
     reduction, model = result.get("reduction_percent"), result.get("reduction_model")
-    table = Table(
-        title="Attitude variation in rad²; largest rate, acceleration, torque",
-        caption=None
-        if reduction is None
-        else f"optimum: {reduction:.1f} % below constant rate ({model} model)",
-        box=SIMPLE_HEAD,
-        padding=(0, 1),
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    table.add_column("schedule", no_wrap=True)
-    for title in (*MODELS, *REACHED.values()):
-        table.add_column(title, justify="right", no_wrap=True)
+    caption = None
+    if reduction is not None:
+        caption = f"optimum: {reduction:.1f} % below constant rate ({model} model)"
+    title = "Attitude variation in rad²; largest rate, acceleration, torque"
+    table = new_table("schedule", *MODELS, *REACHED.values(), title=title, caption=caption)
     for name, title in SCHEDULES.items():
         flown = result["variation"].get(name) or {}
         reached = (result.get("reached") or {}).get(name) or {}
@@ -92,9 +83,8 @@ def variation_table(result: Mapping[str, Any]) -> Table:
 
 def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
     """Show the front of duration (s) against variation (rad^2)."""
-    table = Table(title="Pareto front of duration and variation", box=SIMPLE_HEAD)
-    for title in ("duration, s", "variation, rad²", "at constant rate"):
-        table.add_column(title, justify="right")
+    columns = ("duration, s", "variation, rad²", "at constant rate")
+    table = new_table(*columns, title="Pareto front of duration and variation", left=0)
     for point in front:
         variations = (short(point["variation_rad2"]), short(point.get("constant_rad2")))
         table.add_row(f"{point['duration_s']:.2f}", *variations)
@@ -103,9 +93,8 @@ def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
 
 def knot_table(schedule: Mapping[str, Any]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
-    table = Table(title="Knots of the spline", box=SIMPLE_HEAD)
-    table.add_column("time, s", justify="right")
-    table.add_column(f"{label(schedule.get('drive') or 'sweep')}, rad", justify="right")
+    drive = label(schedule.get("drive") or "sweep")
+    table = new_table("time, s", f"{drive}, rad", title="Knots of the spline", left=0)
     for time_s, angle_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
         table.add_row(f"{time_s:.4f}", f"{angle_rad:.4f}")
     return table

@@ -21,7 +21,7 @@ EXIT_CODES = (
     "6 machine not ready, 130 Ctrl-C."
 )
 KNOWN_MODEL = frozenset({"--parameters", "--model-id"})  # see `put_known_model`
-HOW_IDENTIFIED = ("lattice", "step_s", "start")  # stand beside the parameters of an identified model
+HOW_IDENTIFIED = ("lattice", "step_s", "start")  # next to the parameters of an identified model
 
 # groups of options, as a command's help shows them
 model_option = partial(typer.Option, rich_help_panel=MODEL)
@@ -77,12 +77,7 @@ Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and cu
 
 
 def put_known_model(request: Request, parameters: Path | None, model_id: str | None, url: str | None) -> None:
-    """Fill in an equivalent model that is known already: a file, or the id of a model at a service.
-
-    Raises
-    ------
-    CommandError : neither or both are given, or an id without a service.
-    """
+    """Fill in an equivalent model that is known already: a file, or the id of a model at a service."""
     if (parameters is None) == (model_id is None):
         raise CommandError(
             f"{'no' if parameters is None else 'more than one'} equivalent model is given",
@@ -93,7 +88,7 @@ def put_known_model(request: Request, parameters: Path | None, model_id: str | N
     if parameters is not None:
         found = _parameters_in(parameters)
         request.put("/model/parameters", found, f"--parameters {parameters}")
-        # told outright, so that one option (`--core smoothed`) changes that alone
+        # written out, so that one option (`--core smoothed`) changes that alone
         for name in HOW_IDENTIFIED:
             request.put(f"/model/{name}", deepcopy(found.get(name)), f"--parameters {parameters}")
         return

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from morphid.commands import options
 from morphid.exits import CommandError, Exit
 from morphid.files import writing
 from morphid.interrupt import first_interrupt
-from morphid.screen import meter, print_json, reports_errors, short, stdout
+from morphid.screen import meter, new_table, print_json, reports_errors, short, stdout
 
 if TYPE_CHECKING:
     from morphcore.paper import StageRunner
@@ -61,7 +60,7 @@ def paper(
     if as_json:
         print_json(summary)
         return
-    stdout().print(asked_table(summary))
+    stdout().print(requirements_table(summary))
     stdout().print(f"report: {report}", markup=False, soft_wrap=True)
 
 
@@ -69,8 +68,8 @@ def _work_off(runner: StageRunner) -> None:
     """Run all stages under a progress bar; Ctrl-C leaves what is done."""
     try:
         with meter() as bar, first_interrupt() as interrupted, closing(runner.steps()) as steps:
-            for step in steps:
-                bar.show({"fraction": step.fraction, "phase": step.title, "message": step.message})
+            for stage, progress in steps:
+                bar.show({"fraction": progress.fraction, "phase": stage.title, "message": progress.message})
                 if interrupted():
                     break
             else:
@@ -85,7 +84,7 @@ def _work_off(runner: StageRunner) -> None:
 
 
 def _samples(folder: Path | None) -> Path | None:
-    """The folder of another program's flights: as asked for, or the example flights of a source tree."""
+    """The folder of another program's flights: as given, or the example flights of a source tree."""
     if folder is None:
         folder = Path(__file__).resolve().parents[2] / "examples"
         return folder if (folder / "aircraft.json").is_file() else None
@@ -98,18 +97,10 @@ def _samples(folder: Path | None) -> Path | None:
     return folder
 
 
-def asked_table(summary: dict[str, Any]) -> Table:
-    """Show every asked figure beside what was measured."""
-    table = Table(
-        title=f"Required and measured, seed {summary['seed']}, {summary['total_s']:.0f} s of work",
-        box=SIMPLE_HEAD,
-        padding=(0, 1),
-        collapse_padding=True,
-        pad_edge=False,
-    )
-    table.add_column("figure")
-    for name in ("asked", "measured", ""):
-        table.add_column(name, justify="right", no_wrap=True)
+def requirements_table(summary: dict[str, Any]) -> Table:
+    """Show every requirement next to what was measured."""
+    title = f"Required and measured, seed {summary['seed']}, {summary['total_s']:.0f} s of work"
+    table = new_table("figure", "required", "measured", "", title=title, wrapped=("figure",))
     for each in summary["asked"]:
         relation = "≥" if each["at_least"] else "≤"
         table.add_row(

@@ -1,4 +1,4 @@
-"""What ``morphid simulate`` has beside its request: model, schedule, the written flight, the table."""
+"""What ``morphid simulate`` has besides its request: model, schedule, the written flight, the table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from morphdata.drives import BOTH
@@ -21,7 +20,7 @@ from morphid.commands.operation import Particulars, Values
 from morphid.exits import CommandError, Exit
 from morphid.files import require_file, write_bytes
 from morphid.request import Request, aircraft_drives
-from morphid.screen import short, stdout
+from morphid.screen import new_table, short, stdout
 
 if TYPE_CHECKING:
     from morphid.running import Answer
@@ -127,9 +126,8 @@ def flight_table(result: Mapping[str, Any]) -> Table:
     """Show how a flight started, how far the attitude went, and what it cost."""
     trim, summary, cost = (result.get(part) or {} for part in ("trim", "summary", "cost"))
     tips, largest = trim.get("tip_z_m") or {}, summary.get("max_abs_rad") or {}
-    table = Table(title=f"Flight of the {result['model']['kind']} model", box=SIMPLE_HEAD, show_header=False)
-    table.add_column("what")
-    table.add_column("value", justify="right")
+    table = new_table("what", "value", title=f"Flight of the {result['model']['kind']} model")
+    table.show_header = False
     table.add_row("angle of attack at the start, rad", short(trim.get("alpha_rad")))
     for side in ("left", "right"):
         if tips.get(side) is not None:

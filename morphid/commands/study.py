@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from morphid.commands.operation import Particulars
-from morphid.screen import short, stdout
+from morphid.screen import new_table, short, stdout
 
 
 def show_study(result: Mapping[str, Any]) -> None:
@@ -22,16 +21,12 @@ def show_study(result: Mapping[str, Any]) -> None:
 
 def study_table(result: Mapping[str, Any]) -> Table:
     """Show accuracy and cost per number of links, below those of the rigid model."""
-    table = Table(
+    table = new_table(
+        *("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search"),
         title="Study: J in rad², fitted and held out; RMS of φ, θ, ψ in mrad; flight in ms",
         caption="* recommended; flight: wall time of one of 2 s on one core",
-        box=SIMPLE_HEAD,
-        padding=(0, 1),
-        collapse_padding=True,
-        pad_edge=False,
+        left=0,
     )
-    for name in ("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search"):
-        table.add_column(name, justify="right", no_wrap=True)
     rigid = {**(result.get("rigid") or {}), "links_per_wing": "rigid"}
     recommended = (result.get("recommended") or {}).get("links_per_wing")
     for row in (rigid, *result["rows"]):

@@ -1,10 +1,11 @@
-"""What an examination says."""
+"""What an examination finds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 
 
 class State(StrEnum):
@@ -17,45 +18,18 @@ class State(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report.
+    """One line of the report: what was examined, what was seen, and the remedy where it is not ok."""
 
-    Attributes
-    ----------
-    name : str
-        What was looked at.
-    state : State
-    message : str
-        What was seen.
-    remedy : str
-        What to do about it; empty when it is ok.
-    """
-
-    name: str
     state: State
+    name: str
     message: str
     remedy: str = ""
-
-    def to_document(self) -> dict[str, str]:
-        """Give the finding as ``--json`` prints it."""
-        return {**asdict(self), "state": self.state.value}
 
 
 Check = Callable[[], Iterator[Finding]]
 
 
-def ok(name: str, message: str) -> Finding:
-    """Say that something is as it should be."""
-    return Finding(name, State.OK, message)
-
-
-def warn(name: str, message: str, remedy: str) -> Finding:
-    """Say that something could be better."""
-    return Finding(name, State.WARN, message, remedy)
-
-
-def fail(name: str, message: str, remedy: str) -> Finding:
-    """Say that something does not work."""
-    return Finding(name, State.FAIL, message, remedy)
+ok, warn, fail = (partial(Finding, state) for state in (State.OK, State.WARN, State.FAIL))
 
 
 def examined(checks: Sequence[tuple[str, Check]]) -> Iterator[Finding]:

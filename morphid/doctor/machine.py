@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import resource
 import shutil
@@ -16,13 +17,12 @@ from pathlib import Path
 from morphid.doctor.findings import Finding, fail, ok, warn
 from worker.numerics import share_cores, takes_files, usable_cores
 
-LEAST_PYTHON = (3, 11)
 EXTRAS = ("server", "telemetry")  # of the installation; what only developers need is not examined
 CONSTRAINTS = Path(__file__).resolve().parents[2] / "constraints.txt"
 COMPILE_WITHIN_S = 120.0
-LEAST_MEMORY = 2 * 2**30  # bytes; the kernels' compiler alone takes 0.5 GiB
-LEAST_SPACE, SCARCE_SPACE = 200 * 2**20, 2 * 2**30
-LEAST_FILES, FEW_FILES = 256, 1024
+MIN_MEMORY = 2 * 2**30  # bytes; the kernels' compiler alone takes 0.5 GiB
+MIN_SPACE, SCARCE_SPACE = 200 * 2**20, 2 * 2**30
+MIN_FILES, FEW_FILES = 256, 1024
 CGROUP_MEMORY = Path("/sys/fs/cgroup/memory.max")
 OCTAL = re.compile(r"\\([0-7]{3})")  # how /proc/mounts writes blanks and other characters
 NETWORK_FILE_SYSTEMS = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "9p", "fuse.sshfs"})
@@ -35,12 +35,8 @@ print(json.dumps({"cache": getattr(blend._cache, "cache_path", None), "numba": n
 
 
 def python() -> Iterator[Finding]:
-    """Is Python new enough."""
-    version = ".".join(map(str, sys.version_info[:3]))
-    if sys.version_info < LEAST_PYTHON:
-        yield fail("python", f"Python {version} is too old", "install Python 3.11 or newer")
-    else:
-        yield ok("python", f"Python {version} at {sys.executable}")
+    """Which Python it is; one that is too old cannot load this command."""
+    yield ok("python", f"Python {platform.python_version()} at {sys.executable}")
 
 
 def packages() -> Iterator[Finding]:
@@ -99,7 +95,7 @@ def _version(name: str) -> str | None:
 
 def compiler() -> Iterator[Finding]:
     """Does numba compile, and can what it compiled be kept."""
-    remedy = "pip install -c constraints.txt morphid; the message of the compiler tells more"
+    remedy = "pip install -c constraints.txt morphid; the message of the compiler says more"
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-c", COMPILE],
@@ -115,9 +111,9 @@ def compiler() -> Iterator[Finding]:
         last = done.stderr.strip().splitlines()[-1:] or ["no message"]
         yield fail("compiler", f"the kernels cannot be loaded: {last[0]}", remedy)
         return
-    told = json.loads(done.stdout.splitlines()[-1])
-    yield ok("compiler", f"numba {told['numba']} compiles")
-    cache = Path(told["cache"]) if told["cache"] else None
+    answer = json.loads(done.stdout.splitlines()[-1])
+    yield ok("compiler", f"numba {answer['numba']} compiles")
+    cache = Path(answer["cache"]) if answer["cache"] else None
     if cache is None or not takes_files(cache):
         yield warn(
             "kernel cache",
@@ -144,11 +140,11 @@ def cores(workers: int) -> Iterator[Finding]:
     else:
         yield ok("cores", shared)
     memory = _memory_limit()
-    if memory < LEAST_MEMORY * workers:
+    if memory < MIN_MEMORY * workers:
         yield warn(
             "memory",
             f"{memory / 2**30:.1f} GiB for {workers} jobs at once",
-            f"give {LEAST_MEMORY // 2**30} GiB per job that runs at once, or lower MORPHID_WORKERS",
+            f"give {MIN_MEMORY // 2**30} GiB per job that runs at once, or lower MORPHID_WORKERS",
         )
     else:
         yield ok("memory", f"{memory / 2**30:.1f} GiB")
@@ -166,15 +162,16 @@ def files() -> Iterator[Finding]:
     """May the API open a file for each of its clients."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     remedy = "raise it: `ulimit -n 65536`, LimitNOFILE= of systemd, `ulimits:` of docker-compose.yml"
-    most = soft if hard == resource.RLIM_INFINITY else hard  # the API raises its own soft limit
-    if most != resource.RLIM_INFINITY and most < LEAST_FILES:
-        yield fail("open files", f"at most {most}", remedy)
-    elif most != resource.RLIM_INFINITY and most < FEW_FILES:
-        yield warn(
-            "open files", f"at most {most}: that many clients at once, less what the service needs", remedy
-        )
+    limit = soft if hard == resource.RLIM_INFINITY else hard  # the API raises its own soft limit
+    if limit == resource.RLIM_INFINITY:
+        yield ok("open files", "any number")
+    elif limit < MIN_FILES:
+        yield fail("open files", f"at most {limit}", remedy)
+    elif limit < FEW_FILES:
+        message = f"at most {limit}: that many clients at once, less what the service needs"
+        yield warn("open files", message, remedy)
     else:
-        yield ok("open files", f"up to {'any number' if most == resource.RLIM_INFINITY else most}")
+        yield ok("open files", f"up to {limit}")
 
 
 def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
@@ -199,7 +196,7 @@ def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
     free = shutil.disk_usage(next(each for each in (folder, *folder.parents) if each.exists())).free
     message = f"{free / 2**30:.1f} GiB free"
     remedy = "delete finished jobs (`morphid jobs`, retention), or grow the disk"
-    if free < LEAST_SPACE:
+    if free < MIN_SPACE:
         yield fail("disk", message, remedy)
     elif free < SCARCE_SPACE:
         yield warn("disk", message, remedy)

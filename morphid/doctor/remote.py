@@ -24,10 +24,10 @@ def served_version(client: httpx.Client) -> str | None:
     import httpx
 
     try:
-        told = client.get("/livez").json()
+        answer = client.get("/livez").json()
     except (httpx.HTTPError, ValueError):
         return None
-    return str(told["version"]) if isinstance(told, dict) and told.get("status") == "alive" else None
+    return str(answer["version"]) if isinstance(answer, dict) and answer.get("status") == "alive" else None
 
 
 def service(url: str, api_key: str | None) -> Iterator[Finding]:
@@ -89,18 +89,17 @@ def _clock(answer: Any) -> Iterator[Finding]:
         )
 
 
-def _readiness(told: dict[str, Any]) -> Iterator[Finding]:
+def _readiness(ready: dict[str, Any]) -> Iterator[Finding]:
     remedies = {
         "database": "see MORPHID_DATABASE_URL, `morphid db upgrade`",
         "broker": "start it, or correct MORPHID_BROKER_URL; jobs wait until it is back",
     }
     for part, remedy in remedies.items():
-        state = told[part]
+        state = ready[part]
         yield ok(part, state) if state in {"ok", "not checked (no Redis)"} else fail(part, state, remedy)
-    workers = told["workers"]
-    message = "{status}: {alive} take jobs, {stalled} no longer do, {busy} of {slots} slots busy".format(
-        **workers
-    )
+    workers = ready["workers"]
+    counts = "{alive} take jobs, {stalled} no longer do, {busy} of {slots} slots busy".format(**workers)
+    message = f"{workers['status']}: {counts}"
     if workers["stalled"]:
         yield fail("workers", message, "restart the stalled ones; their logs say what they wait for")
     elif workers["status"] == "ok":

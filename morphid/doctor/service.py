@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import socket
 import stat
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ SKEW_S = 2.0  # leases are the database's own; this only makes times in logs har
 STUCK_S = 600.0  # a job that waits so long while a slot is free
 ORPHANED_S = 120.0  # a lease that ran out so long ago was reaped by nobody
 DELIVERY_LATE_S = 3600.0
-LEAST_BROKER = (6, 2)
+MIN_BROKER = (6, 2)
 OTHERS_MAY = stat.S_IROTH | stat.S_IWOTH
 LARGE_DATABASE = 2 * 2**30  # bytes; its pages are not read one by one
 
@@ -47,7 +47,7 @@ def database(settings: Any) -> Iterator[Finding]:
     """Can it be reached, is it migrated, sound, durable, and does its clock agree with ours."""
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time, schema_revision
+    from app.database import database_time, schema_revision
     from app.observability.logs import masked
     from migrations import HEAD
 
@@ -56,9 +56,8 @@ def database(settings: Any) -> Iterator[Finding]:
         yield warn("database", f"{url} is not there yet", "`morphid serve` or `morphid db upgrade` makes it")
         return
     exposed = settings.uses_sqlite and _sqlite_file(settings.database_url).stat().st_mode & OTHERS_MAY
-    store = Database(settings.database_url)
     try:
-        with store.read() as session:
+        with _reading(settings) as session:
             revision = schema_revision(session)
             skew_s = float(session.scalar(database_time().select()) or 0.0) - time.time()
             sound = list(_sqlite(session, settings) if settings.uses_sqlite else _postgres(session))
@@ -67,8 +66,6 @@ def database(settings: Any) -> Iterator[Finding]:
         remedy = "start it, or correct MORPHID_DATABASE_URL; a damaged file: `morphid db restore`"
         yield fail("database", f"{url}: {masked(sentence)}", remedy)
         return
-    finally:
-        store.dispose()
     if revision != HEAD:
         remedy = "morphid db upgrade" if revision is None or revision < HEAD else "run the newer MorphID"
         yield fail("database", f"{url} is at revision {revision}, this version needs {HEAD}", remedy)
@@ -85,6 +82,19 @@ def database(settings: Any) -> Iterator[Finding]:
         yield ok("clock", "the database's and this machine's agree")
 
 
+@contextmanager
+def _reading(settings: Any) -> Iterator[Any]:
+    """Open a session on the service's database."""
+    from app.database import Database
+
+    store = Database(settings.database_url)
+    try:
+        with store.read() as session:
+            yield session
+    finally:
+        store.dispose()
+
+
 def _sqlite_file(url: str) -> Path:
     from sqlalchemy import make_url
 
@@ -95,11 +105,13 @@ def _sqlite(session: Any, settings: Any) -> Iterator[Finding]:
     file = _sqlite_file(settings.database_url)
     small = file.stat().st_size < LARGE_DATABASE
     pragma = "PRAGMA integrity_check(5)" if small else "PRAGMA quick_check(5)"
-    told = [row[0] for row in session.exec_driver_sql(pragma)]
-    if told == ["ok"]:
+    faults = [row[0] for row in session.exec_driver_sql(pragma)]
+    if faults == ["ok"]:
         yield ok("integrity", f"{pragma.removeprefix('PRAGMA ').partition('(')[0]} finds nothing wrong")
     else:
-        yield fail("integrity", "; ".join(map(str, told)), "stop the service; `morphid db restore` a backup")
+        yield fail(
+            "integrity", "; ".join(map(str, faults)), "stop the service; `morphid db restore` a backup"
+        )
     mode = session.exec_driver_sql("PRAGMA journal_mode").scalar()
     if mode != "wal":
         yield fail(
@@ -148,13 +160,13 @@ def broker(url: str) -> Iterator[Finding]:
             "broker", f"{where}: {state}", "start it, or correct MORPHID_BROKER_URL (with its password)"
         )
         return
-    told: dict[str, Any] = broker_client(url).info()
-    version = str(told.get("valkey_version") or told.get("redis_version"))
-    if tuple(int(part) for part in version.split(".")[:2]) < LEAST_BROKER:
+    info: dict[str, Any] = broker_client(url).info()
+    version = str(info.get("valkey_version") or info.get("redis_version"))
+    if tuple(int(part) for part in version.split(".")[:2]) < MIN_BROKER:
         yield warn("broker", f"{where}: version {version} is old", "Valkey, or Redis 6.2 or newer")
     else:
-        yield ok("broker", f"{where}: {told.get('server_name', 'redis')} {version}")
-    if not int(told.get("aof_enabled", 0)):
+        yield ok("broker", f"{where}: {info.get('server_name', 'redis')} {version}")
+    if not int(info.get("aof_enabled", 0)):
         yield warn(
             "broker journal",
             "messages do not survive its restart: jobs then begin a second later",
@@ -162,7 +174,7 @@ def broker(url: str) -> Iterator[Finding]:
         )
     else:
         yield ok("broker journal", "appendonly")
-    policy = str(told.get("maxmemory_policy", "noeviction"))
+    policy = str(info.get("maxmemory_policy", "noeviction"))
     if policy != "noeviction":
         yield fail(
             "broker memory", f"maxmemory-policy {policy} throws messages away", "maxmemory-policy noeviction"
@@ -176,32 +188,23 @@ def work(settings: Any) -> Iterator[Finding]:
     from sqlalchemy import func, select
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time
+    from app.database import database_time
     from app.health.repository import snapshot
     from app.jobs.records import HELD
     from app.tables import jobs, webhook_deliveries
 
     if settings.uses_sqlite and not _sqlite_file(settings.database_url).exists():
         return
-    store = Database(settings.database_url)
+    lost = jobs.c.status.in_(HELD), jobs.c.lease_until < database_time() - ORPHANED_S
+    deliveries = webhook_deliveries.c
+    overdue = deliveries.status == "waiting", deliveries.next_at < database_time() - DELIVERY_LATE_S
     try:
-        with store.read() as session:
+        with _reading(settings) as session:
             seen = snapshot(session, settings.worker_seen_every_s)
-            orphaned = session.scalar(
-                select(func.count()).where(
-                    jobs.c.status.in_(HELD), jobs.c.lease_until < database_time() - ORPHANED_S
-                )
-            )
-            late = session.scalar(
-                select(func.count()).where(
-                    webhook_deliveries.c.status == "waiting",
-                    webhook_deliveries.c.next_at < database_time() - DELIVERY_LATE_S,
-                )
-            )
+            orphaned = session.scalar(select(func.count()).where(*lost))
+            late = session.scalar(select(func.count()).where(*overdue))
     except SQLAlchemyError:
         return  # the database has its own line
-    finally:
-        store.dispose()
     workers = seen.workers
     if workers.stalled:
         yield fail(
@@ -239,24 +242,18 @@ def keys(settings: Any) -> Iterator[Finding]:
     from sqlalchemy import func, or_, select
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.database import Database, database_time
+    from app.database import database_time
     from app.tables import api_keys
 
     if not settings.demands_keys:
         return
-    store = Database(settings.database_url)
+    expires_at = api_keys.c.expires_at
+    usable = api_keys.c.revoked_at.is_(None), or_(expires_at.is_(None), expires_at > database_time())
     try:
-        with store.read() as session:
-            valid = session.scalar(
-                select(func.count()).where(
-                    api_keys.c.revoked_at.is_(None),
-                    or_(api_keys.c.expires_at.is_(None), api_keys.c.expires_at > database_time()),
-                )
-            )
+        with _reading(settings) as session:
+            valid = session.scalar(select(func.count()).where(*usable))
     except SQLAlchemyError:
         return
-    finally:
-        store.dispose()
     if not valid:
         yield warn(
             "keys", "keys are required but none exist: no one has access", "morphid keys create --help"
@@ -267,22 +264,18 @@ def keys(settings: Any) -> Iterator[Finding]:
 
 def port(host: str, number: int) -> Iterator[Finding]:
     """Is the port free, or ours."""
+    from morphid.broker import bound_port, in_url
     from morphid.connections import client_for
     from morphid.doctor.remote import TIMEOUT_S, served_version
 
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, number))
-        except OSError as error:
-            reason = os.strerror(error.errno or 0)
-        else:
-            yield ok("port", f"{host}:{number} is free")
-            return
-    there = "127.0.0.1" if host in {"0.0.0.0", "::"} else host  # noqa: S104 - recognised, not bound
-    url = f"http://{f'[{there}]' if ':' in there else there}:{number}"
-    with client_for(url, direct=True, timeout=TIMEOUT_S) as client:
+    try:
+        bound_port(host, number)
+    except OSError as error:
+        reason = os.strerror(error.errno or 0)
+    else:
+        yield ok("port", f"{host}:{number} is free")
+        return
+    with client_for(f"http://{in_url(host)}:{number}", direct=True, timeout=TIMEOUT_S) as client:
         version = served_version(client)
     if version is None:
         yield fail(

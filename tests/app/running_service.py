@@ -13,7 +13,7 @@ import httpx
 import uvicorn
 
 from app.database import Database
-from app.http.server import guarded_config
+from app.http.server import GuardedConfig
 from app.jobs import store
 from app.jobs.records import Claim
 from app.main import create_app
@@ -66,7 +66,7 @@ def running_service(
     sending : how webhooks are sent; as the settings say when None, and not at all when left out.
     """
     app = create_app(settings, sending=sending)
-    config = guarded_config(app, settings, port=0, log_level="error", timeout_graceful_shutdown=2)
+    config = GuardedConfig(app, settings, port=0, log_level="error", timeout_graceful_shutdown=2)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()

@@ -7,8 +7,7 @@ import asyncio
 import pytest
 
 from app.errors import TooManyStreams
-from app.owner_limit import OwnerLimit
-from app.owner_turns import OwnerTurns
+from app.owner_turns import OwnerLimit, OwnerTurns
 
 
 class Readers:

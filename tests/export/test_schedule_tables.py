@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 
-from morphcore.export.schedule_tables import schedule_tables
+from morphcore.export.curves import schedule_tables
 
 MOTION = {"sweep_rad": [0.0, 0.1], "rate_rad_s": [0.0, 0.2], "acceleration_rad_s2": [1.0, 1.0 / 3.0]}
 FLOWN = {"phi_rad": [0.0, 0.0], "theta_rad": [0.0, -0.01], "psi_rad": [0.0, float("nan")]}

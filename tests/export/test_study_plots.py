@@ -10,7 +10,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from morphcore.export.study_plots import study_figure, study_plots, study_table
+from morphcore.export.curves import study_table
+from morphcore.export.study_plots import study_figure, study_plots
 
 
 def row(links: int, **changes: Any) -> dict[str, Any]:

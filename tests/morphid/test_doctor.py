@@ -156,7 +156,7 @@ def test_scarce_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert states(machine.data_dir(tmp_path / "file" / "var", sqlite=True)) == {"data directory": State.FAIL}
     monkeypatch.setattr(machine, "SCARCE_SPACE", 10**18)
     assert states(machine.data_dir(tmp_path, sqlite=True))["disk"] is State.WARN
-    monkeypatch.setattr(machine, "LEAST_SPACE", 10**18)
+    monkeypatch.setattr(machine, "MIN_SPACE", 10**18)
     assert states(machine.data_dir(tmp_path, sqlite=True))["disk"] is State.FAIL
     monkeypatch.setattr(machine, "NETWORK_FILE_SYSTEMS", {machine._file_system(tmp_path)})
     assert states(machine.data_dir(tmp_path, sqlite=True))["data directory"] is State.FAIL

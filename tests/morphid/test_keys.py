@@ -15,8 +15,8 @@ from typer.testing import CliRunner, Result
 from app.database import Database
 from app.keys.keyring import FRESH_S
 from app.settings import Settings
+from morphid.commands.keys import moment_of
 from morphid.exits import CommandError, Exit
-from morphid.keys import moment_of
 from morphid.main import app
 from tests.app.running_service import DEAD_BROKER, running_service
 

@@ -16,13 +16,14 @@ import pytest
 from typer.testing import CliRunner
 
 import morphcore.paper
-from morphcore.paper import PaperSettings, StageRunner, StageStep
+from morphcore.paper import PaperSettings, Progress, Stage, StageRunner
 from morphid.exits import Exit
 from morphid.main import app
 from tests.paper import made_up
 
 RUNNER = CliRunner()
 MOST_QUICK_S = 300.0
+TRUTH = Stage("truth", "six flexible flights", lambda *_: iter(()))  # type: ignore[arg-type, return-value]
 
 
 class PlayedRunner:
@@ -34,13 +35,13 @@ class PlayedRunner:
         self.closed = False
         self._interrupts = interrupts
 
-    def steps(self) -> Generator[StageStep]:
+    def steps(self) -> Generator[tuple[Stage, Progress]]:
         """Tell two steps, with Ctrl-C before the second."""
         try:
-            yield StageStep("truth", "six flexible flights", 0.5, "0.2 rad/s")
+            yield TRUTH, Progress(0.5, "0.2 rad/s")
             for _ in range(self._interrupts):
                 os.kill(os.getpid(), signal.SIGINT)
-            yield StageStep("truth", "six flexible flights", 0.6, "0.5 rad/s")
+            yield TRUTH, Progress(0.6, "0.5 rad/s")
             assert not self._interrupts, "worked on"
         finally:
             self.closed = True  # here the real one keeps its checkpoint

@@ -168,7 +168,7 @@ def test_the_server_by_itself_obeys_its_options(monkeypatch: pytest.MonkeyPatch)
         seen.extend((settings, application.args[0]))
         raise SystemExit
 
-    monkeypatch.setattr(server, "guarded_config", configured)
+    monkeypatch.setattr(server, "GuardedConfig", configured)
     monkeypatch.setenv("MORPHID_PORT", "8102")
     with pytest.raises(SystemExit):
         server.main(["--host", "0.0.0.0"])  # noqa: S104 - what it is about

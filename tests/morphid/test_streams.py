@@ -46,7 +46,7 @@ import json, sys
 from morphid.commands.identify import show_model
 from morphid.commands.simulate import show_flight
 from morphid.commands.study import show_study
-from morphid.commands.paper import asked_table
+from morphid.commands.paper import requirements_table
 from morphid.exits import CommandError, Exit
 from morphid.screen import meter, print_job_error, print_json, reports_errors, stderr, stdout
 from morphid.serve import Announcer
@@ -58,7 +58,7 @@ with meter() as bar:
 for show in (show_model, show_flight, show_study):
     show(result)
 figure = {"what": "φ", "at_least": True, "limit": 1, "unit": "°", "value": 1.0, "met": True}
-stdout().print(asked_table({"seed": 1, "total_s": 1.0, "asked": [figure]}))
+stdout().print(requirements_table({"seed": 1, "total_s": 1.0, "asked": [figure]}))
 print_json(result)
 Announcer(json_events=False).event("ready", "in /tmp/Fluß/φ")
 print_job_error({"detail": "θ is NaN", "code": "x"})

@@ -123,12 +123,12 @@ def test_a_checkpoint_of_other_inputs_is_not_used(tmp_path: Path) -> None:
 def test_progress_rises_to_one(tmp_path: Path) -> None:
     """Fractions never fall; each stage has its expected share; the last is 1."""
     _, stages = chain()
-    told = [(step.stage, step.fraction) for step in StageRunner(stages, tmp_path).steps()]
-    fractions = [fraction for _, fraction in told]
+    seen = [(stage.name, progress.fraction) for stage, progress in StageRunner(stages, tmp_path).steps()]
+    fractions = [fraction for _, fraction in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == pytest.approx(1.0)
-    assert max(fraction for stage, fraction in told if stage == "a") == pytest.approx(0.25)
-    assert max(fraction for stage, fraction in told if stage == "b") == pytest.approx(0.75)
+    assert max(fraction for stage, fraction in seen if stage == "a") == pytest.approx(0.25)
+    assert max(fraction for stage, fraction in seen if stage == "b") == pytest.approx(0.75)
 
 
 def test_stages_out_of_order_are_refused(tmp_path: Path) -> None:

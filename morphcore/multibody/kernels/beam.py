@@ -388,7 +388,7 @@ def invert(matrix, out):
 def eliminate(ends, tangents, diagonals, inverses, couplings, m):
     """Block elimination of open chains, tips -> roots; elements of a chain are numbered from its root.
 
-    ``tangents`` (e, 12, 12) of the elements; ``diagonals`` (n, 6, 6) come with what sits on the nodes beside
+    ``tangents`` (e, 12, 12) of the elements; ``diagonals`` (n, 6, 6) come with what sits on the nodes besides
     the elements and go with the condensed matrices; a root's is then the whole chain's as felt there.
     ``inverses`` and ``couplings`` (e, 6, 6) belong to each element's outer node: its inverse, and the inverse
     times the coupling to the inner node.

@@ -20,8 +20,8 @@ LEAST_PLAIN = 1e-4  # smaller limits are written with a power of ten
 ALIKE_RAD = 0.05  # schedules no further apart are called nearly one
 OTHER_MORPHS = {
     "swarm_morph": "optimum, the paper's swarm of 50",
-    "free_morph": "optimum, angles at the knots sought too",
-    "unsettled_morph": "optimum sought without a settling window",
+    "free_morph": "optimum, angles at the knots free too",
+    "unsettled_morph": "optimum searched without a settling window",
 }
 
 
@@ -83,7 +83,7 @@ def schedules(results: Results) -> list[Document]:
         other, flexible = results[name], flown(results)[name]["variation_rad2"]
         variation = dict(other["variation"]["optimum"])
         if other["morph"]["settle_s"] != SETTLE_S:
-            variation = dict.fromkeys(variation)  # sought, and summed, over another window
+            variation = dict.fromkeys(variation)  # searched, and summed, over another window
         rows.append(
             {
                 "name": name,

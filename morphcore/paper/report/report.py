@@ -5,26 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from morphcore.export import paper_plots, schedule_plots, study_plots
 from morphcore.export.figure import rendered
-from morphcore.export.paper_plots import (
-    front_figure,
-    independent_figure,
-    search_figure,
-    truth_figure,
-    verification_figure,
-)
-from morphcore.export.schedule_plots import departure_figure, schedule_figure
-from morphcore.export.study_plots import study_figure
-from morphcore.paper import asked, scenario
-from morphcore.paper.asked import Asked, asked_figures, held_out_ratios, ratio
+from morphcore.paper import requirements, scenario
 from morphcore.paper.report import facts, numbers
+from morphcore.paper.requirements import Requirement, held_out_ratios, judged_requirements, ratio
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Finished
 from morphcore.paper.truth import samples_of
@@ -47,16 +38,7 @@ SECTIONS = {  # templates and their headings
     "differences": "What differs from the paper, and why",
     "provenance": "How this report was made",
 }
-PLOTS = SimpleNamespace(
-    departure_figure=departure_figure,
-    front_figure=front_figure,
-    independent_figure=independent_figure,
-    schedule_figure=schedule_figure,
-    search_figure=search_figure,
-    study_figure=study_figure,
-    truth_figure=truth_figure,
-    verification_figure=verification_figure,
-)
+FORMATS = ("milliseconds", "minutes", "mrad", "number", "percent", "prettified", "signed_percent")
 
 
 def templates() -> Environment:
@@ -73,25 +55,21 @@ def templates() -> Environment:
         "flight_label": lambda name: labels.get(name, name),
         "fmt": format,
         "max_or_none": _max_or_none,
-        "milliseconds": numbers.milliseconds,
-        "minutes": numbers.minutes,
-        "mrad": numbers.mrad,
         "negated": lambda value: None if value is None else -value,
-        "number": numbers.number,
-        "percent": numbers.percent,
-        "prettified": numbers.prettified,
         "ratio": ratio,
-        "signed_percent": numbers.signed_percent,
+        **{name: getattr(numbers, name) for name in FORMATS},
     }
     found.globals |= {
         "COMMON_FLIGHT": COMMON_FLIGHT,
         "STEP_S": STEP_S,
-        "asked": asked,
+        "requirements": requirements,
         "facts": facts,
         "nothing": numbers.NOTHING,
+        "paper_plots": paper_plots,
         "picture": _picture,
-        "plots": PLOTS,
         "scenario": scenario,
+        "schedule_plots": schedule_plots,
+        "study_plots": study_plots,
     }
     return found
 
@@ -123,7 +101,7 @@ def report_page(settings: PaperSettings, finished: Mapping[str, Finished]) -> st
             finished=finished,
             results=results,
             total_s=total_s(finished),
-            asked_figures=asked_of(settings, finished),
+            judged_requirements=requirements_of(settings, finished),
             held_out=held_out_ratios(results["identification"]).values(),
         )
     )
@@ -134,21 +112,21 @@ def total_s(finished: Mapping[str, Finished]) -> float:
     return sum(done.wall_s for done in finished.values())
 
 
-def asked_of(settings: PaperSettings, finished: Mapping[str, Finished]) -> list[Asked]:
-    """The asked figures of a finished run."""
+def requirements_of(settings: PaperSettings, finished: Mapping[str, Finished]) -> list[Requirement]:
+    """The requirements of a finished run."""
     results = {name: done.result for name, done in finished.items()}
-    return asked_figures(results, total_s=total_s(finished), quick=settings.quick)
+    return judged_requirements(results, total_s=total_s(finished), quick=settings.quick)
 
 
 def summary_document(settings: PaperSettings, finished: Mapping[str, Finished]) -> Document:
-    """The run for machines: settings, machine, asked figures, seconds of each stage."""
+    """The run for machines: settings, machine, requirements, seconds of each stage."""
     where = list(finished.values())[-1].where
     return {
         "quick": settings.quick,
         "seed": settings.seed,
         "core": settings.core,
         **where,
-        "asked": [each.to_document() for each in asked_of(settings, finished)],
+        "asked": [each.to_document() for each in requirements_of(settings, finished)],
         "stages_s": {name: done.wall_s for name, done in finished.items()},
         "total_s": total_s(finished),
     }

@@ -17,8 +17,7 @@ from app.database import downgrade
 from app.health import metrics
 from app.health import service as health
 from app.health.broker import broker_state
-from app.health.presence import Sign, note_started, note_stopped
-from app.health.processes import process_identity
+from app.health.presence import Sign, note_started, note_stopped, process_identity
 from app.jobs import store
 from app.jobs.reaper import reap
 from app.settings import Settings

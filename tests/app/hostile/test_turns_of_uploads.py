@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from app.main import BODIES_AT_ONCE
+from app.http.body_limit import BODIES_AT_ONCE
 from app.parsing import pool
 from app.settings import Settings
 from tests.app.calls import JSON, fault

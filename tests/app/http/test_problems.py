@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from app.http.prefer import wait_seconds
+from app.http.parameters import wait_seconds
 from app.http.problems import install_problem_handlers
 from app.schemas.problem import Problem
 from morphdata.refusals import escaped

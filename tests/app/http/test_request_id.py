@@ -8,8 +8,9 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
+from app.http.middleware import MAX_ID_CHARACTERS, RequestId
 from app.http.problems import install_problem_handlers
-from app.http.request_id import MAX_CHARACTERS, RequestId, current_request_id
+from app.observability.context import current_request_id
 from tests.app.running_service import RunningService
 
 
@@ -24,7 +25,7 @@ def test_a_sane_id_comes_back(service: RunningService) -> None:
 
 @pytest.mark.parametrize(
     "insane",
-    [b"", b"a b", b'"; drop', b"a" * (MAX_CHARACTERS + 1), "é".encode(), b"-rf", b"a\tb", b"{}", b"%0a"],
+    [b"", b"a b", b'"; drop', b"a" * (MAX_ID_CHARACTERS + 1), "é".encode(), b"-rf", b"a\tb", b"{}", b"%0a"],
 )
 def test_an_insane_id_is_replaced(service: RunningService, insane: bytes) -> None:
     """What is too long or could mean something to a log or a shell gives way to an id of our own."""

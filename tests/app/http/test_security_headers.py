@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from app.http.security_headers import HSTS, SecurityHeaders
+from app.http.middleware import HSTS, SecurityHeaders
 from tests.app.running_service import RunningService
 
 

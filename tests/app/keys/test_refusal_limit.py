@@ -50,7 +50,7 @@ def test_addresses_do_not_answer_for_one_another() -> None:
 def test_a_key_that_opened_is_never_held_up() -> None:
     """Others' guesses from the same office do not lock out who works there, until the key itself is ended."""
     limit = RefusalLimit(Clock())
-    limit.note_opened("203.0.113.5", "mine")
+    limit.note_valid("203.0.113.5", "mine")
     while tried(limit, "203.0.113.5"):
         pass
     assert limit.wait_s("203.0.113.5", "mine") == 0
@@ -73,5 +73,5 @@ def test_memory_is_bounded() -> None:
     for number in range(REMEMBERED + 50):
         address = f"10.{number >> 16}.{number >> 8 & 255}.{number & 255}"
         limit.note_refused(address)
-        limit.note_opened(address, "mine")
-    assert len(limit._buckets) == len(limit._opened) == REMEMBERED
+        limit.note_valid(address, "mine")
+    assert len(limit._buckets) == len(limit._valid) == REMEMBERED

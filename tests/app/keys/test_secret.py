@@ -37,9 +37,9 @@ def test_only_its_own_digest_is_opened() -> None:
     """A secret opens the SHA-256 of itself and nothing else."""
     key, other = KeyText.new(), KeyText.new()
     assert key.digest() == hashlib.sha256(key.secret.encode()).hexdigest()
-    assert key.opens(key.digest())
-    assert not key.opens(other.digest())
-    assert not key.opens("")
+    assert key.matches(key.digest())
+    assert not key.matches(other.digest())
+    assert not key.matches("")
 
 
 def test_a_secret_is_not_shown_by_accident() -> None:

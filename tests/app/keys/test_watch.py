@@ -50,7 +50,7 @@ def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
         watch = KeyWatch(database, on_lost=told.append)
 
         async def wait(in_use: KeyInUse) -> None:
-            async with in_use.while_it_opens():
+            async with in_use.while_valid():
                 await asyncio.sleep(3600.0)
 
         with watch.use(mine) as first, watch.use(other) as second:
@@ -65,7 +65,7 @@ def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
                 task.cancel()
             if first.lost:
                 with pytest.raises(Unauthorized):
-                    first.must_open()
+                    first.require_valid()
                 with pytest.raises(Unauthorized):
                     await wait(first)
             return ended == [True] and first.lost, second.lost
@@ -93,7 +93,7 @@ def test_other_ends_of_a_wait_stay_what_they_are() -> None:
 
     async def play() -> None:
         with pytest.raises(TimeoutError):
-            async with KeyInUse().while_it_opens(), asyncio.timeout(0.0):
+            async with KeyInUse().while_valid(), asyncio.timeout(0.0):
                 await asyncio.sleep(1.0)
 
     asyncio.run(play())

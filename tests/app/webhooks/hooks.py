@@ -21,7 +21,7 @@ from app.webhooks.outbox import note_challenge, note_end
 from app.webhooks.posting import Timeouts
 from app.webhooks.schemas import EVERY_EVENT
 from app.webhooks.sender import SenderSettings, WebhookSender
-from app.webhooks.signature import new_secret
+from app.webhooks.service import new_secret
 from tests.app.webhooks.receiver import TO_LOOPBACK
 
 OWNER = "local"

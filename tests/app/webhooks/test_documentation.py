@@ -13,9 +13,8 @@ from standardwebhooks import Webhook
 
 from app.database import Database
 from app.webhooks.retries import DELAYS_S, MAX_RETRY_AFTER_S, MAX_TRIES
-from app.webhooks.sender import SenderSettings
-from app.webhooks.service import MAX_WEBHOOKS
-from app.webhooks.signature import new_secret, signed_headers
+from app.webhooks.sender import SenderSettings, signed_headers
+from app.webhooks.service import MAX_WEBHOOKS, new_secret
 from tests.app.webhooks.hooks import challenged_hook, deliveries, hook_row, many_ends, send_due
 from tests.app.webhooks.receiver import content, receiver
 

@@ -15,7 +15,8 @@ from standardwebhooks import Webhook, WebhookVerificationError
 
 from app.webhooks.addresses import AddressPolicy
 from app.webhooks.posting import MAX_ANSWER_BYTES, Answer, Poster, Timeouts
-from app.webhooks.signature import new_secret, signed_headers
+from app.webhooks.sender import signed_headers
+from app.webhooks.service import new_secret
 from tests.app.webhooks.receiver import HOST, TO_LOOPBACK, Authority, Receiver, at_loopback, receiver, status
 
 BODY = b'{"type":"webhook.test"}'
@@ -43,8 +44,8 @@ def post(
     """Post once, believing `authority` or the usual ones."""
 
     async def once() -> Answer:
-        async with Poster(policy, authority and authority.trust(), timeouts) as poster:
-            return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
+        poster = Poster(policy, authority and authority.trust(), timeouts or Timeouts())
+        return await poster.post(url, {"webhook-id": "msg_1"}, BODY)
 
     return asyncio.run(once())
 

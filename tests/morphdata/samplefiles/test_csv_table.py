@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from morphcore.export.curves import curve_table
-from morphcore.export.schedule_tables import schedule_tables
+from morphcore.export.curves import curve_table, schedule_tables
 from morphcore.simulate.flight import write_trajectory_csv
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphdata.samplefiles.csv_table import CONTROL, FORMULA_STARTS, neutral, write_table
@@ -79,7 +78,7 @@ def test_no_table_of_ours_holds_a_formula(tmp_path: Path, name: str) -> None:
         "flights": {name: {name: angles}},
     }
     sample = {"name": name, "time_s": t.tolist(), "measured": angles}
-    texts = [(tmp_path / "flight.csv").read_text(), curve_table(sample)]
+    texts = [(tmp_path / "flight.csv").read_text(), curve_table(sample).decode()]
     texts += [table.decode() for table in schedule_tables(curves).values()]
     for text in texts:
         assert all(map(harmless, cells(text)))

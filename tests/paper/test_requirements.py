@@ -1,4 +1,4 @@
-"""The table of what was asked: computed from the stages, judged by its limits."""
+"""The table of requirements: computed from the stages, judged by its limits."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import json
 
 import pytest
 
-from morphcore.paper.asked import Asked, asked_figures
+from morphcore.paper.requirements import Requirement, judged_requirements
 from tests.paper import made_up
 
 
-def by_name(made: dict[str, made_up.Document], *, quick: bool = True) -> dict[str, Asked]:
-    """Give the asked figures of made-up results by what they are."""
-    return {each.what: each for each in asked_figures(made, total_s=100.0, quick=quick)}
+def by_name(made: dict[str, made_up.Document], *, quick: bool = True) -> dict[str, Requirement]:
+    """Give the requirements of made-up results by what they are."""
+    return {each.what: each for each in judged_requirements(made, total_s=100.0, quick=quick)}
 
 
-def one(made: dict[str, made_up.Document], words: str) -> Asked:
+def one(made: dict[str, made_up.Document], words: str) -> Requirement:
     """Give the one figure whose description holds some words."""
     (found,) = [each for what, each in by_name(made).items() if words in what]
     return found
@@ -23,8 +23,12 @@ def one(made: dict[str, made_up.Document], words: str) -> Asked:
 
 def test_a_limit_is_kept_on_its_own_side() -> None:
     """At most and at least; the limit itself is kept; what was not measured is not judged."""
-    assert [Asked("", 1.0, value).met for value in (0.9, 1.0, 1.1, None)] == [True, True, False, None]
-    assert [Asked("", 1.0, value, at_least=True).met for value in (0.9, 1.0, 1.1)] == [False, True, True]
+    assert [Requirement("", 1.0, value).met for value in (0.9, 1.0, 1.1, None)] == [True, True, False, None]
+    assert [Requirement("", 1.0, value, at_least=True).met for value in (0.9, 1.0, 1.1)] == [
+        False,
+        True,
+        True,
+    ]
 
 
 def test_every_figure_comes_from_its_stage() -> None:

@@ -1,4 +1,4 @@
-"""What was asked of this reproduction, beside what this run measured; nothing is judged by hand."""
+"""The requirements on this reproduction next to what this run measured; nothing is judged by hand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FULL_RUN_S, QUICK_RUN_S = 3600.0, 300.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class Requirement:
     """One figure: what it is, its limit, what was measured (None: nothing), in ``unit``.
 
     at_least : the limit is a least value, not a largest one.
@@ -52,8 +52,8 @@ class Asked:
         return {**vars(self), "met": self.met}
 
 
-def asked_figures(results: Results, *, total_s: float, quick: bool) -> list[Asked]:
-    """Every asked figure that the stages at hand can tell.
+def judged_requirements(results: Results, *, total_s: float, quick: bool) -> list[Requirement]:
+    """Every requirement whose stage is at hand, with its measured value.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def asked_figures(results: Results, *, total_s: float, quick: bool) -> list[Aske
         *_held_out(results.get("identification")),
         *_computation(results.get("computation")),
         *_morph(results.get("morph")),
-        Asked("this run, all stages together", QUICK_RUN_S if quick else FULL_RUN_S, total_s, "s"),
+        Requirement("this run, all stages together", QUICK_RUN_S if quick else FULL_RUN_S, total_s, "s"),
     ]
 
 
@@ -91,62 +91,64 @@ def batch_share(computation: Document) -> float:
     return float(computation["batch"]["flight_s"] / flexible["total_s"])
 
 
-def _convergence(truth: Document | None) -> Iterator[Asked]:
+def _convergence(truth: Document | None) -> Iterator[Requirement]:
     limits = {"elements doubled": ELEMENTS_MRAD, "step halved": STEP_MRAD}
     for row in [] if truth is None else truth["convergence"]["rows"]:
         if row["what"] in limits:
             moved = MRAD * max(row["max_abs_rad"].values())
-            yield Asked(
+            yield Requirement(
                 f"flexible model, {row['what']}: attitude moves by", limits[row["what"]], moved, "mrad"
             )
 
 
-def _independent(found: Document | None) -> Iterator[Asked]:
+def _independent(found: Document | None) -> Iterator[Requirement]:
     if found is None or not found["available"]:
         return
     law = next(law for law in found["laws"] if law["core"] == THEIR_CORE)
     theirs = found["theirs"]["tip_z_m"]
     if theirs:
         off = PERCENT * abs(law["trim"]["tip_z_m"] / theirs - 1.0)
-        yield Asked("another program's trim, nothing fitted: tip deflection off by", TIP_PERCENT, off, "%")
+        yield Requirement(
+            "another program's trim, nothing fitted: tip deflection off by", TIP_PERCENT, off, "%"
+        )
     for flown in law["flights"]:
         shares = [share for share in flown["worst_share"].values() if share is not None]
         if len(shares) > 1:
             worst = PERCENT * max(shares)
-            yield Asked(
+            yield Requirement(
                 f"its flight {flown['sample']}: worst angle off by, of its range", ANGLE_PERCENT, worst, "%"
             )
         else:
             rms = MRAD * flown["rms_rad"]["theta"]
-            yield Asked(f"its flight {flown['sample']}: RMS of pitch", PITCH_RMS_MRAD, rms, "mrad")
+            yield Requirement(f"its flight {flown['sample']}: RMS of pitch", PITCH_RMS_MRAD, rms, "mrad")
 
 
-def _held_out(identification: Document | None) -> Iterator[Asked]:
+def _held_out(identification: Document | None) -> Iterator[Requirement]:
     ratios: Mapping[str, float | None] = {} if identification is None else held_out_ratios(identification)
     labels = {each.name: each.label for each in paper_flights()}
     for name, value in ratios.items():
         what = f"{labels.get(name, name)}, held out: J of the equivalent over J of the rigid model"
-        yield Asked(what, HELD_OUT_RATIO, value)
+        yield Requirement(what, HELD_OUT_RATIO, value)
 
 
-def _computation(found: Document | None) -> Iterator[Asked]:
+def _computation(found: Document | None) -> Iterator[Requirement]:
     if found is None:
         return
     row = found["flights"][0]
     shares = {part: PERCENT * flight_share(row, "equivalent", part) for part in ("fly_s", "total_s")}
     one = "computation of one equivalent flight of 2 s, of the flexible one's"
-    yield Asked(f"{one}: the flight alone", FLIGHT_PERCENT, shares["fly_s"], "%")
-    yield Asked(f"{one}: with lattice and trim", FLIGHT_PERCENT, shares["total_s"], "%")
+    yield Requirement(f"{one}: the flight alone", FLIGHT_PERCENT, shares["fly_s"], "%")
+    yield Requirement(f"{one}: with lattice and trim", FLIGHT_PERCENT, shares["total_s"], "%")
     batch = PERCENT * batch_share(found)
-    yield Asked("the same in a batch, with lattice and trim", BATCH_PERCENT, batch, "%")
+    yield Requirement("the same in a batch, with lattice and trim", BATCH_PERCENT, batch, "%")
     flexible = row["models"]["flexible"]["wall_s"]
-    yield Asked("flexible flight of 2 s on one core", FLEXIBLE_FLIGHT_S, flexible, "s")
+    yield Requirement("flexible flight of 2 s on one core", FLEXIBLE_FLIGHT_S, flexible, "s")
 
 
-def _morph(found: Document | None) -> Iterator[Asked]:
+def _morph(found: Document | None) -> Iterator[Requirement]:
     if found is None:
         return
-    yield Asked(
+    yield Requirement(
         "optimised morph: attitude variation below constant rate by, flown in the flexible model",
         REDUCTION_PERCENT,
         found["reduction_percent"],
@@ -155,6 +157,8 @@ def _morph(found: Document | None) -> Iterator[Asked]:
     )
     checked = found["checked"]
     limit = found["limits"]["max_rate_rad_s"]
-    yield Asked("its largest rate", limit, checked["max_rate_rad_s"], "rad/s")
-    yield Asked("its fastest backward turn", BACKWARD_RAD_S, max(0.0, -checked["min_rate_rad_s"]), "rad/s")
-    yield Asked("found in", SEARCH_S, checked["found_s"], "s")
+    yield Requirement("its largest rate", limit, checked["max_rate_rad_s"], "rad/s")
+    yield Requirement(
+        "its fastest backward turn", BACKWARD_RAD_S, max(0.0, -checked["min_rate_rad_s"]), "rad/s"
+    )
+    yield Requirement("found in", SEARCH_S, checked["found_s"], "s")
