@@ -169,6 +169,18 @@ class FlightPlan(Shown):
             ),
         )
 
+    def instants(self, rows: NDArray[np.int64]) -> FlightPlan:
+        """What the plan has at some grid times alone, to evaluate there; it cannot be flown."""
+        return replace(
+            self,
+            angles=self.angles[rows],
+            rates=self.rates[rows],
+            accelerations=self.accelerations[rows],
+            hinges=np.ascontiguousarray(self.hinges[rows]),
+            wind_N=np.ascontiguousarray(self.wind_N[rows]),
+            table=replace(self.table, position=self.table.position[rows]),
+        )
+
     @property
     def mean_accelerations(self) -> Array:
         """(steps, s) mean acceleration of the hinges over each step, rad/s^2."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,22 +18,42 @@ Array = NDArray[np.float64]
 LARGEST_SPEED_RATIO = 10.0  # of the airspeed at the start: no glide gets there
 
 
+Part = Literal["twist", "loads"]  # of a record: what models leave out unless it is requested
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Accelerations and hinge torques at the output times (k times, s surfaces).
+
+    velocity_rate_B : (k, 3) time derivative of the components in B of the reference point's velocity, m/s^2.
+    hinge_torque : (k, s) of the motors along the hinges' positive coordinates, N m, 0 without a hinge; None
+    of the flexible model.
+    """
+
+    velocity_rate_B: Array
+    hinge_torque: Array | None = None
+
+
 @dataclass(frozen=True)
 class FlightRecord:
     """A flown flight at its output times (k times, s surfaces).
 
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
-    point; angles : (k, s) of the hinges, rad; tips_z : (k, s) tips below their roots along z of B, m.
-    trim : the start.
+    point; wind_N : (k, 3) m/s of the air there; angles : (k, s) of the hinges, rad; tips_z : (k, s) tips
+    below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the tips against their
+    roots, nose up, rad, and loads : both None unless requested (`Part`).
     """
 
     euler: Array
     omega_B: Array
     velocity_N: Array
     position_N: Array
+    wind_N: Array
     angles: Array
     tips_z: Array
     trim: Trim
+    tips_twist: Array | None = None
+    loads: Loads | None = None
 
 
 def require_sound(
@@ -55,17 +76,15 @@ def require_sound(
         raise FlightDiverged(time_s=float(times[max(int(np.argmin(sound)) - 1, 0)]))
 
 
-def recorded_trajectory(aircraft: Aircraft, times: Array, record: FlightRecord) -> Trajectory:
-    """The trajectory, columns as the example flights; each side's wing is its first hinged surface."""
-    columns = np.concatenate([record.omega_B, record.velocity_N, record.position_N], axis=1)
-    names = ("p", "q", "r", "vx", "vy", "vz", "x", "y", "z")
-    extra = {name: column.copy() for name, column in zip(names, columns.T, strict=True)}
+def recorded_trajectory(
+    aircraft: Aircraft, times: Array, record: FlightRecord, extra: dict[str, Array]
+) -> Trajectory:
+    """The trajectory with some further columns; each side's wing is its first hinged surface."""
     sweeps = {"left": np.zeros(times.size), "right": np.zeros(times.size)}
     for side in sweeps:
         for number, surface in enumerate(aircraft.surfaces):
             if surface.side == side and surface.hinge is not None:
                 sweeps[side] = record.angles[:, number].copy()
-                extra[f"tip_{side}_z"] = record.tips_z[:, number].copy()
                 break
     phi, theta, psi = record.euler.T.copy()
     trajectory = Trajectory(
