@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from morphdata.base import Angle, Document, Length, Position, Text
+from morphdata.base import Document, Length, Position, Text
+from morphdata.drives import MAX_HINGES, Drive, Hinge, Side, drive_faults, drives_of
 from morphdata.faults import Fault
 
-HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
 MAX_SURFACES = 16
 
 EXAMPLE_MATERIAL: dict[str, Any] = {
@@ -173,41 +173,11 @@ class Section(Document):
             )
 
 
-class Hinge(Document):
-    """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence."""
-
-    position_m: Position = Field(
-        description="From the fuselage reference point, body axes (forward, right, down)."
-    )
-    axis: Literal["x", "y", "z"]
-    min_rad: Angle = Field(
-        default=-HINGE_RANGE_RAD, description="Least angle; samples beyond it are refused."
-    )
-    max_rad: Angle = Field(
-        default=HINGE_RANGE_RAD, description="Greatest angle; samples beyond it are refused."
-    )
-
-    @property
-    def axis_index(self) -> int:
-        """0, 1 or 2 for x, y, z."""
-        return "xyz".index(self.axis)
-
-    def faults(self) -> Iterator[Fault]:
-        """The range has a width."""
-        if self.min_rad >= self.max_rad:
-            yield Fault(
-                "range_upside_down",
-                f"min_rad {self.min_rad:g} is not below max_rad {self.max_rad:g}.",
-                "/min_rad",
-                "Swap them, or correct one.",
-            )
-
-
 class Surface(Document):
     """A lifting surface, hinged (it morphs) or fixed (a tail)."""
 
     name: Text
-    side: Literal["right", "left"]
+    side: Side
     span_m: Length
     chord_m: Chord | None = Field(
         default=None, description="Uniform chord, or the chord where root or tip is not given."
@@ -225,9 +195,14 @@ class Surface(Document):
         description="Line of the sections' centres of mass aft of mid-chord, m; negative: forward of it.",
     )
     profile_drag: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
-    hinge: Hinge | None = None
+    hinge: Hinge | None = Field(default=None, description="The only hinge; `hinges` takes several.")
+    hinges: Annotated[list[Hinge], Field(min_length=1, max_length=MAX_HINGES)] | None = Field(
+        default=None,
+        description="From the fuselage outward; each carries those after it and the whole surface. What is "
+        "between them has neither mass nor lift.",
+    )
     position_m: Position | None = Field(
-        default=None, description="Root of a fixed surface, which has no hinge."
+        default=None, description="Root at mid-chord; at the last hinge where it is left out."
     )
     flexible: bool = True
 
@@ -239,8 +214,17 @@ class Surface(Document):
 
     @property
     def root_m(self) -> list[float]:
-        """Where the root's mid-chord is in the unswept aircraft, body axes: at the hinge where not said."""
-        return self.position_m or (self.hinge.position_m if self.hinge else [0.0, 0.0, 0.0])
+        """Where the root's mid-chord is before any hinge moves, body axes: at the last hinge if not given."""
+        return self.position_m or (self.all_hinges[-1].position_m if self.all_hinges else [0.0, 0.0, 0.0])
+
+    @property
+    def all_hinges(self) -> tuple[Hinge, ...]:
+        """Hinges from the fuselage outward; none of a fixed surface."""
+        return tuple(self.hinges or ()) if self.hinge is None else (self.hinge,)
+
+    def hinge_pointer(self, number: int) -> str:
+        """Return where a hinge stands in the document."""
+        return f"/hinges/{number}" if self.hinge is None else "/hinge"
 
     def faults(self) -> Iterator[Fault]:
         """The chord is known, the surface is attached, its axes lie within reach of the chord."""
@@ -259,7 +243,14 @@ class Surface(Document):
                     f"/{name}",
                     "It is counted from mid-chord, in m, aft positive.",
                 )
-        if self.hinge is None and self.position_m is None:
+        if self.hinge is not None and self.hinges is not None:
+            yield Fault(
+                "given_twice",
+                "hinge and hinges are both given.",
+                "/hinges",
+                "Leave hinge out, and put it into the list.",
+            )
+        if not self.all_hinges and self.position_m is None:
             yield Fault(
                 "missing",
                 f"{self.name!r} has neither a hinge nor a position.",
@@ -277,8 +268,14 @@ class Aircraft(Document):
     fuselage: Fuselage
     surfaces: list[Surface] = Field(min_length=1, max_length=MAX_SURFACES)
 
+    @property
+    def drives(self) -> dict[str, Drive]:
+        """What can be moved, by name."""
+        return drives_of(self.surfaces)
+
     def faults(self) -> Iterator[Fault]:
-        """No two surfaces have one name."""
+        """No two surfaces have one name, and each drive turns like hinges."""
+        yield from drive_faults(self.surfaces)
         names: set[str] = set()
         for number, surface in enumerate(self.surfaces):
             if surface.name in names:

@@ -91,7 +91,7 @@ CHANNELS: list[ChannelFacts] = [
     ChannelFacts(
         "hinge_torque",
         "N m",
-        "Torque of the hinge's drive, along its positive coordinate.",
+        "Torque of the drive's motors, along its positive coordinate.",
         per="drive",
         models=CHAINS,
     ),

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, FailFast, Field
 
 from morphdata.base import MAX_ROWS, MIN_ROWS, Angle, Document
+from morphdata.drives import SIDES
 from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
 from morphdata.samplefiles.reading import place_in, read_file
@@ -18,7 +19,6 @@ from morphdata.vehicle import HingeRange
 MAX_DURATION_S = LONGEST_FLIGHT_S
 MAX_KNOTS = 1000
 DEFAULT_RAMP_S = 0.1
-SIDES = ("left", "right")
 SCHEDULE_COLUMNS = ("t", "sweep_left", "sweep_right")
 
 EXAMPLE_SCHEDULE: dict[str, Any] = {

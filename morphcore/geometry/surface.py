@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from morphcore.geometry.section import SectionProperties, given_section, solid_box
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
-from morphdata.aircraft import Hinge, Material, Section
+from morphdata.aircraft import Material, Section
+from morphdata.drives import Hinge
 from morphdata.vehicle import ANGLE_TOLERANCE_RAD
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ B : body axes, forward, right, down, with the origin at the reference point. N :
   lift bends up. ``tip_left_z``, ``tip_right_z`` : of the first hinged surface of a side.
 - ``tip_twist`` : the torsion of the rotation Rx(flap) Ry(torsion) Rz(edgewise) from the axes of a tip to
   those of its root, nose up.
-- ``hinge_torque`` : of the motor, along the hinge's positive coordinate. At a corner of a schedule's rate its
-  acceleration, and with it torque and load factor, is that of the morph.
+- ``hinge_torque`` : of a drive's motors together, along its positive coordinate. At a corner of a schedule's
+  rate the hinge's acceleration, and with it torque and load factor, is that of the morph.
 """
 
 from __future__ import annotations
@@ -39,12 +39,11 @@ from morphdata.channels import (
     column_parts,
     default_channels,
 )
+from morphdata.drives import drive_name
 from morphdata.faults import refuse
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[FlightRecord, Aircraft, Flight], Array | Mapping[str, Array]]
-
-DRIVE_WORDS = {"z": "sweep", "x": "fold", "y": "incidence"}  # by the axis of the hinge
 
 
 @dataclass(frozen=True)
@@ -204,9 +203,12 @@ def _tip_twist(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Map
 def _hinge_torque(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Mapping[str, Array]:
     assert record.loads is not None  # noqa: S101 - `needs` says so
     assert record.loads.hinge_torque is not None  # noqa: S101 - ``models`` in the documents says so
-    hinged = [(k, each) for k, each in enumerate(aircraft.surfaces) if each.hinge is not None]
-    parts = column_parts(f"{DRIVE_WORDS[each.hinge.axis]}_{each.side}" for _, each in hinged if each.hinge)
-    return {part: record.loads.hinge_torque[:, k] for part, (k, _) in zip(parts, hinged, strict=True)}
+    torques: dict[str, Array] = {}
+    for number, surface in enumerate(aircraft.surfaces):
+        if surface.hinge is not None:
+            name, own = drive_name(surface.hinge, surface.side), record.loads.hinge_torque[:, number]
+            torques[name] = torques[name] + own if name in torques else own
+    return torques
 
 
 TWIST: frozenset[Part] = frozenset({"twist"})

@@ -24,8 +24,8 @@ from morphcore.stopping import Stop
 from morphcore.threads import use_threads
 from morphcore.validity import documents
 from morphdata.channels import document_name
+from morphdata.drives import SIDES
 from morphdata.parameters import KnownModel, flown_with
-from morphdata.schedules import SIDES
 from morphdata.simulate import DEFAULT_ELEMENTS, FlexibleModel, FlightModel, SimulateRequest
 
 Array = NDArray[np.float64]

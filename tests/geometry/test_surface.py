@@ -11,8 +11,9 @@ from scipy.integrate import quad
 
 from morphcore.frames import axis_rotation
 from morphcore.geometry.surface import Surface
-from morphdata.aircraft import Hinge, Material
+from morphdata.aircraft import Material
 from morphdata.aircraft import Surface as SurfaceDocument
+from morphdata.drives import Hinge
 
 WOOD = Material(density_kg_m3=500.0, youngs_modulus_pa=2.1e9, poisson_ratio=0.3, stiffness_damping_s=0.004)
 SIDES: tuple[Literal["right", "left"], ...] = ("right", "left")

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft, Fuselage, Hinge, Surface
+from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft, Fuselage, Surface
 from morphdata.base import Document
+from morphdata.drives import Hinge
 from morphdata.faults import Fault, InvalidInput
 from morphdata.lattice import Lattice
 

@@ -12,7 +12,8 @@ from morphcore.errors import InvalidInput
 from morphcore.simulate.schedule import Hold, Spline, scheduled
 from morphcore.simulate.schedule_table import write_schedule_csv
 from morphcore.simulate.trajectory import load_trajectory
-from morphdata.schedules import SIDES, load_schedules
+from morphdata.drives import SIDES
+from morphdata.schedules import load_schedules
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -1,0 +1,291 @@
+"""Hinges, and the drives that move them: one prescribed history may turn several like hinges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Protocol
+
+from pydantic import Field
+
+from morphdata.base import Angle, Document, Position
+from morphdata.faults import Fault
+from morphdata.refusals import escaped
+
+HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
+MAX_HINGES = 4  # of one surface
+WORDS = {"x": "fold", "y": "incidence", "z": "sweep"}  # of a hinge that has no name
+SIDES = ("left", "right")
+BOTH = "both"
+# columns of samples and keys of schedules that mean something else
+RESERVED = frozenset({"t", "time", "phi", "theta", "psi", BOTH, *SIDES})
+SAME_AXIS = 1e-9  # distance of two unit vectors
+
+Side = Literal["right", "left"]
+Vector = tuple[float, float, float]
+Component = Annotated[float, Field(ge=-1e3, le=1e3)]
+
+
+class Hinge(Document):
+    """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence, a vector does any."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")] | None = Field(
+        default=None,
+        description="Name of its drive, without the side, which is appended: `droop` of a left surface is "
+        "the drive `droop_left`. Without a name an x hinge is `fold`, y `incidence` and z `sweep`.",
+    )
+    position_m: Position = Field(
+        description="From the fuselage reference point, body axes (forward, right, down), where no hinge has "
+        "moved."
+    )
+    axis: Literal["x", "y", "z"] | Annotated[list[Component], Field(min_length=3, max_length=3)] = Field(
+        description="A letter turns mirror images alike: a positive angle moves the tip aft (z) or up (x), "
+        "or the nose up (y). A vector in body axes, of any length, is turned about by the right-hand rule; "
+        "the mirror image of [x, y, z] is [-x, y, -z]."
+    )
+    kind: Literal["revolute"] = "revolute"
+    min_rad: Angle = Field(
+        default=-HINGE_RANGE_RAD, description="Smallest angle; samples beyond it are refused."
+    )
+    max_rad: Angle = Field(
+        default=HINGE_RANGE_RAD, description="Largest angle; samples beyond it are refused."
+    )
+    angle_rad: Angle = Field(default=0.0, description="Angle that is held where no history is given.")
+
+    @property
+    def word(self) -> str | None:
+        """Name without the side; None of a skew hinge that has none."""
+        return self.name or (WORDS[self.axis] if isinstance(self.axis, str) else None)
+
+    @property
+    def axis_index(self) -> int:
+        """0, 1 or 2 for x, y, z."""
+        return "xyz".index(str(self.axis))
+
+    def axis_B(self, side: str) -> Vector:
+        """Unit vector in body axes about which a positive angle turns a surface of a side."""
+        if isinstance(self.axis, str):
+            sign = 1.0 if side == "right" else -1.0
+            return {"x": (-sign, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, sign)}[self.axis]
+        x, y, z = self.axis
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
+
+    def faults(self) -> Iterator[Fault]:
+        """The axis has a direction, the range a width, and the held angle lies in it."""
+        if not isinstance(self.axis, str):
+            if not any(self.axis):
+                yield Fault(
+                    "axis_zero", "The axis has no direction.", "/axis", "Give x, y, z or a vector, not zero."
+                )
+            if self.name is None:
+                yield Fault(
+                    "missing",
+                    "A hinge about a vector needs a name.",
+                    "/name",
+                    'Name its drive, for example "cant"; only x, y and z have names of their own.',
+                )
+        if self.min_rad >= self.max_rad:
+            yield Fault(
+                "range_upside_down",
+                f"min_rad {self.min_rad:g} is not below max_rad {self.max_rad:g}.",
+                "/min_rad",
+                "Swap them, or correct one.",
+            )
+        elif not self.min_rad <= self.angle_rad <= self.max_rad:
+            yield Fault(
+                "angle_out_of_range",
+                f"The hinge is held at {self.angle_rad:g} rad, and goes from {self.min_rad:g} to "
+                f"{self.max_rad:g} rad.",
+                "/angle_rad",
+                "Give an angle inside the range, or widen min_rad and max_rad.",
+            )
+
+
+class Hinged(Protocol):
+    """What a drive knows of a surface."""
+
+    @property
+    def name(self) -> str:
+        """Of the surface."""
+
+    @property
+    def side(self) -> Any:
+        """Right or left."""
+
+    @property
+    def all_hinges(self) -> Sequence[Hinge]:
+        """From the fuselage outward."""
+
+    def hinge_pointer(self, number: int) -> str:
+        """Where a hinge stands in the surface's document."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A prescribed input: the hinges that one history turns.
+
+    Attributes
+    ----------
+    name : str
+        Key of its history, `sweep_left`.
+    word : str
+        The name without the side, `sweep`: of both sides together.
+    side : str
+    surfaces : tuple of str
+        Names of the surfaces that it moves, in the aircraft's order.
+    hinges : tuple of (int, int)
+        Number of the surface and of the hinge on it, each from 0.
+    low, high : float
+        Range that all its hinges allow, rad.
+    held : float
+        Angle of its hinges where no history is given, rad.
+    """
+
+    name: str
+    word: str
+    side: str
+    surfaces: tuple[str, ...]
+    hinges: tuple[tuple[int, int], ...]
+    low: float
+    high: float
+    held: float
+
+
+def drive_name(hinge: Hinge, side: str) -> str:
+    """Return the name of the drive that moves a hinge of a surface of a side."""
+    word = hinge.word or ""
+    return word if word.endswith((f"_{SIDES[0]}", f"_{SIDES[1]}")) else f"{word}_{side}"
+
+
+def drives_of(surfaces: Sequence[Hinged]) -> dict[str, Drive]:
+    """Return the drives of an aircraft's surfaces by name, in the order of the hinges."""
+    found: dict[str, Drive] = {}
+    for number, surface in enumerate(surfaces):
+        for place, hinge in enumerate(surface.all_hinges):
+            name = drive_name(hinge, surface.side)
+            word = name.removesuffix(f"_{surface.side}")
+            former = found.get(name, Drive(name, word, surface.side, (), (), -math.inf, math.inf, 0.0))
+            found[name] = Drive(
+                name,
+                word,
+                surface.side,
+                (*former.surfaces, surface.name),
+                (*former.hinges, (number, place)),
+                max(former.low, hinge.min_rad),
+                min(former.high, hinge.max_rad),
+                hinge.angle_rad,
+            )
+    return found
+
+
+def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
+    """Check that names of drives are free and belong to their side, and that one name turns like hinges."""
+    first: dict[str, tuple[Hinge, str]] = {}
+    for number, surface in enumerate(surfaces):
+        for place, hinge in enumerate(surface.all_hinges):
+            if hinge.word is None:
+                continue  # its own fault says so
+            pointer = f"/surfaces/{number}{surface.hinge_pointer(place)}/name"
+            name = drive_name(hinge, surface.side)
+            if hinge.word in RESERVED:
+                yield Fault(
+                    "name_reserved",
+                    f"A drive cannot be called {hinge.word!r}.",
+                    pointer,
+                    f"These names mean something else: {', '.join(sorted(RESERVED))}.",
+                )
+            elif not name.endswith(f"_{surface.side}"):
+                yield Fault(
+                    "wrong_side",
+                    f"{surface.name!r} is on the {surface.side} side, its drive is called {name!r}.",
+                    pointer,
+                    "Leave the side out of the name; it is appended.",
+                )
+            former, owner = first.setdefault(name, (hinge, surface.name))
+            apart = math.dist(former.axis_B(surface.side), hinge.axis_B(surface.side))
+            if apart > SAME_AXIS or former.angle_rad != hinge.angle_rad:
+                what = "axis" if apart > SAME_AXIS else "angle_rad"
+                yield Fault(
+                    "unlike_hinges",
+                    f"The drive {name!r} would turn hinges of {owner!r} and {surface.name!r} that differ in "
+                    f"their {what}.",
+                    pointer,
+                    "Give one of them another name: a drive turns its hinges alike.",
+                )
+
+
+def resolved(keys: Iterable[str], drives: Mapping[str, Drive]) -> tuple[dict[str, str], list[Fault]]:
+    """Find out which history each drive follows.
+
+    A key is the name of a drive (`sweep_left`), its word for both sides (`sweep`), or, where no other drive
+    could be meant, `both`, `left`, `right` and, as in samples of old, `sweep_left` and `sweep_right` for
+    hinges of another kind.
+
+    Parameters
+    ----------
+    keys : iterable of str
+        Of the histories.
+    drives : mapping of str to Drive
+        Of the aircraft.
+
+    Returns
+    -------
+    keys_of_drives : dict
+        Drive -> key; a drive that no key moves is not in it.
+    faults : list of Fault
+        Keys that name no drive, could mean several, or move what another key moves; at ``/key``.
+    """
+    followed: dict[str, str] = {}
+    faults = []
+    for key in keys:
+        meant, fault = _meant(key, drives)
+        if fault is not None:
+            faults.append(fault)
+        for name in meant:
+            if name in followed:
+                faults.append(
+                    Fault(
+                        "given_twice",
+                        f"{followed[name]!r} and {key!r} both move the drive {name!r}.",
+                        f"/{escaped(key)}",
+                        "Leave one of them out.",
+                    )
+                )
+                break
+            followed[name] = key
+    return followed, faults
+
+
+def _meant(key: str, drives: Mapping[str, Drive]) -> tuple[list[str], Fault | None]:
+    if key in drives:
+        return [key], None
+    of_word = [drive.name for drive in drives.values() if drive.word == key]
+    if of_word:
+        return of_word, None
+    side = key.removeprefix(f"{WORDS['z']}_")
+    if key != BOTH and side not in SIDES:
+        return [], Fault(
+            "unknown_drive",
+            f"The aircraft has no drive {key!r}.",
+            f"/{escaped(key)}",
+            f"Its drives are {shown_names(drives)}." if drives else "None of its surfaces has a hinge.",
+        )
+    candidates = [drive for drive in drives.values() if key == BOTH or drive.side == side]
+    if len({drive.word for drive in candidates}) > 1:
+        return [], Fault(
+            "ambiguous_drive",
+            f"{key!r} could mean several drives.",
+            f"/{escaped(key)}",
+            f"Name them: {shown_names(drives)}.",
+        )
+    return [drive.name for drive in candidates], None
+
+
+def shown_names(drives: Mapping[str, Drive]) -> str:
+    """Return the names of drives for people, and the words that move both sides."""
+    words = dict.fromkeys(drive.word for drive in drives.values())
+    pairs = [word for word in words if all(f"{word}_{side}" in drives for side in SIDES)]
+    both = f" (or {', '.join(pairs)} for both sides)" if pairs else ""
+    return f"{', '.join(drives)}{both}"
