@@ -188,6 +188,24 @@ class JobNotFinished(Conflict):
         )
 
 
+class ExportFailed(Conflict):
+    """The job that writes an exported file has ended without it; tells what the job tells."""
+
+    code = "export_failed"
+    title = "The model was not exported"
+
+    def __init__(self, job_id: str, job_code: str, detail: str, pointer: str, hint: str) -> None:
+        again = f"DELETE /jobs/{job_id} to have it tried again."
+        super().__init__(detail, pointer, f"{hint} {again}".strip())
+        self.code = job_code
+        self.job_id = job_id
+
+    @property
+    def members(self) -> dict[str, Any]:
+        """Where the job is."""
+        return {"job": f"/jobs/{self.job_id}"}
+
+
 class TooManyWebhooks(Conflict):
     """The owner has as many webhooks as one may have."""
 

@@ -21,7 +21,7 @@ from morphcore.identify.result import IdentifyResult
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted
 from morphcore.models.parameters_document import parameter_batch, parameters_document
 from morphcore.shown import Shown
-from morphcore.simulate.trim import Trim
+from morphcore.simulate.trim import StartMode, Trim
 from morphdata.aircraft import Aircraft
 from morphdata.export import ExportRequest, ModelFile, Origin
 from morphdata.flight import Flight
@@ -52,7 +52,7 @@ class ExportedModel(Shown):
     file: ModelFile
     chain: ChainModel
     batch: ParameterBatch
-    start: str
+    start: StartMode
 
     @classmethod
     def of(cls, request: ExportRequest) -> ExportedModel:

@@ -1,4 +1,4 @@
-"""The export format ``json``: aircraft, flight, model and origin in one document, `morphdata.export.ModelFile`."""
+"""The export format ``json``: aircraft, flight, model and origin as a `morphdata.export.ModelFile`."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ Vectors are columns, lists of names are cell arrays, and what ends in ``_index``
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy.io import savemat
@@ -28,7 +28,7 @@ def write(exported: ExportedModel) -> bytes:
         for group, table in exported.tables.items()
     }
     stream = io.BytesIO()
-    savemat(stream, structs, long_field_names=True, oned_as="column", do_compression=True)
+    savemat(cast("Any", stream), structs, long_field_names=True, oned_as="column", do_compression=True)
     return HEADER.ljust(HEADER_BYTES) + stream.getvalue()[HEADER_BYTES:]
 
 

@@ -77,7 +77,7 @@ def model_tables(file: ModelFile, chain: ChainModel, batch: ParameterBatch, foun
     return {
         "origin": _origin(file),
         "documents": {
-            name: np.array(_json(getattr(file, name).document()))
+            name: np.array(_json(getattr(file, name).model_dump(exclude_none=True)))
             for name in ("aircraft", "flight", "model")
         },
         "parameters": _parameters(chain, batch),
@@ -119,9 +119,9 @@ def _parameters(chain: ChainModel, batch: ParameterBatch) -> Table:
     return table
 
 
-def _root(surface: Surface) -> NDArray[np.float64]:
+def _root(surface: Surface) -> Array:
     """Origin of the first link in B with all hinges at zero, m."""
-    return np.array(surface.position_m) + np.array([surface.elastic_axis_x_m, 0.0, 0.0])
+    return np.asarray(np.add(surface.position_m, [surface.elastic_axis_x_m, 0.0, 0.0]))
 
 
 def _surfaces(chain: ChainModel) -> Table:

@@ -35,9 +35,7 @@ class ExportWork:
         """Give the file, and what there is to say of it."""
         with library_errors():
             document = self._export.to_document()
-            return Outcome(
-                document, {**result_file(document), self._export.format.file: self._export.data()}
-            )
+            return Outcome(document, {**result_file(document), self._export.format.file: self._export.data()})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
         """Give nothing: half a file is no result."""
