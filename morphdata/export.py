@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -12,13 +12,18 @@ from morphdata.base import Document, Identifier, Result, Text
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
-from morphdata.formats import FormatName
+from morphdata.formats import FORMATS
 from morphdata.options import OUTPUT, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, Parameters, flown_with
 from morphdata.vehicle import model_surfaces_faults, start_faults
 from morphdata.version import VERSION
 
 MAX_FITS = 1000
+if TYPE_CHECKING:
+    FormatName = str
+else:  # type checkers see no choices that come from a list
+    FormatName = Literal[tuple(each.name for each in FORMATS)]
+
 NOTICE = "Equivalent model of a morphing aircraft, identified and written by MorphID."
 
 EXAMPLE_EXPORT: dict[str, Any] = {

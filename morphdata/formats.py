@@ -7,7 +7,6 @@ The module holds one function, ``write(exported) -> bytes``, that the format's `
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +63,6 @@ FORMATS: list[ExportFormat] = [
         "morphcore.export.json_file:write",
     ),
 ]
-
-if TYPE_CHECKING:
-    FormatName = str
-else:  # type checkers see no choices that come from a list
-    FormatName = Literal[tuple(each.name for each in FORMATS)]
 
 
 def format_named(name: str) -> ExportFormat:

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import MAX_ROWS, MIN_ROWS, Document, Result
-from morphdata.channels import CHANNELS_TEXT, RequestedChannels, channels_faults
+from morphdata.channel_choice import CHANNELS_TEXT, RequestedChannels, channels_faults
 from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault

@@ -21,7 +21,8 @@ from app.jobs.schemas import Job
 from app.keys.records import Scope
 from app.models import repository, service
 from app.models.schemas import IdentifiedModel, ModelPage
-from morphdata.formats import FORMATS, FormatName, format_named
+from morphdata.export import FormatName
+from morphdata.formats import FORMATS, format_named
 
 router = APIRouter(tags=["models"])
 

@@ -32,13 +32,8 @@ from numpy.typing import NDArray
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.record import FlightRecord, Part
-from morphdata.channels import (
-    ChannelChoice,
-    channel_facts,
-    channels_faults,
-    column_parts,
-    default_channels,
-)
+from morphdata.channel_choice import ChannelChoice, channels_faults
+from morphdata.channels import channel_facts, column_parts, default_channels
 from morphdata.drives import drive_name
 from morphdata.faults import refuse
 
