@@ -28,7 +28,8 @@ def refusal(**hinges: Any) -> tuple[str, str]:
     """Code and pointer of the first fault."""
     with pytest.raises(InvalidInput) as caught:
         aircraft(**hinges)
-    return caught.value.code, caught.value.pointer
+    fault = caught.value.faults[0]
+    return fault.code, fault.pointer
 
 
 def test_the_old_hinge_is_a_list_of_one() -> None:
