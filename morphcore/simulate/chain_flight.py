@@ -53,7 +53,7 @@ def chain_flight(
     rows, chunks, states = JOINTS + flown.coordinates, [], []
     wanted = flown.state_rows if "loads" in parts else rows
     for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
-        chunks.append(chunk.rows[:, :rows, 0])
+        chunks.append(chunk.rows[:, :rows, 0].copy())  # a view would keep the whole states
         if "loads" in parts:  # of the whole states only what is reported is kept
             inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
             states.append(chunk.rows[at[inside] - chunk.first, :, 0])

@@ -18,6 +18,7 @@ from tests.app.request_documents import (
     RESULT,
     SIMULATE_RESULT,
     STUDY_RESULT,
+    export_document,
     identify_document,
     optimize_document,
     simulate_document,
@@ -31,6 +32,7 @@ REQUESTS = [
     ("StudyRequest", study_document),
     ("SimulateRequest", simulate_document),
     ("OptimizeRequest", optimize_document),
+    ("ExportRequest", export_document),
 ]
 RESULTS = [RESULT, STUDY_RESULT, SIMULATE_RESULT, OPTIMIZE_RESULT]
 

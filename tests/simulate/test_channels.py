@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,15 @@ def test_both_lists_hold_the_same_channels() -> None:
     assert [channel.name for channel in CHANNELS] == EVERY
     assert len(set(EVERY)) == len(EVERY)
     assert {channel.unit for channel in CHANNELS} == {"rad/s", "m/s", "m", "rad", "m/s^2", "1", "N m"}
+
+
+def test_the_page_on_formats_lists_them(root: Path) -> None:
+    """docs/formats.md has a row for every channel, with its unit and meaning."""
+    text = (root / "docs" / "formats.md").read_text(encoding="utf-8")
+    per = {"": "", "surface": " (per surface)", "drive": " (per drive)"}
+    for each in KNOWN:
+        unit = "" if each.unit == "1" else each.unit
+        assert f"| `{each.name}`{per[each.per]} | {unit} | {each.description} |" in text
 
 
 def test_a_flight_without_a_request_has_the_columns_of_the_examples() -> None:
