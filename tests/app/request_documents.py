@@ -86,6 +86,11 @@ def optimize_document() -> Document:
     }
 
 
+def export_document() -> Document:
+    """Build a valid request for an export."""
+    return {**_vehicle(), "model": {"parameters": copy.deepcopy(RESULT["model"])}, "format": "npz"}
+
+
 RESULT: Document = {
     "model": {
         "links_per_wing": 2,
