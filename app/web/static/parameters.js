@@ -111,7 +111,7 @@ const FORMATS = document.body.dataset.formats.split(" ");
 async function fetchExport(path, say) {
   for (;;) {
     const answer = await request(path, { headers: { Accept: "*/*" } });
-    if (answer.status !== 202) return answer.blob();
+    if (answer.status !== 202) return answer;
     say("A job is writing the file …");
     await new Promise((wake) => setTimeout(wake, 1000 * Number(answer.headers.get("Retry-After") ?? 2)));
   }
@@ -125,8 +125,10 @@ function exportCard(model) {
   const save = async (format) => {
     say("");
     try {
-      const url = URL.createObjectURL(await fetchExport(`/models/${model}/export?format=${format}`, say));
-      element("a", { href: url, download: `${model}.${format}` }).click();
+      const answer = await fetchExport(`/models/${model}/export?format=${format}`, say);
+      const [, name] = /filename="([^"]+)"/.exec(answer.headers.get("Content-Disposition"));
+      const url = URL.createObjectURL(await answer.blob());
+      element("a", { href: url, download: name }).click();
       setTimeout(() => URL.revokeObjectURL(url), 10000);
       say("");
     } catch (error) {
