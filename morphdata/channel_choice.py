@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 else:  # type checkers see no choices that come from a list
     ChannelName = Literal[tuple(each.name for each in CHANNELS)]
 
-RequestedChannels = Annotated[list[ChannelName], Field(max_length=100)]
+RequestedChannels = Annotated[
+    list[ChannelName], Field(max_length=100, json_schema_extra={"uniqueItems": True})
+]
 CHANNELS_TEXT = (
     "Columns of the trajectory beside time, attitude and hinge angles, in this order; those of the example "
     "flights when left out."
