@@ -269,10 +269,10 @@ class MissingScope(ServiceError):
     code = "missing_scope"
     title = "The API key lacks permission"
 
-    def __init__(self, scopes: list[str]) -> None:
+    def __init__(self, missing: list[str], scopes: list[str]) -> None:
         self.scopes = scopes
         super().__init__(
-            f"The key lacks the scope {' '.join(scopes)}.",
+            f"The key lacks the scope {' '.join(missing)}.",
             "#header/Authorization",
             "Use a key with this scope: `morphid keys create --scope ...`; GET /me tells what yours may do.",
         )

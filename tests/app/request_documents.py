@@ -122,6 +122,14 @@ RESULT: Document = {
     "cost": {"rigid_flight_s": 0.1, "equivalent_flight_s": 0.2, "flexible_flight_s": None},
 }
 
+EXPORT_RESULT: Document = {
+    "format": "npz",
+    "file": "model.npz",
+    "media_type": "application/x-npz",
+    "size_bytes": 8000,
+    "sha256": "0" * 64,
+}
+
 STUDY_RESULT: Document = {
     "rows": [
         {

@@ -97,9 +97,10 @@ def test_the_api_offers_it(house: dict[str, Any]) -> None:
 
 
 def test_its_job_ends_with_it(house: dict[str, Any]) -> None:
-    """Result and table hold the channels that were requested, in their order, the unit in the result."""
-    columns = list(house["result"]["trajectory"])
-    assert columns[-2:] == ["q_rad_s", "climb_rad"]
+    """Result and table hold the channels that were requested and no other, the unit in the result."""
+    attitude = {"phi_rad", "theta_rad", "psi_rad"}
+    moved = {name for name in house["result"]["trajectory"] if name.startswith("sweep_")}
+    assert set(house["result"]["trajectory"]) - moved == {"time_s", *attitude, "q_rad_s", "climb_rad"}
     assert house["table"].splitlines()[0].split(",")[-2:] == ["q", "climb"]
     climb = np.array(house["result"]["trajectory"]["climb_rad"])
     assert abs(climb[0]) < 1e-9, "level flight at the start"
