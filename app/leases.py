@@ -24,36 +24,24 @@ LeasedRow = Row[*tuple[Any, ...]]
 
 
 class Held(Protocol):
-    """A claim: which row it is for, and with which fence."""
+    """A claim."""
 
     @property
     def key(self) -> Key:
         """Values of the table's key columns."""
-        ...
 
     @property
     def fence(self) -> int:
         """The row's fence as long as the claim holds."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """What a change means, for its subscribers.
+    """What a change means, for its subscribers."""
 
-    Attributes
-    ----------
-    event : str
-        Type of the event in the row's history.
-    payload : mapping, optional
-        Content of the event.
-    result : dict, optional
-        The document that the row ends with.
-    """
-
-    event: str
-    payload: Mapping[str, Any] | None = None
-    result: Document | None = None
+    event: str  # type of the event in the row's history
+    payload: Mapping[str, Any] | None = None  # content of the event
+    result: Document | None = None  # the document that the row ends with
 
 
 Subscriber = Callable[[Session, LeasedRow, Note], None]
@@ -61,47 +49,21 @@ Subscriber = Callable[[Session, LeasedRow, Note], None]
 
 @dataclass(eq=False)
 class LeasedTable:
-    """A table of leased work; it has the columns ``status``, ``fence`` and ``attempt``.
-
-    Attributes
-    ----------
-    table : Table
-    key : sequence of Column
-        The columns that name a row.
-    lease : Column
-        Until when the claim holds, s since 1970 UTC.
-    waiting : str
-        Status of a row that may be claimed.
-    held : sequence of str
-        Statuses while a claim holds; a claim sets the first.
-    ends : collection of str
-        Statuses that a row never leaves.
-    returning : sequence of Column
-        What the methods return of a row.
-    unheld : mapping
-        Columns with their values while nobody holds the row.
-    dated : mapping
-        Columns that every change sets.
-    noted : mapping
-        Columns that every change with a `Note` sets.
-    on_change : list of callable
-        Called after every change with a note.
-    on_end : sequence of callable, or None
-        Called after every change with a note to one of `ends`, in this order; None as long as nobody has said
-        what belongs to an end, and then no row can end.
-    """
+    """A table of leased work; it has the columns ``status``, ``fence`` and ``attempt``."""
 
     table: Table
     key: Sequence[Column[Any]]
-    lease: Column[Any]
-    waiting: str
-    held: Sequence[str]
-    ends: Collection[str]
-    returning: Sequence[Column[Any]]
-    unheld: Mapping[str, Any] = field(default_factory=dict)
-    dated: Mapping[str, Any] = field(default_factory=dict)
-    noted: Mapping[str, Any] = field(default_factory=dict)
-    on_change: list[Subscriber] = field(default_factory=list)
+    lease: Column[Any]  # until when the claim holds, s since 1970 UTC
+    waiting: str  # status of a row that may be claimed
+    held: Sequence[str]  # statuses while a claim holds; a claim sets the first
+    ends: Collection[str]  # statuses that a row never leaves
+    returning: Sequence[Column[Any]]  # what the methods return of a row
+    unheld: Mapping[str, Any] = field(default_factory=dict)  # columns and values while nobody holds the row
+    dated: Mapping[str, Any] = field(default_factory=dict)  # columns that every change sets
+    noted: Mapping[str, Any] = field(default_factory=dict)  # columns that every change with a `Note` sets
+    on_change: list[Subscriber] = field(default_factory=list)  # called after every change with a note
+    # Called, in this order, after every change with a note to one of `ends`. None until the subscribers are
+    # known (`app.on_end`); no row can end before.
     on_end: Sequence[Subscriber] | None = ()
 
     def at(self, key: Key) -> tuple[ColumnElement[bool], ...]:
@@ -111,17 +73,11 @@ class LeasedTable:
     def held_by(self, claim: Held, *statuses: str) -> tuple[ColumnElement[bool], ...]:
         """Conditions that select the row of a claim as long as the claim holds.
 
-        Parameters
-        ----------
-        *statuses
-            In place of the table's own `held`.
+        ``statuses`` take the place of the table's own `held`.
         """
         columns = self.table.c
-        return (
-            *self.at(claim.key),
-            columns.fence == claim.fence,
-            columns.status.in_(statuses or self.held),
-        )
+        holds = columns.fence == claim.fence, columns.status.in_(statuses or self.held)
+        return (*self.at(claim.key), *holds)
 
     def lost(self, now: ColumnElement[float]) -> ColumnElement[bool]:
         """Whether a row's lease ran out before its holder gave it up."""
@@ -130,21 +86,9 @@ class LeasedTable:
     def change(
         self, session: Session, *conditions: ColumnElement[bool], note: Note | None = None, **values: Any
     ) -> LeasedRow | None:
-        """Compare-and-set on one row.
+        """Set columns of the row that the conditions select, and return the row as it is now (`returning`).
 
-        Parameters
-        ----------
-        *conditions
-            What must hold of the row.
-        note
-            What the change means; without one it is no news to any subscriber.
-        **values
-            Columns to set.
-
-        Returns
-        -------
-        Row or None
-            The row as it is now (`returning`).
+        Subscribers are called only for a change with a `note`.
         """
         more = {**self.dated, **(self.noted if note is not None else {})}
         row = session.execute(
@@ -154,14 +98,11 @@ class LeasedTable:
             for subscriber in self.on_change:
                 subscriber(session, row, note)
             if row.status in self.ends:
-                self._ended(session, row, note)
+                if self.on_end is None:
+                    raise RuntimeError(f"no subscribers for ends of {self.table.name}: import app.on_end")
+                for subscriber in self.on_end:
+                    subscriber(session, row, note)
         return row
-
-    def _ended(self, session: Session, row: LeasedRow, note: Note) -> None:
-        if self.on_end is None:
-            raise RuntimeError(f"nothing has subscribed to the end of {self.table.name}: import app.on_end")
-        for subscriber in self.on_end:
-            subscriber(session, row, note)
 
     def take(
         self, session: Session, *conditions: ColumnElement[bool], lease_until: Any, **values: Any
@@ -201,12 +142,9 @@ class LeasedTable:
     def reap(
         self, session: Session, key: Key, fence: int, *conditions: ColumnElement[bool], **values: Any
     ) -> LeasedRow | None:
-        """Take a row from a holder that is lost: it writes in vain if it wakes up.
+        """Take a row from a lost holder, with the fence as the reaper saw it.
 
-        Parameters
-        ----------
-        fence
-            As the reaper saw it; any number of reapers may run at once.
+        The holder writes in vain if it wakes up; any number of reapers may run at once.
         """
         columns = self.table.c
         freed = {"fence": columns.fence + 1, **self.unheld}

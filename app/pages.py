@@ -15,19 +15,9 @@ Rows = Sequence[Row[*tuple[Any, ...]]]
 def read_page(
     session: Session, query: Select[Any], ids: Column[str], *, cursor: str | None, limit: int
 ) -> tuple[Rows, str | None]:
-    """Read one page of what a query selects.
+    """Read at most `limit` rows after `cursor`; return them and the next page's cursor, None on the last.
 
-    Parameters
-    ----------
-    ids
-        Column with the identifiers, which rise with time.
-    cursor
-        Of the page before; None for the first page.
-
-    Returns
-    -------
-    tuple
-        At most `limit` rows, and the cursor of the next page; None on the last.
+    ``ids`` is the column with the identifiers, which rise with time.
     """
     if cursor is not None:
         query = query.where(ids < cursor)

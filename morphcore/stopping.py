@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TypeVar
 
+from morphdata.faults import Interrupted
+
+__all__ = ["Deadline", "Interrupted", "Stop", "heed", "listening", "one_at_a_time", "say", "stoppable"]
+
 Stop = Callable[[], bool]
 Value = TypeVar("Value")
-
-
-class Interrupted(Exception):
-    """The caller's ``stop`` said so between two chunks."""
 
 
 class Deadline:

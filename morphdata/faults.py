@@ -108,6 +108,10 @@ class InvalidInput(MorphError):
         return cls(first.detail, pointer=first.pointer, hint=first.hint, faults=every)
 
 
+class Interrupted(Exception):
+    """Long work was asked to stop, and has ended between two chunks."""
+
+
 def refuse(faults: Iterable[Fault]) -> None:
     """Raise InvalidInput that names all of these faults; return where there is none."""
     found = tuple(faults)

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from morphdata.faults import InvalidInput
+from morphdata.faults import InvalidInput, MorphError
 from morphdata.operations import operation_named
 from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
@@ -77,8 +77,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     bar.note("loading the library")
     threads = numerics.usable_cores()
     numerics.prepare_environment(threads)
-    from morphcore.stopping import listening
-    from worker.operations import WorkInterrupted, WorkRefused, find_operation
+    from morphcore.stopping import Interrupted, listening
+    from worker.operations import find_operation
     from worker.progress import Pace
 
     checkpoint: bytes | None = None
@@ -90,7 +90,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 for step in work.steps(None, interrupted):
                     checkpoint = step.checkpoint
                     bar.show(pace.progress(step))
-            except WorkInterrupted:
+            except Interrupted:
                 best = None if checkpoint is None else work.best_so_far(checkpoint)
                 if best is None:
                     return Answer(exit=Exit.INTERRUPTED, result=None)
@@ -100,9 +100,9 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 raise CommandError(f"{request.operation} ended without a step")
             outcome = work.outcome(checkpoint)
         return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
-    except WorkRefused as error:
+    except MorphError as error:
         raise CommandError(
-            error.detail, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
+            error.message, code=Exit.INVALID_INPUT, hint=error.hint, pointer=error.pointer
         ) from None
 
 

@@ -33,9 +33,8 @@ from worker.row_watch import RowWatch
 
 log = logging.getLogger(__name__)
 
-REAP_EXPIRES_S = (
-    24 * 3600.0
-)  # by the worker's clock, which may be hours off: short lives would never reach it
+# by the worker's clock, which may be hours off: a message with a short life would never reach it
+REAP_EXPIRES_S = 24 * 3600.0
 
 
 def make_app(settings: Settings) -> Celery:
@@ -51,7 +50,7 @@ def make_app(settings: Settings) -> Celery:
         worker_concurrency=settings.workers,
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
-        worker_enable_remote_control=False,  # nobody steers workers through the broker; they show their life
+        worker_enable_remote_control=False,  # nobody controls workers through the broker
         worker_consumer="worker.consumer:IndependentConsumer",
         worker_pool_start_method="fork",  # children inherit the pipe of `worker.shutdown`
         broker_connection_retry_on_startup=True,
@@ -115,7 +114,7 @@ def _look_at_the_table(**_: Any) -> None:
 
 
 @worker_shutting_down.connect
-def _tell_the_children(**_: Any) -> None:
+def _announce_shutdown(**_: Any) -> None:
     shutdown.announce()
 
 

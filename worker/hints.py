@@ -51,24 +51,12 @@ _REAP_BODY = TypeAdapter(tuple[tuple[()], _ReapOptions, Any])
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """What a wake-up message says.
+    """The content of a wake-up message."""
 
-    Attributes
-    ----------
-    task : str
-        `RUN_JOB` or `REAP`.
-    arguments : list
-        The job that caused it, for `RUN_JOB`.
-    options : dict
-        How to reap, for `REAP`.
-    id : str
-        New for each message taken: two of one id would be taken for one.
-    """
-
-    task: str
-    arguments: list[str] = field(default_factory=list)
-    options: dict[str, float] = field(default_factory=dict)
-    id: str = field(default_factory=lambda: str(uuid4()))
+    task: str  # `RUN_JOB` or `REAP`
+    arguments: list[str] = field(default_factory=list)  # the job that caused it, for `RUN_JOB`
+    options: dict[str, float] = field(default_factory=dict)  # how to reap, for `REAP`
+    id: str = field(default_factory=lambda: str(uuid4()))  # new for each: two of one id would count as one
 
     def headers(self) -> dict[str, Any]:
         """Return the headers of a Celery message (protocol 2)."""
@@ -110,16 +98,7 @@ class Hint:
 
 
 def read_hint(message: bytes, clock: Callable[[], float] = time.time) -> Hint | None:
-    """Read a message from the broker.
-
-    Returns
-    -------
-    None for one that has expired.
-
-    Raises
-    ------
-    ValueError : it is malformed.
-    """
+    """Read a message from the broker; None for an expired one, ValueError for a malformed one."""
     if len(message) > MAX_BYTES:
         raise ValueError("too long")
     envelope = _Envelope.model_validate_json(message)

@@ -4,65 +4,43 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from typing import NamedTuple
 
-from app.jobs.records import ChunkClaim, Claim
-from app.jobs.store import load_request
+from app.jobs.records import Claim
 from worker.operations import Begin, Document, Work
-from worker.retry import Retry
 
 JOBS_KEPT = 2  # a swarm's tables take some megabytes; a worker alternates between few jobs
 DEFAULT_CHUNKS = 16
 
 
-class Prepared(NamedTuple):
-    """Work that has begun.
+class JobCache:
+    """Begins work, and keeps that of spread jobs, whose chunks come one after the other.
 
-    Attributes
-    ----------
-    work : Work
-    chunks : int
-        Number of parts that a generation is cut into; 0 for work that one worker does alone.
+    ``find_operation(name)`` returns the function that begins the work; each job has so many numeric
+    ``threads``.
     """
 
-    work: Work
-    chunks: int
+    def __init__(self, find_operation: Callable[[str], Begin], threads: int) -> None:
+        self._find_operation = find_operation
+        self._threads = threads
+        self._kept: OrderedDict[str, tuple[Work, int]] = OrderedDict()
 
+    def prepared(self, claim: Claim, load_request: Callable[[], Document]) -> tuple[Work, int]:
+        """Return a job's work, and the number of chunks that each generation is divided into.
 
-class JobCache:
-    """Begins work, and keeps that of spread jobs, whose chunks come one after the other."""
-
-    def __init__(self) -> None:
-        self._kept: OrderedDict[str, Prepared] = OrderedDict()
-
-    def prepared(
-        self, claim: Claim | ChunkClaim, store: Retry, find_operation: Callable[[str], Begin], threads: int
-    ) -> Prepared:
-        """Return a job's work: what was kept of it, or begun from its request.
-
-        Parameters
-        ----------
-        store : Retry
-            Loads the request.
-        find_operation : callable
-            Name -> function that begins the work.
-        threads : int
-            Numeric threads of one job.
+        The number is 0 for work that one worker does alone.
         """
-        job_id = claim.job_id
-        if job_id in self._kept:
-            self._kept.move_to_end(job_id)
-            return self._kept[job_id]
-        request = store.read(lambda session: load_request(session, job_id))
-        prepared = Prepared(find_operation(claim.operation)(request, threads), chunks_of(request))
-        if prepared.chunks:
-            self._kept[job_id] = prepared
+        if claim.job_id in self._kept:
+            self._kept.move_to_end(claim.job_id)
+            return self._kept[claim.job_id]
+        request = load_request()
+        work, chunks = self._find_operation(claim.operation)(request, self._threads), _chunks(request)
+        if chunks:
+            self._kept[claim.job_id] = work, chunks
             if len(self._kept) > JOBS_KEPT:
                 self._kept.popitem(last=False)
-        return prepared
+        return work, chunks
 
 
-def chunks_of(request: Document) -> int:
-    """Number of chunks that a request wants its generations cut into; 0 for one worker alone."""
+def _chunks(request: Document) -> int:
     execution = request.get("execution") or {}
     return int(execution.get("chunks", DEFAULT_CHUNKS)) if execution.get("mode") == "distributed" else 0

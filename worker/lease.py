@@ -1,4 +1,4 @@
-"""Keep the lease of a claim on a job or a chunk, and learn soon that its work should stop."""
+"""A claim on a job or a chunk in a worker's hands: kept alive, watched, and written for."""
 
 from __future__ import annotations
 
@@ -10,30 +10,37 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
-from enum import Enum
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from app.database import Database
-from app.jobs.records import ChunkClaim, Claim, LeaseState
+from app.database import Database, Session
+from app.database_errors import DatabaseTrouble, trouble_of
+from app.jobs.records import Claim, StopReason
 from app.jobs.store import look_at_lease, renew_lease
+from morphdata.faults import MorphError
 
 log = logging.getLogger(__name__)
+Answer = TypeVar("Answer")
 
 STUCK_AFTER_S = 120.0  # work looks at its stop signal every second; if not, a kernel never returned
 # a cancelled job must end within two seconds: one for a chunk of work, one for its result
 LOOK_EVERY_S = 0.25
+FIRST_PAUSE_S = 0.5  # before the job store is asked again; doubles
+MAX_PAUSE_S = 4.0
+FULL_TRIES = 4  # somebody may be making room; then the job fails with `storage_full`
+SHUTDOWN_PATIENCE_S = 5.0  # a worker that ends waits so long for the job store; then the reaper does the rest
 
 
-class StopReason(Enum):
-    """Why running work was asked to stop."""
+class StaleClaim(Exception):
+    """The store refused a write: the job is someone else's now."""
 
-    CANCEL = "cancel"  # the user wants no more of it
-    DEADLINE = "deadline"  # its time is over
-    SHUTDOWN = "shutdown"  # this worker ends; another will go on from the checkpoint
-    LOST = "lost"  # another claim holds the job now; nothing we write counts
+
+class StorageFull(MorphError):
+    """The job store has no room for what should be written; what was there before still is."""
+
+    code = "storage_full"
 
 
 def end_process() -> None:
@@ -42,16 +49,14 @@ def end_process() -> None:
 
 
 class LeaseKeeper:
-    """A thread that keeps one claim alive while kernels run (they release the GIL).
+    """Keeps one claim alive in a thread while kernels run (they release the GIL).
 
-    Use as a context manager around the work, and hand `should_stop` to it.
+    Use as a context manager around the work, and hand `should_stop` to it. Transactions are repeated while
+    the job store is away: nobody else can take the job meanwhile, and if only this worker is cut off, the
+    fence keeps its writes out.
 
     Parameters
     ----------
-    database : Database
-        The job store.
-    claim : Claim or ChunkClaim
-        What to keep alive.
     lease_s, heartbeat_s : float
         How long each renewal lasts, and the time between two, s.
     shutting_down : callable
@@ -60,14 +65,12 @@ class LeaseKeeper:
         Time between two looks at the row, s.
     on_stuck : callable
         Called when the work has ignored its stop signal for `stuck_after_s`.
-    stuck_after_s : float
-        Patience with work that was asked to stop, s.
     """
 
     def __init__(
         self,
         database: Database,
-        claim: Claim | ChunkClaim,
+        claim: Claim,
         *,
         lease_s: float,
         heartbeat_s: float,
@@ -75,6 +78,7 @@ class LeaseKeeper:
         look_every_s: float = LOOK_EVERY_S,
         on_stuck: Callable[[], None] = end_process,
         stuck_after_s: float = STUCK_AFTER_S,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._database = database
         self._claim = claim
@@ -84,11 +88,12 @@ class LeaseKeeper:
         self._look_every_s = min(look_every_s, heartbeat_s)
         self._on_stuck = on_stuck
         self._stuck_after_s = stuck_after_s
+        self._sleep = sleep
         self._work_ended = False
         self._over = threading.Event()
         self._reason: StopReason | None = None
         self._thread = threading.Thread(
-            target=copy_context().run,  # its lines say whose job it is
+            target=copy_context().run,  # its log lines name the job
             args=(self._watch,),
             name=f"lease-{claim.job_id}",
             daemon=True,
@@ -118,9 +123,68 @@ class LeaseKeeper:
         self._work_ended = True
 
     def look(self) -> None:
-        """Look at once, in the caller's thread; what cannot be looked at is looked at later."""
-        with suppress(SQLAlchemyError):
-            self._judge(self._look())
+        """Look at the row at once, in the caller's thread; if the store is away, the thread does it later."""
+        with suppress(SQLAlchemyError), self._database.read() as session:
+            self._judge(look_at_lease(session, self._claim))
+
+    def read(self, load: Callable[[Session], Answer]) -> Answer:
+        """Read in a transaction of its own, repeated while the store is away."""
+
+        def once() -> Answer:
+            with self._database.read() as session:
+                return load(session)
+
+        return self._retried(once)
+
+    def write(self, write: Callable[[Session], bool], *, even_if_full: bool = False) -> None:
+        """Write in a transaction of its own, repeated while the store is away.
+
+        Parameters
+        ----------
+        write : callable
+            Returns False when the claim is stale.
+        even_if_full : bool
+            Use the job store's reserve of disk space: for a few rows that must be written.
+
+        Raises
+        ------
+        StaleClaim
+            The store refused the write, or this worker ends before the store is back.
+        StorageFull
+            There is no room.
+        """
+
+        def once() -> bool:
+            if even_if_full:
+                return self._database.write_even_if_full(write)
+            with self._database.write() as session:
+                return write(session)
+
+        if not self._retried(once):
+            raise StaleClaim
+
+    def _retried(self, transaction: Callable[[], Answer]) -> Answer:
+        pause_s, tries, shutdown_at = FIRST_PAUSE_S, 0, None
+        while True:
+            try:
+                return transaction()
+            except SQLAlchemyError as error:
+                trouble, tries = trouble_of(error), tries + 1
+                if trouble is None:
+                    raise
+                if trouble is DatabaseTrouble.FULL and tries == FULL_TRIES:
+                    hint = "make room (delete finished jobs, or grow the disk) and submit the job again"
+                    message = "the job store has no room for what the job wrote"
+                    raise StorageFull(message, hint=hint) from error
+                log.warning("the job store is %s, trying again", trouble.value)
+            if self._reason is StopReason.LOST:
+                raise StaleClaim
+            if self._reason is StopReason.SHUTDOWN:
+                shutdown_at = time.monotonic() if shutdown_at is None else shutdown_at
+                if time.monotonic() - shutdown_at > SHUTDOWN_PATIENCE_S:
+                    raise StaleClaim
+            self._sleep(min(pause_s, 1.0) if shutdown_at is not None else pause_s)
+            pause_s = min(2.0 * pause_s, MAX_PAUSE_S)
 
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
@@ -129,10 +193,13 @@ class LeaseKeeper:
             now = time.monotonic()
             try:
                 if now - renewed_at >= self._heartbeat_s:
-                    self._judge(self._renew())
+                    with self._database.write() as session:
+                        found = renew_lease(session, self._claim, self._lease_s)
                     renewed_at = now
                 else:
-                    self._judge(self._look())
+                    with self._database.read() as session:
+                        found = look_at_lease(session, self._claim)
+                self._judge(found)
             except SQLAlchemyError as error:
                 # The claim is not lost by that: nobody can take the job while the job store is away for all,
                 # and if it is away only for us, the fence keeps our writes out.
@@ -150,18 +217,6 @@ class LeaseKeeper:
             log.critical("job %s ignores its stop signal; ending this process", self._claim.job_id)
             self._on_stuck()
 
-    def _look(self) -> LeaseState:
-        with self._database.read() as session:
-            return look_at_lease(session, self._claim)
-
-    def _renew(self) -> LeaseState:
-        with self._database.write() as session:
-            return renew_lease(session, self._claim, self._lease_s)
-
-    def _judge(self, state: LeaseState) -> None:
-        if not state.held:
-            self._reason = StopReason.LOST
-        elif self._reason is None and state.cancel_requested:
-            self._reason = StopReason.CANCEL
-        elif self._reason is None and state.deadline_passed:
-            self._reason = StopReason.DEADLINE
+    def _judge(self, found: StopReason | None) -> None:
+        if self._reason is None or found is StopReason.LOST:
+            self._reason = found

@@ -36,17 +36,7 @@ def usable_cores() -> int:
 
 
 def share_cores(concurrency: int, *, cores: int | None = None) -> int:
-    """Give each of the concurrent jobs its share of the cores, at least one.
-
-    Parameters
-    ----------
-    concurrency : jobs that run at once on this machine.
-    cores : cores to share, all usable ones when None.
-
-    Returns
-    -------
-    Threads per job.
-    """
+    """Return each concurrent job's share of the cores (by default all usable ones), at least one thread."""
     return max(1, (usable_cores() if cores is None else cores) // max(1, concurrency))
 
 
@@ -77,9 +67,9 @@ def ensure_cache() -> None:
 
 
 def takes_files(folder: Path) -> bool:
-    """Whether a file can really be made there: permission bits do not tell of read-only and full disks.
+    """Whether a file can really be made there: permission bits do not show read-only and full disks.
 
-    Of a folder that is not there yet the nearest one above it is asked.
+    For a folder that is not there yet the nearest one above it is tried.
     """
     try:
         there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
@@ -129,11 +119,8 @@ def _private_folder() -> Path | None:
 class Kernels:
     """The compiled kernels of this process, made ready once, in the background.
 
-    Parameters
-    ----------
-    warm_up : compiles or loads those that most jobs need (threads -> None).
-    threads : numeric threads of one job.
-    further : compiles or loads the others, once jobs may run.
+    ``warm_up(threads)`` compiles or loads those that most jobs need, ``further()`` the others, once jobs may
+    run; each job has so many numeric ``threads``.
     """
 
     def __init__(
@@ -157,12 +144,7 @@ class Kernels:
         return self._done.is_set()
 
     def wait(self, stop: Callable[[], bool], *, poll_s: float = 0.2) -> bool:
-        """Wait for the end of the warm-up; whoever needs a further kernel compiles it where it is called.
-
-        Returns
-        -------
-        False when ``stop()`` turned true first.
-        """
+        """Wait for the end of the warm-up; return False when ``stop()`` turned true first."""
         self.start()
         while not self._done.wait(poll_s):
             if stop():

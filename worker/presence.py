@@ -1,7 +1,7 @@
 """A worker's signs of life: rows written from the very loop that hands jobs to its children.
 
 A process that is there but begins no jobs (stopped, hung) writes none, and one whose children are gone or do
-not answer writes that it has no slots: whoever reads the table sees it. Without a broker the rows are looked
+not answer writes that it has no slots. Without a broker the rows are looked
 at all the same (`worker.row_watch`), so the broker is no part of these signs. Each sign is a transaction on a
 connection of its own, closed at once: the parent process forks, and a child must not inherit a connection.
 """
@@ -46,14 +46,11 @@ def process_name() -> str:
 def brief_engine(url: str) -> Engine:
     """Open an engine that keeps no connection and loses little time with a database that is away."""
     parsed = make_url(normal_url(url))
+    link: dict[str, Any] = {"connect_timeout": PATIENCE_S, "options": f"-c statement_timeout={PATIENCE_S}s"}
     if parsed.get_backend_name() == "sqlite":
-        return create_engine(parsed, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
-    link = {"connect_timeout": PATIENCE_S, "options": f"-c statement_timeout={PATIENCE_S}s"}
-    return create_engine(
-        parsed,
-        poolclass=NullPool,
-        connect_args={key: value for key, value in link.items() if key not in parsed.query},
-    )
+        link = {"timeout": PATIENCE_S}
+    options = {key: value for key, value in link.items() if key not in parsed.query}
+    return create_engine(parsed, poolclass=NullPool, connect_args=options)
 
 
 def can_work(pid: int, *, proc: Path = Path("/proc")) -> bool:
@@ -68,12 +65,7 @@ def can_work(pid: int, *, proc: Path = Path("/proc")) -> bool:
 
 
 class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
-    """Part of Celery's worker: beats in its event loop, and says goodbye when it ends.
-
-    Parameters
-    ----------
-    worker : Celery's.
-    """
+    """Part of Celery's worker: writes signs of life from its event loop, and a last one when it ends."""
 
     requires = ("celery.worker.components:Pool", RowWatch)  # a sign says that the rows are looked at
 
@@ -85,10 +77,10 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         self._name = process_name()  # the parent's, not a pool child's
         self._timers: list[Any] = []
         self._known = False
-        self._told = True
+        self._written = True
 
     def start(self, worker: Any) -> None:
-        """Beat from now on: once at once, but in the loop, so that it proves that the loop runs."""
+        """Write a sign at once, but in the loop, so that it proves that the loop runs; then regularly."""
         beat = (worker,)
         self._timers = [
             worker.timer.call_after(0.01, self._beat, beat),
@@ -96,7 +88,7 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         ]
 
     def stop(self, _worker: Any) -> None:
-        """Beat no more: the worker ends."""
+        """Write that the worker ends."""
         for timer in self._timers:
             timer.cancel()
         self._timers = []
@@ -109,12 +101,7 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
     def _beat(self, worker: Any) -> None:
         able = worker.row_watch.unanswered_s < UNABLE_AFTER_S
         slots = sum(can_work(child.pid) for child in _children(worker)) if able else 0
-        sign = Sign(
-            self._name,
-            VERSION,
-            slots=slots,
-            busy=len(state.active_requests),
-        )
+        sign = Sign(self._name, VERSION, slots=slots, busy=len(state.active_requests))
         note = note_seen if self._known else note_started
         number = dropped.number
 
@@ -131,11 +118,11 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
             with self._engine.begin() as session:
                 write(session)
         except SQLAlchemyError as error:
-            if self._told:
+            if self._written:
                 log.warning("no sign of life could be written: %s", error)
-            self._told = False
+            self._written = False
             return False
-        self._told = True
+        self._written = True
         return True
 
 

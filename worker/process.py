@@ -22,10 +22,7 @@ COMMANDS: Final = {
 def main(arguments: list[str] | None = None) -> int:
     """Run until SIGTERM and return the exit code.
 
-    Parameters
-    ----------
-    arguments : list of str, optional
-        ``worker`` or ``beat``, then more of Celery's options for it; the command line's when left out.
+    The arguments are ``worker`` or ``beat``, then more of Celery's options for it.
     """
     role, *options = sys.argv[1:] if arguments is None else arguments
     if role not in COMMANDS:

@@ -35,13 +35,7 @@ def work_waits() -> bool:
 
 
 class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
-    """Part of Celery's worker: looks in its event loop, as long as the pool is there.
-
-    Parameters
-    ----------
-    worker : Celery's.
-    clock : seconds that only rise.
-    """
+    """Part of Celery's worker: looks in its event loop, as long as the pool is there."""
 
     requires = ("celery.worker.components:Pool",)
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import app.on_end  # noqa: F401 - workers end jobs
 from app.database import Database, Session
-from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.chunks import claim_chunk, must_be_taken_over, take_over
 from app.jobs.records import ChunkClaim, Claim
+from app.jobs.rows import Unit, UnitKind
 from app.jobs.store import claim_job
 from app.jobs.turns import next_unit
-from worker.attempt import Attempt, Ending
-from worker.chunk import ChunkFlight
+from worker.attempt import Attempt, Ending, fly_chunk
 from worker.job_cache import JobCache
 from worker.lease import LeaseKeeper
 from worker.numerics import Kernels
@@ -29,7 +27,7 @@ CHUNK_LEASE_S = 10.0  # a chunk that is lost holds up its generation for so long
 HEARTBEATS_PER_LEASE = 5  # a chunk of a second needs none
 
 
-def tell_nobody(_job_id: str, _count: int) -> None:
+def publish_nothing(_job_id: str, _count: int) -> None:
     """Send no wake-up messages: the reaper does."""
 
 
@@ -38,7 +36,7 @@ def never() -> bool:
     return False
 
 
-@dataclass(frozen=True)
+@dataclass
 class Runner:
     """Everything that running jobs needs, handed in.
 
@@ -49,11 +47,9 @@ class Runner:
     worker_name : shown in the job's events.
     lease_s, heartbeat_s : life and renewal of a claim, s.
     find_operation : name -> function that begins the work.
-    shutting_down : tells that this worker is asked to end.
-    clock : seconds that only rise.
+    shutting_down : whether this worker was asked to end.
     publish : sends a number of wake-up messages for a job.
-    chunk_lease_s : life of a claim on a chunk, s: shorter, for a lost one holds up its whole generation.
-    cache : the work of the jobs that this process saw last.
+    chunk_lease_s : life of a claim on a chunk, s; short, because a lost one holds up its whole generation.
     """
 
     database: Database
@@ -63,26 +59,21 @@ class Runner:
     heartbeat_s: float
     find_operation: Callable[[str], Begin] = find_operation
     shutting_down: Callable[[], bool] = never
-    clock: Callable[[], float] = time.monotonic
-    publish: Callable[[str, int], None] = tell_nobody
+    publish: Callable[[str, int], None] = publish_nothing
     chunk_lease_s: float = CHUNK_LEASE_S
-    cache: JobCache = field(default_factory=JobCache)
+
+    def __post_init__(self) -> None:
+        self._cache = JobCache(self.find_operation, self.kernels.threads)
 
     def run_next(self) -> tuple[Ending, str | None]:
-        """Do what should be done next: a message only says that there is work, the rows say which.
-
-        Returns
-        -------
-        The ending and the job's id.
-        """
+        """Do what should be done next, by the rows; return the ending and the job's id."""
         claim = None if self.shutting_down() else self._claim()
         if claim is None:
             return Ending.NOTHING_QUEUED, None
         with attempt_span(claim):
-            if isinstance(claim, ChunkClaim):
-                ending, error = self._fly(claim)
-            else:
+            if not isinstance(claim, ChunkClaim):
                 return self._attempt(claim), claim.job_id
+            ending, error = self._fly(claim)
         taken = None if ending is Ending.RELEASED else self._taken_over(claim.job_id, error)
         if taken is not None:
             with attempt_span(taken):
@@ -91,34 +82,30 @@ class Runner:
 
     def _fly(self, chunk: ChunkClaim) -> tuple[Ending, Document | None]:
         with self._keeper(chunk, self.chunk_lease_s, self.chunk_lease_s / HEARTBEATS_PER_LEASE) as keeper:
-            flight = ChunkFlight(self.database, chunk, keeper, self.kernels, self.cache, clock=self.clock)
-            ending = flight.run(self.find_operation)
+            ending, error = fly_chunk(chunk, keeper, self.kernels, self._cache)
         log.debug("job %s: chunk %d.%d %s", chunk.job_id, chunk.generation, chunk.number, ending.value)
-        return ending, flight.error
+        return ending, error
 
     def _taken_over(self, job_id: str, error: Document | None) -> Claim | None:
         """Claim a spread job that must go on, now that its chunks are stored or its end has come."""
         if error is None:
-            with self.database.read() as connection:
-                if not must_be_taken_over(connection, job_id):
+            with self.database.read() as session:
+                if not must_be_taken_over(session, job_id):
                     return None
-        with self.database.write() as connection:
-            return take_over(connection, job_id, self.worker_name, self.lease_s, whatever=error is not None)
+        with self.database.write() as session:
+            return take_over(session, job_id, self.worker_name, self.lease_s, whatever=error is not None)
 
     def _attempt(self, claim: Claim, error: Document | None = None) -> Ending:
         log.info("job %s: attempt %d of %d", claim.job_id, claim.attempt, claim.max_attempts)
         with self._keeper(claim, self.lease_s, self.heartbeat_s) as keeper:
-            attempt = Attempt(self.database, claim, keeper, self.kernels, self.cache, clock=self.clock)
-            if error is None:
-                ending = attempt.run(self.find_operation)
-            else:
-                ending = attempt.give_up(self.find_operation, error)
+            attempt = Attempt(claim, keeper, self.kernels, self._cache)
+            ending = attempt.run() if error is None else attempt.give_up(error)
         if attempt.handed_out:
             self.publish(claim.job_id, attempt.handed_out)
         log.info("job %s: %s", claim.job_id, ending.value)
         return ending
 
-    def _keeper(self, claim: Claim | ChunkClaim, lease_s: float, heartbeat_s: float) -> LeaseKeeper:
+    def _keeper(self, claim: Claim, lease_s: float, heartbeat_s: float) -> LeaseKeeper:
         return LeaseKeeper(
             self.database,
             claim,
@@ -127,18 +114,18 @@ class Runner:
             shutting_down=self.shutting_down,
         )
 
-    def _claim(self) -> Claim | ChunkClaim | None:
+    def _claim(self) -> Claim | None:
         for _ in range(CLAIM_TRIES):
-            with self.database.write() as connection:
-                unit = next_unit(connection)
+            with self.database.write() as session:
+                unit = next_unit(session)
                 if unit is None:
                     return None
-                claim = self._take(connection, unit)
+                claim = self._take(session, unit)
             if claim is not None:
                 return claim
         return None
 
-    def _take(self, session: Session, unit: Unit) -> Claim | ChunkClaim | None:
+    def _take(self, session: Session, unit: Unit) -> Claim | None:
         if unit.kind is UnitKind.CHUNK:
             return claim_chunk(session, unit, self.worker_name, self.chunk_lease_s)
         if unit.kind is UnitKind.SPREAD:

@@ -1,9 +1,9 @@
-"""Spans and log facts of an attempt at a job or a chunk."""
+"""Spans and log context of an attempt at a job or a chunk."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from app.jobs.records import ChunkClaim, Claim
@@ -12,14 +12,14 @@ from app.observability.tracing import past_span, span
 
 
 @contextmanager
-def attempt_span(claim: Claim | ChunkClaim) -> Iterator[None]:
+def attempt_span(claim: Claim) -> Iterator[None]:
     """Trace an attempt as part of the request's trace; log lines within the block carry the job."""
+    chunk = isinstance(claim, ChunkClaim)
     with bound(job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker):
-        kind = "chunk" if isinstance(claim, ChunkClaim) else "attempt"
-        if isinstance(claim, Claim) and claim.fence == 1:  # a job handed back begins attempt 1 again
+        if not chunk and claim.fence == 1:  # a job handed back begins attempt 1 again
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
-            f"{kind} {claim.operation}",
+            f"{'chunk' if chunk else 'attempt'} {claim.operation}",
             kind="consumer",
             traceparent=claim.traceparent,
             attributes={
@@ -32,29 +32,22 @@ def attempt_span(claim: Claim | ChunkClaim) -> Iterator[None]:
 
 
 class PhaseSpans:
-    """Spans of the phases of a search, seen from its steps: a phase began when the step before it ended.
+    """Spans of the phases of a search: a phase began when the last step of the one before ended."""
 
-    Parameters
-    ----------
-    clock : callable
-        Seconds that only rise.
-    """
-
-    def __init__(self, *, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._phase: str | None = None
-        self._began = self._last = clock()
+        self._began = self._last = time.monotonic()
 
     def note(self, phase: str | None) -> None:
         """Note the phase of a step that has just ended."""
         if phase != self._phase:
             self.close()
             self._phase, self._began = phase, self._last
-        self._last = self._clock()
+        self._last = time.monotonic()
 
     def close(self) -> None:
-        """End the phase that is under way."""
+        """End the current phase."""
         if self._phase is not None:
-            now = self._clock()
+            now = time.monotonic()
             past_span(self._phase, seconds=self._last - self._began, ago_s=now - self._last)
         self._phase = None

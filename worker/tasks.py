@@ -17,6 +17,7 @@ from app.jobs.queue import RUN_JOB, messages_waiting
 from app.jobs.queue import publish as send_hint
 from app.jobs.reaper import log_ends, reap
 from app.jobs.records import ReapReport
+from app.jobs.rows import Unit
 from app.jobs.turns import next_unit
 from app.observability.counters import count
 from app.observability.job_counts import REAP_ROUNDS
@@ -33,12 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class Process:
-    """What one pool child keeps between tasks.
-
-    Parameters
-    ----------
-    threads : numeric threads of one job.
-    """
+    """What one pool child keeps between tasks."""
 
     def __init__(self, threads: int) -> None:
         self.settings = load_settings()
@@ -52,13 +48,18 @@ class Process:
             lease_s=self.settings.lease_s,
             heartbeat_s=self.settings.heartbeat_s,
             shutting_down=shutdown.announced,
-            publish=publish_chunks,
+            publish=lambda job_id, count: publish_all(repeat(job_id, count)),
             chunk_lease_s=min(self.settings.lease_s, CHUNK_LEASE_S),
         )
 
     def reap_is_due(self) -> bool:
         """Whether this process has not reaped just now."""
         return bool(time.monotonic() - self.reaped_at > app.conf.beat_schedule["reap"]["schedule"] / 2.0)
+
+    def next_unit(self) -> Unit | None:
+        """The work that should be done next."""
+        with self.database.read() as session:
+            return next_unit(session)
 
 
 _processes: dict[int, Process] = {}  # by process id: a forked child never uses its parent's connections
@@ -77,7 +78,7 @@ def enter_process() -> Process:
 
 @contextmanager
 def _unless_away() -> Iterator[None]:
-    """Let a hint go when the job store is away: the reaper repeats it when the store is back."""
+    """Ignore that the job store is away: the reaper repeats the message when the store is back."""
     try:
         yield
     except SQLAlchemyError as error:
@@ -94,46 +95,32 @@ def publish(job_id: str) -> bool:
 
 def publish_all(job_ids: Iterable[str]) -> None:
     """Send several hints, up to the first that the broker does not take."""
-    for job_id in job_ids:
-        if not publish(job_id):
-            break
-
-
-def publish_chunks(job_id: str, count: int) -> None:
-    """Send a hint for each chunk of a job that was handed out; a broker that is away loses none of them."""
-    publish_all(repeat(job_id, count))
+    all(publish(job_id) for job_id in job_ids)
 
 
 @app.task(name=RUN_JOB)
 def run_job(job_id: str) -> None:
     """Run the job that should run next (a hint names the job that caused it)."""
     log.debug("woken for job %s", job_id)
-    ending, released_id = Ending.NOTHING_QUEUED, None
     with _unless_away():
-        ending, released_id = enter_process().runner.run_next()
-    if ending is Ending.RELEASED and released_id is not None:
-        publish(released_id)
-    elif ending is not Ending.NOTHING_QUEUED:
-        with _unless_away():
-            pass_on()
-
-
-def pass_on() -> None:
-    """Wake somebody for the next queued job unless a message is on its way: a lost one costs nothing."""
-    process = enter_process()
-    with process.database.read() as connection:
-        unit = next_unit(connection)
-    if unit is not None and messages_waiting(process.settings.broker_url) == 0:
-        publish(unit.job_id)
+        process = enter_process()
+        ending, released_id = process.runner.run_next()
+        if ending is Ending.RELEASED and released_id is not None:
+            publish(released_id)
+        elif ending is not Ending.NOTHING_QUEUED:
+            # wake somebody for the next job unless a message is on its way: a lost one costs nothing
+            unit = process.next_unit()
+            if unit is not None and messages_waiting(process.settings.broker_url) == 0:
+                publish(unit.job_id)
 
 
 def work_waits() -> bool:
-    """Look whether a job or a part of one waits; a worker that ends, or a store that is away, has none."""
+    """Whether a job or a part of one waits; never for a worker that ends, or while the store is away."""
     if shutdown.announced():
         return False
     unit = None
-    with _unless_away(), enter_process().database.read() as connection:
-        unit = next_unit(connection)
+    with _unless_away():
+        unit = enter_process().next_unit()
     return unit is not None
 
 
@@ -146,9 +133,9 @@ def reap_jobs(republish_after_s: float | None = None) -> None:
             return  # messages pile up while every worker is busy: the first of them did the work
         republish_after_s = process.settings.republish_after_s
     report = ReapReport()
-    with _unless_away(), process.database.write() as connection:
-        report = reap(connection, republish_after_s=republish_after_s)
-        count(connection, REAP_ROUNDS)
+    with _unless_away(), process.database.write() as session:
+        report = reap(session, republish_after_s=republish_after_s)
+        count(session, REAP_ROUNDS)
     process.reaped_at = time.monotonic()
     log_ends(report)
     publish_all(report.publish)

@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 
 class Dropped:
-    """Malformed messages that this process took and that nobody has written down yet."""
+    """Malformed messages that this process took and that are not yet written down."""
 
     def __init__(self) -> None:
         self.number = 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import delete, insert, select
 
@@ -13,8 +13,35 @@ from app.identifiers import new_identifier
 from app.jobs.records import moment
 from app.tables import audit_log
 
+if TYPE_CHECKING:
+    from app.http.context import Caller
+
 TARGET_LENGTH = 160
 DONE = "done"
+
+
+def note(
+    session: Session,
+    caller: Caller,
+    action: Action,
+    target: str,
+    *,
+    detail: Mapping[str, Any] | None = None,
+) -> None:
+    """Note what `caller` did to the thing with the id `target`, in the transaction that did it.
+
+    ``detail`` holds a few small facts; never a secret, never content.
+    """
+    insert_entry(
+        session,
+        action,
+        owner=caller.owner,
+        key_id=caller.key_id,
+        target=target,
+        request_id=caller.request_id,
+        address=caller.address,
+        detail=detail,
+    )
 
 
 def insert_entry(
@@ -63,6 +90,6 @@ def list_entries(
 
 
 def prune(session: Session, older_than_s: float) -> int:
-    """Forget deeds older than so many seconds; tell how many."""
+    """Delete entries older than so many seconds; return how many there were."""
     old = delete(audit_log).where(audit_log.c.at < database_time() - older_than_s)
     return int(session.execute(old).rowcount)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
-from sqlalchemy import delete, insert
+from sqlalchemy import insert
 
 from app.database import Session, database_time
 from app.tables import artifacts
@@ -38,7 +38,7 @@ def media_type(name: str) -> str:
 
 
 def artifact_headers(name: str) -> dict[str, str]:
-    """Headers of the answer that carries a file; its name is a plain one, which needs no quoting."""
+    """Headers of the answer that carries a file; a plain name needs no quoting."""
     shown = "inline" if media_type(name) in SHOWN_TYPES.values() else "attachment"
     return {**HEADERS, "Content-Disposition": f'{shown}; filename="{name}"'}
 
@@ -49,17 +49,10 @@ def is_plain(name: str) -> bool:
 
 
 def store_artifacts(session: Session, job_id: str, files: Mapping[str, bytes]) -> None:
-    """Write the files of a job, replacing those of the same name.
-
-    Raises
-    ------
-    ValueError
-        When a name is not a plain file name.
-    """
+    """Write the files of a job that ends; each name must be a plain file name."""
     for name, data in files.items():
         if not is_plain(name):
             raise ValueError(f"artifact name {name!r} is not a plain file name")
-        session.execute(delete(artifacts).where(artifacts.c.job_id == job_id, artifacts.c.name == name))
         session.execute(
             insert(artifacts).values(
                 job_id=job_id,

@@ -3,7 +3,7 @@
 Like the job store, every function takes a `Session` and leaves the commit to its caller. A chunk has a lease
 and a fence of its own; an outcome is stored where job, generation, number, fence and state are the claim's,
 and only there. The claim on the job itself is given up while its chunks are flown and taken again, with a
-higher fence, by whoever finds that all are stored or that the job must end.
+higher fence, by the worker that finds all stored or that must end the job.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ from sqlalchemy import delete, insert, select
 
 from app.database import Session, database_time
 from app.documents import Document
-from app.jobs.chunk_rows import CHUNKS, DONE, HANDED_OUT, OPEN, Unit, must_go_on
 from app.jobs.records import ChunkClaim, Claim
-from app.jobs.rows import JOBS
+from app.jobs.rows import CHUNKS, DONE, HANDED_OUT, JOBS, OPEN, Unit, must_go_on
 from app.jobs.store import claim_from_row, replace_checkpoint, save_progress
 from app.jobs.turns import note_served
 from app.tables import job_checkpoints, job_chunks, jobs
@@ -25,15 +24,11 @@ from app.tables import job_checkpoints, job_chunks, jobs
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What the chunks of a generation brought.
+    """What the chunks of a generation brought."""
 
-    outcomes : in the order in which the tasks were handed out. elapsed_s : since they were handed out.
-    before : the progress shown until now.
-    """
-
-    outcomes: tuple[bytes, ...]
-    elapsed_s: float
-    before: Document
+    outcomes: tuple[bytes, ...]  # in the order in which the tasks were handed out
+    elapsed_s: float  # since they were handed out
+    before: Document  # the progress shown until now
 
 
 def hand_out(
@@ -43,20 +38,10 @@ def hand_out(
     checkpoint: bytes,
     progress: Document | None = None,
 ) -> bool:
-    """Give a claimed job up for chunks: progress, checkpoint and tasks, all or nothing.
+    """Give a claimed job up for chunks; return False for a stale claim.
 
-    Publish the job's id once for each task after the commit.
-
-    Parameters
-    ----------
-    tasks : what to fly, in order; the chunks of a generation before are forgotten.
-    checkpoint : the state that the outcomes will be told to.
-    progress : when it is news.
-
-    Returns
-    -------
-    bool
-        False when the claim is stale; nothing was written then.
+    Publish the job's id once for each task after the commit. The chunks of the generation before are deleted;
+    `progress` is written when it is given.
     """
     if progress is not None and not save_progress(session, claim, progress, None):
         return False
@@ -67,24 +52,17 @@ def hand_out(
     earlier = session.scalars(
         delete(job_chunks).where(job_chunks.c.job_id == claim.job_id).returning(job_chunks.c.generation)
     ).all()
-    generation = max(earlier, default=-1) + 1
-    session.execute(
-        insert(job_chunks),
-        [
-            {
-                "job_id": claim.job_id,
-                "generation": generation,
-                "number": number,
-                "owner": claim.owner,
-                "status": OPEN,
-                "attempt": 0,
-                "fence": 0,
-                "task": task,
-                "at": row.updated_at,
-            }
-            for number, task in enumerate(tasks)
-        ],
-    )
+    same = {
+        "job_id": claim.job_id,
+        "generation": max(earlier, default=-1) + 1,
+        "owner": claim.owner,
+        "status": OPEN,
+        "attempt": 0,
+        "fence": 0,
+        "at": row.updated_at,
+    }
+    chunks = [{**same, "number": number, "task": task} for number, task in enumerate(tasks)]
+    session.execute(insert(job_chunks), chunks)
     return True
 
 
@@ -94,29 +72,27 @@ def claim_chunk(session: Session, unit: Unit, worker_name: str, lease_s: float) 
     row = CHUNKS.claim(session, unit.key, lease_until=lease_until, worker=worker_name)
     if row is None:
         return None
-    job = session.execute(
-        select(jobs.c.operation, jobs.c.request_id, jobs.c.traceparent, job_chunks.c.task)
+    job = jobs.c.operation, jobs.c.max_attempts, jobs.c.request_id, jobs.c.traceparent
+    found = session.execute(
+        select(*job, job_chunks.c.task)
         .join(job_chunks, job_chunks.c.job_id == jobs.c.id)
         .where(*CHUNKS.at(unit.key))
-    ).one()
+    )
     note_served(session, row.owner)
     return ChunkClaim(
         job_id=unit.job_id,
-        owner=row.owner,
-        operation=job.operation,
         generation=unit.generation,
         number=unit.number,
+        owner=row.owner,
         fence=row.fence,
         attempt=row.attempt,
         worker=worker_name,
-        task=bytes(job.task),
-        request_id=job.request_id,
-        traceparent=job.traceparent,
+        **found.mappings().one(),
     )
 
 
 def finish_chunk(session: Session, chunk: ChunkClaim, outcome: bytes) -> bool:
-    """Store what came of a chunk; False when it is another's now, or forgotten."""
+    """Store the outcome of a chunk; return False when it is another worker's now, or deleted."""
     return CHUNKS.settle(session, chunk, status=DONE, outcome=outcome, **CHUNKS.unheld) is not None
 
 
@@ -126,7 +102,7 @@ def give_back_chunk(session: Session, chunk: ChunkClaim) -> bool:
 
 
 def must_be_taken_over(session: Session, job_id: str) -> bool:
-    """Whether a spread job waits for somebody to advance or to end it: a look that writes nothing."""
+    """Whether a spread job waits for somebody to advance or to end it."""
     return session.scalar(select(jobs.c.id).where(jobs.c.id == job_id, must_go_on())) is not None
 
 
@@ -135,14 +111,8 @@ def take_over(
 ) -> Claim | None:
     """Claim a spread job that must go on: the fence rises, the attempt does not.
 
-    Parameters
-    ----------
-    whatever : claim it though chunks are still flown: one of them has told that the job cannot be done.
-
-    Returns
-    -------
-    Claim or None
-        None when another worker has it, or nothing is to be done.
+    ``whatever`` claims it while chunks are still flown: one of them has shown that the job cannot be done.
+    Returns None when another worker has it, or nothing is to be done.
     """
     row = JOBS.take(
         session,
@@ -155,7 +125,7 @@ def take_over(
 
 
 def flown(session: Session, claim: Claim) -> Flown | None:
-    """What the chunks of a claimed job brought; None where there are none, or not all are stored."""
+    """Return what the chunks of a claimed job brought; None where there are none, or not all are stored."""
     rows = session.execute(
         select(job_chunks.c.status, job_chunks.c.outcome)
         .where(job_chunks.c.job_id == claim.job_id)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
@@ -9,7 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import AwareDatetime, BaseModel
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
 from app.errors import (
     ArtifactNotFound,
@@ -23,19 +24,27 @@ from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
 from app.http.parameters import ID_PATTERN, CursorQuery, LimitQuery
 from app.http.prefer import PreferHeader, wait_seconds
 from app.http.problems import documented
-from app.jobs import repository, service, store
+from app.jobs import repository, store
 from app.jobs.artifacts import MEDIA_TYPES, OTHER_FILES, artifact_headers, is_plain, media_type
 from app.jobs.event_stream import EventStream, read_in_turn, wait_for_end
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.jobs.repository import JobFilter
-from app.jobs.results import JobResult
-from app.jobs.schemas import EXAMPLE_ID, Artifact, ArtifactList, Job, JobEventPage, JobPage, OperationName
+from app.jobs.schemas import (
+    EXAMPLE_ID,
+    ArtifactList,
+    Job,
+    JobEventPage,
+    JobPage,
+    JobResult,
+    OperationName,
+)
 from app.keys.records import Scope
 from morphdata.execution import Label
 from morphdata.operations import OPERATIONS
+from morphdata.operations.descriptor import Operation
 
-router = APIRouter(tags=["jobs"])
+router = APIRouter(tags=["jobs"], generate_unique_id_function=attrgetter("name"))
 
 JobId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_ID])]
 FILE_KINDS: dict[str, Any] = {
@@ -74,6 +83,10 @@ REQUEST: dict[str, Any] = {
 }
 
 
+def _files_of(operation: Operation[Any]) -> str:
+    return f"Of `{operation.name}`: {', '.join(f'`{name}`' for name in operation.files)}."
+
+
 def as_json(answer: BaseModel) -> Response:
     """Answer with a checked value as it is: the framework would check and copy it once more."""
     return Response(answer.model_dump_json(), media_type="application/json")
@@ -97,7 +110,6 @@ JobFilterDep = Annotated[JobFilter, Depends(_wanted)]
 @router.get(
     "/jobs",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="list_jobs",
     summary="List jobs",
     response_model=JobPage,
     responses=documented(InvalidRequest),
@@ -111,14 +123,13 @@ def list_jobs(
 ) -> Response:
     """Your jobs, newest first, a page at a time."""
     with app.database.read() as session:
-        page = service.page(session, owner, wanted, cursor=cursor, limit=limit)
-    return as_json(page)
+        found, next_cursor = repository.list_jobs(session, owner, wanted, cursor=cursor, limit=limit)
+    return as_json(JobPage(jobs=[Job.of(job) for job in found], next_cursor=next_cursor))
 
 
 @router.get(
     "/jobs/{job_id}",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job",
     summary="Get a job",
     response_model=Job,
     responses=documented(InvalidRequest, JobNotFound, TooManyStreams),
@@ -132,7 +143,6 @@ async def get_job(app: ServiceDep, caller: CallerDep, job_id: JobId, prefer: Pre
 @router.get(
     "/jobs/{job_id}/events",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_events",
     summary="Follow a job",
     response_class=JSONResponse,
     response_model=JobEventPage,
@@ -158,7 +168,7 @@ async def get_job_events(
 
     def read() -> JobEventPage:
         with app.database.read() as session:
-            return service.event_page(session, caller.owner, job_id, seen)
+            return repository.event_page(session, caller.owner, job_id, seen)
 
     page = await read_in_turn(app, caller.owner, read)
     accepted = request.headers.get("accept", "")
@@ -172,7 +182,6 @@ async def get_job_events(
 @router.get(
     "/jobs/{job_id}/result",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_result",
     summary="Get the result of a job",
     response_model=JobResult,
     responses=documented(InvalidRequest, JobNotFound, ResultNotReady),
@@ -183,14 +192,13 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
     Of a cancelled or expired search it is the best so far, marked `"partial": true`.
     """
     with app.database.read() as session:
-        text = service.result(session, owner, job_id)
+        text = repository.required_result_json(session, owner, job_id)
     return Response(text, media_type="application/json")
 
 
 @router.get(
     "/jobs/{job_id}/request",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_request",
     summary="Get the request of a job",
     response_class=JSONResponse,
     responses={200: REQUEST, **documented(InvalidRequest, JobNotFound)},
@@ -209,31 +217,19 @@ def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response
 @router.get(
     "/jobs/{job_id}/artifacts",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="list_job_artifacts",
     summary="List the files of a job",
+    description=" ".join(["Plots, tables and the result as files.", *map(_files_of, OPERATIONS)]),
     responses=documented(InvalidRequest, JobNotFound),
 )
 def list_job_artifacts(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> ArtifactList:
-    """Plots, curves and the result as files."""
+    """List the files, by name."""
     with app.database.read() as session:
-        found = repository.list_artifacts(session, owner, job_id)
-    return ArtifactList(
-        artifacts=[
-            Artifact(
-                name=item.name,
-                media_type=item.media_type,
-                size_bytes=item.size_bytes,
-                href=f"/jobs/{job_id}/artifacts/{item.name}",
-            )
-            for item in found
-        ]
-    )
+        return repository.list_artifacts(session, owner, job_id)
 
 
 @router.get(
     "/jobs/{job_id}/artifacts/{name}",
     dependencies=[demands(Scope.JOBS_READ)],
-    operation_id="get_job_artifact",
     summary="Get a file of a job",
     response_class=Response,
     responses={
@@ -254,14 +250,13 @@ def get_job_artifact(
     if not is_plain(name):  # and no database is asked for the character zero
         raise ArtifactNotFound(job_id, name)
     with app.database.read() as session:
-        _, data = repository.artifact_data(session, owner, job_id, name)
+        data = repository.artifact_data(session, owner, job_id, name)
     return Response(data, media_type=media_type(name), headers=artifact_headers(name))
 
 
 @router.post(
     "/jobs/{job_id}/cancel",
     dependencies=[demands(Scope.JOBS_WRITE)],
-    operation_id="cancel_job",
     summary="Cancel a job",
     responses=documented(InvalidRequest, JobNotFound),
 )
@@ -279,14 +274,13 @@ def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
 
     job = app.database.write_even_if_full(cancel)
     if job.status is JobStatus.CANCELLING:
-        app.publisher.publish(job_id)  # a spread job is in nobody's hands: whoever is woken winds it down
+        app.publisher.publish(job_id)  # a spread job has no holder: the worker that is woken winds it down
     return Job.of(job)
 
 
 @router.delete(
     "/jobs/{job_id}",
     dependencies=[demands(Scope.JOBS_WRITE)],
-    operation_id="delete_job",
     summary="Delete a finished job",
     status_code=204,
     responses=documented(InvalidRequest, JobNotFound, JobNotFinished),

@@ -14,7 +14,7 @@ from app.database_errors import trouble_of
 from app.documents import json_bytes
 from app.errors import JobNotFound, Unauthorized
 from app.http.context import Caller, Service
-from app.jobs import service as jobs
+from app.jobs import repository
 from app.jobs.records import Job as StoredJob
 from app.jobs.rows import get_job
 from app.jobs.schemas import Job, JobEvent, JobEventPage
@@ -27,17 +27,9 @@ Found = TypeVar("Found")
 
 
 class EventStream(StreamingResponse):
-    """The answer that follows a job; it counts as one of its owner's streams while it lasts.
+    """The answer that follows one of the caller's jobs after event number `after`.
 
-    Parameters
-    ----------
-    service : Service
-    caller : Caller
-        Who follows.
-    job_id : str
-        One of the caller's jobs.
-    after : int
-        Number of the last event that was seen.
+    It counts as one of its owner's streams while it lasts.
     """
 
     def __init__(self, service: Service, caller: Caller, job_id: str, after: int) -> None:
@@ -49,13 +41,7 @@ class EventStream(StreamingResponse):
         self._place = service.streams.place(caller.owner)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer.
-
-        Raises
-        ------
-        TooManyStreams
-            The owner has as many as one may have.
-        """
+        """Answer, or raise `TooManyStreams`."""
         with self._place:
             await super().__call__(scope, receive, send)
 
@@ -82,7 +68,7 @@ async def stream_events(service: Service, caller: Caller, job_id: str, after: in
     def read() -> JobEventPage | None:
         try:
             with service.database.read() as session:
-                return jobs.event_page(session, caller.owner, job_id, after)
+                return repository.event_page(session, caller.owner, job_id, after)
         except JobNotFound:
             return None
         except SQLAlchemyError as error:
@@ -119,20 +105,8 @@ async def wait_for_end(
 ) -> Job:
     """Wait until a job has ended, at most `timeout_s`, and show it as it is then.
 
-    Parameters
-    ----------
-    accepted : Job, optional
-        The job that the caller has just posted. It is shown as it was last seen when it is deleted meanwhile:
-        the post was accepted all the same.
-
-    Raises
-    ------
-    JobNotFound
-        There is no such job.
-    TooManyStreams
-        As many requests of the owner wait as may.
-    Unauthorized
-        The caller's key opens no more.
+    A job that was just `accepted` is shown as it was last seen when it is deleted meanwhile: the post was
+    accepted all the same.
     """
 
     def read() -> StoredJob:
@@ -141,7 +115,8 @@ async def wait_for_end(
 
     def show() -> Job:
         with service.database.read() as session:
-            return jobs.shown(session, service.queue, get_job(session, caller.owner, job_id))
+            job = get_job(session, caller.owner, job_id)
+            return Job.of(job, service.queue.place(session, job))
 
     try:
         if timeout_s > 0.0:

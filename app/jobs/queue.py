@@ -33,10 +33,7 @@ def _client(broker_url: str) -> Any:
 def publish(job_id: str, broker_url: str | None = None) -> bool:
     """Send the workers a wake-up message for a job; call it after the commit.
 
-    Returns
-    -------
-    bool
-        False when the broker cannot be reached: the reaper repeats the message later, so nothing is lost.
+    Returns False when the broker cannot be reached: the reaper repeats the message later.
     """
     url = broker_url or load_settings().broker_url
     try:
@@ -60,10 +57,7 @@ def messages_waiting(broker_url: str) -> int | None:
 class Publisher:
     """Sends wake-up messages from its own thread, so that no request waits for a broker.
 
-    Parameters
-    ----------
-    broker_url : str
-        Where to send; never contacted before the first message.
+    The broker is never contacted before the first message.
     """
 
     def __init__(self, broker_url: str) -> None:

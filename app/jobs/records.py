@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from enum import StrEnum
+from enum import Enum, StrEnum
 from typing import Any
 
 
@@ -71,7 +71,7 @@ class Job:
         return self.status.value in FINISHED
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
     """A worker's right to write to one job, until its lease runs out or a later claim has a higher fence."""
 
@@ -87,40 +87,32 @@ class Claim:
     waited_s: float = 0.0  # since the job was made
 
     @property
-    def key(self) -> tuple[str]:
-        """Key of the job's row."""
+    def key(self) -> tuple[str | int, ...]:
+        """Key of the row."""
         return (self.job_id,)
 
 
-@dataclass(frozen=True, slots=True)
-class ChunkClaim:
-    """A worker's right to store the outcome of one chunk."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChunkClaim(Claim):
+    """A worker's right to store the outcome of one chunk of a job; fence and attempt are the chunk's."""
 
-    job_id: str
-    owner: str
-    operation: str
     generation: int
     number: int
-    fence: int
-    attempt: int
-    worker: str
     task: bytes
-    request_id: str | None = None
-    traceparent: str | None = None
 
     @property
-    def key(self) -> tuple[str, int, int]:
-        """Key of the chunk's row."""
+    def key(self) -> tuple[str | int, ...]:
+        """Key of the row."""
         return (self.job_id, self.generation, self.number)
 
 
-@dataclass(frozen=True, slots=True)
-class LeaseState:
-    """Answer to a heartbeat."""
+class StopReason(Enum):
+    """Why running work should stop."""
 
-    held: bool  # False: another claim or the reaper took the job; stop, write nothing
-    cancel_requested: bool = False
-    deadline_passed: bool = False  # finish as `expired`, with the best so far
+    CANCEL = "cancel"  # the user wants no more of it
+    DEADLINE = "deadline"  # its time is over: finish as `expired`, with the best so far
+    SHUTDOWN = "shutdown"  # this worker ends; another will go on from the checkpoint
+    LOST = "lost"  # another claim or the reaper took it: nothing that this worker writes counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,22 +124,3 @@ class ReapReport:
     cancelled: tuple[str, ...] = ()
     expired: tuple[str, ...] = ()
     publish: tuple[str, ...] = ()  # send a wake-up message for these, after the commit
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """One row of a job's history; `seq` rises by one."""
-
-    seq: int
-    type: str
-    payload: Mapping[str, Any]
-    at: datetime
-
-
-@dataclass(frozen=True, slots=True)
-class StoredArtifact:
-    """A file that a job left, without its content."""
-
-    name: str
-    media_type: str
-    size_bytes: int

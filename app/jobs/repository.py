@@ -10,9 +10,10 @@ from sqlalchemy import ColumnElement, delete, func, select, union_all
 
 from app.database import Session
 from app.documents import unpacked_json
-from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound
-from app.jobs.records import FINISHED, Event, Job, StoredArtifact, moment
+from app.errors import ArtifactNotFound, JobNotFinished, JobNotFound, ResultNotReady
+from app.jobs.records import FINISHED, Job
 from app.jobs.rows import JOB_COLUMNS, get_job, job_from_row
+from app.jobs.schemas import Artifact, ArtifactList, JobEvent, JobEventPage
 from app.pages import read_page
 from app.tables import (
     STATUSES,
@@ -24,28 +25,19 @@ from app.tables import (
     jobs,
 )
 
+EVENT_PAGE = 500
 EVERY_STATUS = (None,)
 ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
 
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Which jobs a list shows; what is empty or None does not narrow it.
+    """Which jobs a list shows; what is empty or None does not narrow it."""
 
-    Attributes
-    ----------
-    statuses : tuple of str
-        Any of these.
-    operation, label : str or None
-        Exactly this.
-    created_after, created_before : datetime or None
-        The first moment that counts, and the first that counts no more.
-    """
-
-    statuses: tuple[str, ...] = ()
+    statuses: tuple[str, ...] = ()  # any of these
     operation: str | None = None
     label: str | None = None
-    created_after: datetime | None = None
+    created_after: datetime | None = None  # or at that moment
     created_before: datetime | None = None
 
     @property
@@ -113,45 +105,45 @@ def _newest_ids(
     return sorted(found, reverse=True)[:limit]
 
 
-def events_after(session: Session, owner: str, job_id: str, seq: int, limit: int) -> list[Event]:
-    """Events of a job after number `seq`, oldest first; empty for a job that is not the owner's."""
+def event_page(
+    session: Session, owner: str, job_id: str, after: int, limit: int = EVENT_PAGE
+) -> JobEventPage:
+    """Events of a job after number `after`, oldest first."""
+    job = get_job(session, owner, job_id)
     rows = session.execute(
         select(job_events.c.seq, job_events.c.type, job_events.c.payload, job_events.c.at)
-        .join(jobs, jobs.c.id == job_events.c.job_id)
-        .where(jobs.c.owner == owner, job_events.c.job_id == job_id, job_events.c.seq > seq)
+        .where(job_events.c.job_id == job_id, job_events.c.seq > after)
         .order_by(job_events.c.seq)
         .limit(limit)
     )
-    return [Event(row.seq, row.type, row.payload, moment(row.at)) for row in rows]
+    events = [JobEvent.model_validate(row) for row in rows]
+    last = events[-1].seq if events else after
+    return JobEventPage(events=events, last_seq=last, finished=job.finished and last >= job.event_seq)
 
 
 def result_json(session: Session, owner: str, job_id: str) -> bytes | None:
-    """Return the JSON text of a job's result, None while there is none.
+    """Return the JSON text of a job's result, None while there is none."""
+    get_job(session, owner, job_id)
+    document = session.scalar(select(job_results.c.document).where(job_results.c.job_id == job_id))
+    return None if document is None else unpacked_json(document)
 
-    Raises
-    ------
-    JobNotFound
-        When `owner` has no such job.
-    """
-    row = session.execute(
-        select(job_results.c.document)
-        .select_from(jobs)
-        .outerjoin(job_results, job_results.c.job_id == jobs.c.id)
-        .where(jobs.c.id == job_id, jobs.c.owner == owner)
-    ).one_or_none()
-    if row is None:
-        raise JobNotFound(job_id)
-    return None if row.document is None else unpacked_json(row.document)
+
+def required_result_json(session: Session, owner: str, job_id: str) -> bytes:
+    """Return the JSON text of a job's result; raise `ResultNotReady`, which says why, where there is none."""
+    text = result_json(session, owner, job_id)
+    if text is not None:
+        return text
+    job = get_job(session, owner, job_id)
+    if job.finished:
+        reason = f" ({job.error['code']}: {job.error['detail']})" if job.error else ""
+        hint = "It ended without a result; see its error, and submit a corrected request."
+        raise ResultNotReady(f"Job {job_id} is {job.status.value}{reason}.", hint=hint)
+    hint = f"Wait for the end: GET /jobs/{job_id} with Prefer: wait=30, or its events."
+    raise ResultNotReady(f"Job {job_id} is still {job.status.value}.", hint=hint)
 
 
 def request_json(session: Session, owner: str, job_id: str) -> bytes:
-    """Return the JSON text of a job's request, every sample and model inline.
-
-    Raises
-    ------
-    JobNotFound
-        When `owner` has no such job.
-    """
+    """Return the JSON text of a job's request, every sample and model inline."""
     document = session.execute(
         select(job_requests.c.document)
         .join(jobs, jobs.c.id == job_requests.c.job_id)
@@ -162,51 +154,32 @@ def request_json(session: Session, owner: str, job_id: str) -> bytes:
     return unpacked_json(document)
 
 
-def list_artifacts(session: Session, owner: str, job_id: str) -> list[StoredArtifact]:
-    """Files of a job, by name.
-
-    Raises
-    ------
-    JobNotFound
-        When `owner` has no such job.
-    """
+def list_artifacts(session: Session, owner: str, job_id: str) -> ArtifactList:
+    """Files of a job, by name."""
     get_job(session, owner, job_id)
     rows = session.execute(
         select(artifacts.c.name, artifacts.c.media_type, artifacts.c.size_bytes)
         .where(artifacts.c.job_id == job_id)
         .order_by(artifacts.c.name)
     )
-    return [StoredArtifact(row.name, row.media_type, row.size_bytes) for row in rows]
+    files = [Artifact(href=f"/jobs/{job_id}/artifacts/{row['name']}", **row) for row in rows.mappings()]
+    return ArtifactList(artifacts=files)
 
 
-def artifact_data(session: Session, owner: str, job_id: str, name: str) -> tuple[str, bytes]:
-    """Return media type and content of one file.
-
-    Raises
-    ------
-    ArtifactNotFound
-        When the job left no such file, or is not the owner's.
-    """
-    row = session.execute(
-        select(artifacts.c.media_type, artifacts.c.data)
+def artifact_data(session: Session, owner: str, job_id: str, name: str) -> bytes:
+    """Return the content of one file; raise `ArtifactNotFound` where the owner has no such job or file."""
+    data = session.execute(
+        select(artifacts.c.data)
         .join(jobs, jobs.c.id == artifacts.c.job_id)
         .where(jobs.c.id == job_id, jobs.c.owner == owner, artifacts.c.name == name)
-    ).one_or_none()
-    if row is None:
+    ).scalar_one_or_none()
+    if data is None:
         raise ArtifactNotFound(job_id, name)
-    return row.media_type, bytes(row.data)
+    return bytes(data)
 
 
 def delete_job(session: Session, owner: str, job_id: str) -> None:
-    """Delete a finished job with its events, result and files; its model stays.
-
-    Raises
-    ------
-    JobNotFound
-        When `owner` has no such job.
-    JobNotFinished
-        When it has not ended.
-    """
+    """Delete a finished job with its events, result and files; its model stays."""
     deleted = session.execute(
         delete(jobs)
         .where(jobs.c.id == job_id, jobs.c.owner == owner, jobs.c.status.in_(FINISHED))

@@ -1,4 +1,4 @@
-"""What is forgotten after a time: old jobs, flights, delivered messages, noted deeds. Models are kept.
+"""What is deleted after a time: old jobs, flights, delivered messages, audit entries. Models are kept.
 
 In rounds of a few rows, so that no transaction is long; any number of processes may make rounds at once.
 """
@@ -22,24 +22,12 @@ ROUND_LIMIT = 100  # rows of a table in one round: their files may be megabytes 
 
 @dataclass(frozen=True, slots=True)
 class Keep:
-    """For how many days things are kept; 0: for ever.
+    """For how many days things are kept; 0: for ever."""
 
-    Attributes
-    ----------
-    jobs : float
-        With events, results and files, counted from their end.
-    trajectories : float
-        Uploaded flights; jobs have copies of their own.
-    deliveries : float
-        Webhook messages, counted from their end.
-    audit : float
-        Noted deeds.
-    """
-
-    jobs: float = 0.0
-    trajectories: float = 0.0
-    deliveries: float = 0.0
-    audit: float = 0.0
+    jobs: float = 0.0  # with events, results and files, counted from their end
+    trajectories: float = 0.0  # uploaded flights; jobs have copies of their own
+    deliveries: float = 0.0  # webhook messages, counted from their end
+    audit: float = 0.0  # entries of the audit log
 
     @classmethod
     def of(cls, settings: Settings) -> Keep:
@@ -49,7 +37,7 @@ class Keep:
 
 @dataclass(frozen=True, slots=True)
 class Forgotten:
-    """How much one round forgot."""
+    """How many rows one round deleted."""
 
     jobs: int = 0
     trajectories: int = 0

@@ -1,17 +1,23 @@
-"""Job rows as values, and as leased work."""
+"""Jobs and chunks as leased work, the conditions that select them, and job rows as values.
+
+A spread job is running and its work lies in `job_chunks`. While workers fly its chunks the job itself has no
+holder and no lease. The worker that stored the last chunk, or learns that the job was cancelled or ran out of
+time, takes it over like any claim.
+"""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from enum import Enum
 from typing import Any
 
-from sqlalchemy import Row, Text, cast, delete, func, insert, select, update
+from sqlalchemy import ColumnElement, Row, Text, and_, cast, delete, exists, func, insert, or_, select, update
 
 from app.database import Session, database_time
 from app.documents import finite
 from app.errors import JobNotFound
 from app.jobs.records import FINISHED, HELD, Job, JobStatus, optional_moment
-from app.leases import LeasedRow, LeasedTable, Note
+from app.leases import Key, LeasedRow, LeasedTable, Note
 from app.tables import job_checkpoints, job_chunks, job_events, jobs
 
 JOB_COLUMNS = tuple(jobs.c[field.name] for field in fields(Job) if field.name != "replayed")
@@ -22,12 +28,12 @@ QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
 FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second
 SPARSE_STEP = 120  # of what is older, one event a minute stays
 
+OPEN, RUNNING, DONE = "open", "running", "done"  # states of a chunk
+REST_S = 1.0  # workers take the next chunk within milliseconds; after this the job is at rest
+
 
 def write_event(session: Session, row: LeasedRow, note: Note) -> None:
-    """Write the event of a change; its number is the one that the change has given out.
-
-    The job's new ``status`` and ``attempt`` are added to its payload.
-    """
+    """Write the event of a change, with the job's new ``status`` and ``attempt`` in its payload."""
     content = {**(note.payload or {}), "status": row.status, "attempt": row.attempt}
     session.execute(
         insert(job_events).values(
@@ -48,8 +54,72 @@ JOBS = LeasedTable(
     dated={"updated_at": database_time()},
     noted={"event_seq": jobs.c.event_seq + 1},
     on_change=[write_event],
-    on_end=None,  # `app.on_end` says it
+    on_end=None,  # set by `app.on_end`
 )
+CHUNKS = LeasedTable(
+    job_chunks,
+    key=(job_chunks.c.job_id, job_chunks.c.generation, job_chunks.c.number),
+    lease=job_chunks.c.lease_until,
+    waiting=OPEN,
+    held=(RUNNING,),
+    ends=(DONE,),
+    returning=(job_chunks.c.owner, job_chunks.c.fence, job_chunks.c.attempt),
+    unheld={"worker": None, "lease_until": None},
+    dated={"at": database_time()},
+)
+
+# handed out to several workers: running, and held by none
+HANDED_OUT = and_(jobs.c.status.in_(HELD), jobs.c.lease_until.is_(None), jobs.c.spread)
+
+
+class UnitKind(Enum):
+    """What a worker can take."""
+
+    JOB = "job"  # a queued job
+    CHUNK = "chunk"  # an open chunk of a running job
+    SPREAD = "spread"  # a spread job whose chunks are all stored, or which must end
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """The next piece of work; ``generation`` and ``number`` are those of a chunk."""
+
+    kind: UnitKind
+    job_id: str
+    generation: int = 0
+    number: int = 0
+
+    @property
+    def key(self) -> Key:
+        """Key of the chunk's or the job's row."""
+        place = (self.generation, self.number) if self.kind is UnitKind.CHUNK else ()
+        return (self.job_id, *place)
+
+
+def deadline_passed() -> ColumnElement[bool]:
+    """Whether a job's time is over, by the database's clock."""
+    return jobs.c.deadline_at < database_time()
+
+
+def in_time() -> ColumnElement[bool]:
+    """Whether a job's time is not over."""
+    return or_(jobs.c.deadline_at.is_(None), jobs.c.deadline_at > database_time())
+
+
+def must_go_on() -> ColumnElement[bool]:
+    """Whether a spread job without a holder waits for a worker to advance or to end it."""
+    unfinished = job_chunks.c.status.in_((OPEN, RUNNING))
+    flown = ~exists().where(job_chunks.c.job_id == jobs.c.id, job_chunks.c.owner == jobs.c.owner, unfinished)
+    return and_(HANDED_OUT, or_(jobs.c.status == JobStatus.CANCELLING.value, deadline_passed(), flown))
+
+
+def at_rest() -> ColumnElement[bool]:
+    """Whether a spread job has no holder and no worker flies, or just flew, one of its chunks."""
+    lately = exists().where(
+        job_chunks.c.job_id == jobs.c.id,
+        or_(job_chunks.c.status == RUNNING, job_chunks.c.at > database_time() - REST_S),
+    )
+    return and_(HANDED_OUT, ~lately)
 
 
 def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
@@ -61,13 +131,7 @@ def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
 
 
 def get_job(session: Session, owner: str, job_id: str) -> Job:
-    """Read one job of `owner`.
-
-    Raises
-    ------
-    JobNotFound
-        When there is none with this id, or it is another owner's.
-    """
+    """Read one job; raise `JobNotFound` where this owner has none with this id."""
     row = session.execute(
         select(*JOB_COLUMNS).where(jobs.c.id == job_id, jobs.c.owner == owner)
     ).one_or_none()
@@ -77,10 +141,7 @@ def get_job(session: Session, owner: str, job_id: str) -> Job:
 
 
 def drop_state(session: Session, row: LeasedRow, _note: Note) -> None:
-    """Delete what only somebody who goes on with a job needs, and count what stays: nothing grows any more.
-
-    What an end leaves of its best so far is in its result by then, or lost with its worker.
-    """
+    """Delete what is only needed to go on with a job, and add the size of its history to its stored bytes."""
     session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
     session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == row.id))
     history = (
@@ -92,9 +153,9 @@ def drop_state(session: Session, row: LeasedRow, _note: Note) -> None:
 
 
 def thin_events(session: Session, job_id: str, newest: int) -> None:
-    """Drop the progress event that is `FULL_HISTORY` older than the newest, but for one in `SPARSE_STEP`.
+    """Drop the progress event that is `FULL_HISTORY` older than the newest, except one in `SPARSE_STEP`.
 
-    Called with every new one: the history of the longest job stays short, and nobody ever looks through it.
+    Called with every new event, so that the history of the longest job stays short without any search.
     """
     old = newest - FULL_HISTORY
     if old > 0 and old % SPARSE_STEP:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
-from app.jobs.waiting import QueuePlace as Place
 from app.keys.schemas import Quotas
 from morphdata.operations import OPERATIONS
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
 if TYPE_CHECKING:
     OperationName = str
+    JobResult = Any
 else:
     OperationName = Literal[tuple(operation.name for operation in OPERATIONS)]
+    JobResult = Union[tuple(operation.result for operation in OPERATIONS)]  # noqa: UP007 - of a list
 
 
 class Progress(BaseModel):
@@ -85,11 +86,6 @@ class QueuePlace(BaseModel):
         "nothing is known."
     )
 
-    @classmethod
-    def of(cls, place: Place) -> QueuePlace:
-        """Show a place in the queue."""
-        return cls(position=place.position, eta_s=place.eta_s)
-
 
 class Validation(BaseModel):
     """The request is valid; each operation adds its name and what it would cost."""
@@ -143,36 +139,17 @@ class Job(BaseModel):
     links: JobLinks
 
     @classmethod
-    def of(cls, job: StoredJob, place: Place | None = None) -> Job:
+    def of(cls, job: StoredJob, place: QueuePlace | None = None) -> Job:
         """Show a stored job, and where it stands in the queue."""
         at = f"/jobs/{job.id}"
+        parts = ("events", "result", "artifacts", "cancel")
+        shown = {name: getattr(job, name) for name in cls.model_fields if hasattr(job, name)}
         return cls(
-            id=job.id,
-            operation=job.operation,
-            status=job.status,
-            progress=None if job.progress is None else Progress.model_validate(job.progress),
-            error=None if job.error is None else JobError.model_validate(job.error),
-            partial=job.partial,
-            attempt=job.attempt,
-            max_attempts=job.max_attempts,
-            priority=job.priority,
-            label=job.label,
-            queue=None if place is None else QueuePlace.of(place),
+            **shown,
+            queue=place,
             request=RequestSummary.model_validate(job.summary),
-            model_id=job.model_id,
             last_event=job.event_seq,
-            created_at=job.created_at,
-            started_at=job.started_at,
-            updated_at=job.updated_at,
-            finished_at=job.finished_at,
-            deadline_at=job.deadline_at,
-            links=JobLinks(
-                self=at,
-                events=f"{at}/events",
-                result=f"{at}/result",
-                artifacts=f"{at}/artifacts",
-                cancel=f"{at}/cancel",
-            ),
+            links=JobLinks(self=at, **{part: f"{at}/{part}" for part in parts}),
         )
 
 
@@ -185,6 +162,8 @@ class JobPage(BaseModel):
 
 class JobEvent(BaseModel):
     """One event of a job's history."""
+
+    model_config = ConfigDict(from_attributes=True)
 
     seq: int = Field(description="Rises from 1.")
     type: str = Field(description="`queued`, `started`, `progress`, `requeued`, ... or the final status.")

@@ -9,34 +9,169 @@ stale one changes nothing and returns False.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 
 from sqlalchemy import case, delete, insert, literal, or_, select
 
-from app.database import Session, database_time
-from app.documents import Document, finite, packed, unpacked
-from app.errors import JobNotFound
+from app.database import Session, database_time, insert_new
+from app.documents import Document, Sealed, finite, packed, sealed, unpacked
+from app.errors import IdempotencyConflict, JobNotFound
+from app.identifiers import new_identifier
 from app.jobs.artifacts import store_artifacts
-from app.jobs.chunk_rows import CHUNKS, at_rest, deadline_passed, in_time
-from app.jobs.creation import create_job
-from app.jobs.records import FINISHED, HELD, ChunkClaim, Claim, Job, JobStatus, LeaseState
-from app.jobs.rows import JOBS, get_job, job_from_row, thin_events
+from app.jobs.records import FINISHED, HELD, ChunkClaim, Claim, Job, JobStatus, StopReason
+from app.jobs.rows import (
+    CHUNKS,
+    JOB_COLUMNS,
+    JOBS,
+    at_rest,
+    deadline_passed,
+    get_job,
+    in_time,
+    job_from_row,
+    thin_events,
+    write_event,
+)
 from app.jobs.turns import note_served
+from app.keys import quota
 from app.leases import LeasedRow, Note
-from app.tables import job_checkpoints, job_chunks, job_requests, job_results, jobs
+from app.tables import (
+    idempotency_keys,
+    job_checkpoints,
+    job_chunks,
+    job_requests,
+    job_results,
+    jobs,
+    owners,
+)
 
-__all__ = [
-    "claim_job",
-    "create_job",
-    "finish_job",
-    "get_job",
-    "load_checkpoint",
-    "load_request",
-    "look_at_lease",
-    "release_job",
-    "renew_lease",
-    "request_cancel",
-    "save_progress",
-]
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Which call a job comes from."""
+
+    key_id: str | None = None  # the API key, whose quota the job uses
+    request_id: str | None = None  # leads from the call's logs to the worker's
+    traceparent: str | None = None  # W3C trace context
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """How a job is run."""
+
+    priority: int = 0  # inside its owner the highest runs first
+    label: str | None = None  # the owner's own word for it
+    max_attempts: int = 3  # claims before a job whose workers are lost is given up
+    max_seconds: float | None = None  # deadline, counted from the first claim
+    expires_in_s: float | None = None  # a job that has not begun after this time is not begun any more
+
+
+NO_ORIGIN = Origin()
+USUAL_TERMS = Terms()
+
+
+def create_job(
+    session: Session,
+    *,
+    owner: str,
+    operation: str,
+    request: Document | Sealed,
+    summary: Document | None = None,
+    flights_estimated: int = 0,
+    terms: Terms = USUAL_TERMS,
+    origin: Origin = NO_ORIGIN,
+    idempotency_key: str | None = None,
+) -> Job:
+    """Write a queued job; publish its id after the commit.
+
+    Parameters
+    ----------
+    request : dict or Sealed
+        The whole request, every sample inline: what `load_request` gives the worker.
+    summary : dict, optional
+        The few small facts of the request that listings show.
+    flights_estimated : int
+        Charged to the key until the job has ended and its flights are known.
+    idempotency_key : str, optional
+        With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
+
+    Raises
+    ------
+    IdempotencyConflict
+        The key was used for another request.
+    QuotaExceeded
+        The API key may not have another such job.
+    """
+    job_id = new_identifier("job")
+    document = request if isinstance(request, Sealed) else sealed(request)
+    if idempotency_key is not None:
+        earlier = _take_idempotency_key(session, owner, idempotency_key, operation, document.sha256, job_id)
+        if earlier is not None:
+            return earlier
+    size_bytes = len(document.data)
+    quota.charge(session, origin.key_id, new_jobs=1, flights=flights_estimated, size_bytes=size_bytes)
+    agreed = {**asdict(origin), **asdict(terms)}
+    expires_in_s = agreed.pop("expires_in_s")
+    row = session.execute(
+        insert(jobs)
+        .values(
+            id=job_id,
+            owner=owner,
+            operation=operation,
+            status=JobStatus.QUEUED.value,
+            summary=finite(summary or {}),
+            attempt=0,
+            fence=0,
+            event_seq=1,
+            partial=False,
+            deadline_at=None if expires_in_s is None else database_time() + expires_in_s,
+            published_at=database_time(),
+            created_at=database_time(),
+            updated_at=database_time(),
+            flights_estimated=flights_estimated,
+            size_bytes=size_bytes,
+            **agreed,
+        )
+        .returning(*JOBS.returning)
+    ).one()
+    session.execute(
+        insert(job_requests).values(job_id=job_id, document=document.data, sha256=document.sha256)
+    )
+    write_event(session, row, Note("queued"))
+    session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
+    return job_from_row(row)
+
+
+def _take_idempotency_key(
+    session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
+) -> Job | None:
+    """Write the key, or return the job that holds it. The unique key decides between two racing requests.
+
+    A job is deleted together with its key, and on Postgres that may be committed between any two statements
+    here: then the key is free, and is written after all. A job that is returned is there until the commit.
+    """
+    keys = idempotency_keys
+    values = {
+        "owner": owner,
+        "key": key,
+        "operation": operation,
+        "sha256": fingerprint,
+        "job_id": job_id,
+        "at": database_time(),
+    }
+    taking = insert_new(session, keys).values(**values).on_conflict_do_nothing().returning(keys.c.job_id)
+    holding = select(keys).where(keys.c.owner == owner, keys.c.key == key)
+    while session.execute(taking).one_or_none() is None:
+        earlier = session.execute(holding).one_or_none()
+        if earlier is None:
+            continue
+        if (earlier.operation, earlier.sha256) != (operation, fingerprint):
+            raise IdempotencyConflict(key)
+        kept = select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
+        # waits for whoever is deleting the job, and for nobody else
+        row = session.execute(kept.with_for_update(read=True, key_share=True)).one_or_none()
+        if row is not None:
+            return job_from_row(row, replayed=True)
+    return None
 
 
 def load_request(session: Session, job_id: str) -> Document:
@@ -51,10 +186,10 @@ def load_request(session: Session, job_id: str) -> Document:
 
 
 def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 60.0) -> Claim | None:
-    """Take a queued job: fence and attempt rise by one, the lease runs from now (database time).
+    """Take a queued job: fence and attempt rise by one, the lease runs from now, another owner is next.
 
-    It is the turn of another owner then. Returns None when the job is not queued any more (someone else was
-    first, or it was cancelled) or its time is over.
+    Returns None when the job is not queued any more (someone else was first, or it was cancelled) or its time
+    is over.
     """
     now = database_time()
     first = jobs.c.started_at.is_(None)
@@ -90,14 +225,14 @@ def claim_from_row(row: LeasedRow, worker_name: str) -> Claim:
     )
 
 
-def renew_lease(session: Session, claim: Claim | ChunkClaim, lease_s: float = 60.0) -> LeaseState:
-    """The heartbeat: push the lease out and learn whether to stop."""
+def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> StopReason | None:
+    """Extend the lease, and return why the work should stop."""
     (CHUNKS if isinstance(claim, ChunkClaim) else JOBS).renew(session, claim, lease_s)
     return look_at_lease(session, claim)
 
 
-def look_at_lease(session: Session, claim: Claim | ChunkClaim) -> LeaseState:
-    """Learn whether to stop, writing nothing: cheap enough to ask several times a second.
+def look_at_lease(session: Session, claim: Claim) -> StopReason | None:
+    """Return why the work should stop, writing nothing: cheap enough to ask several times a second.
 
     The database's clock judges deadlines: a worker's may be an hour wrong.
     """
@@ -109,27 +244,17 @@ def look_at_lease(session: Session, claim: Claim | ChunkClaim) -> LeaseState:
         query = query.where(*JOBS.held_by(claim))
     row = session.execute(query).one_or_none()
     if row is None:
-        return LeaseState(held=False)
-    return LeaseState(
-        held=True,
-        cancel_requested=row.status == JobStatus.CANCELLING.value,
-        deadline_passed=bool(row.deadline_passed),
-    )
+        return StopReason.LOST
+    if row.status == JobStatus.CANCELLING.value:
+        return StopReason.CANCEL
+    return StopReason.DEADLINE if row.deadline_passed else None
 
 
 def save_progress(session: Session, claim: Claim, progress: Document, checkpoint: bytes | None) -> bool:
-    """Write progress, its event and (when given) the checkpoint, all or nothing.
+    """Write progress, its event and (when given) the checkpoint; return False for a stale claim.
 
-    Parameters
-    ----------
-    progress : dict
-        ``fraction`` (0..1), ``generation``, ``best_cost``, ``flights``, ``flights_per_s``, ``eta_s``,
-        ``phase``, ``message``; any may be missing. NaN and infinity become null.
-
-    Returns
-    -------
-    bool
-        False when the claim is stale; nothing was written then.
+    ``progress`` may have ``fraction`` (0..1), ``generation``, ``best_cost``, ``flights``, ``flights_per_s``,
+    ``eta_s``, ``phase`` and ``message``. NaN and infinity become null.
     """
     clean = finite(progress)
     values: Document = {"progress": clean}
@@ -171,7 +296,7 @@ def finish_job(
     error: Document | None = None,
     artifacts: Mapping[str, bytes] | None = None,
 ) -> bool:
-    """End a claimed job, with what it leaves behind.
+    """End a claimed job, with what it leaves behind; return False for a stale claim.
 
     Parameters
     ----------
@@ -181,11 +306,6 @@ def finish_job(
         ``{"code", "detail", "hint"?, "pointer"?}`` of a failure; stored and shown as it is.
     artifacts : mapping, optional
         File name -> content.
-
-    Returns
-    -------
-    bool
-        False when the claim is stale; nothing was written then.
     """
     ending = JobStatus(status).value
     if ending not in FINISHED:
@@ -238,13 +358,8 @@ def release_job(session: Session, claim: Claim) -> bool:
 def request_cancel(session: Session, owner: str, job_id: str) -> Job:
     """Ask a job to end: a queued one does at once, a running one winds down, a finished one stays as it is.
 
-    A spread job at which nobody works just now ends at once as well: there is nobody to wind it down.
+    A spread job that no worker is at just now ends at once as well: there is nobody to wind it down.
     Otherwise publish the id after the commit, so that some worker does.
-
-    Raises
-    ------
-    JobNotFound
-        When `owner` has no such job.
     """
     mine = (jobs.c.id == job_id, jobs.c.owner == owner)
     row = JOBS.change(

@@ -18,19 +18,14 @@ from app.broker import canonical, is_redis
 
 CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
 SOCKET_TIMEOUT_S = 2.0
-# Celery prefers these to what it is told; whoever has them set means another application
+# Celery prefers these to its settings; whoever has them set means another application
 CELERY_VARIABLES = ("BROKER_URL", "BROKER_READ_URL", "BROKER_WRITE_URL", "RESULT_BACKEND", "LOADER")
 
 
 def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> dict[str, Any]:
     """Return Celery's settings of a broker; variables of Celery's own (`CELERY_BROKER_URL`) no longer count.
 
-    Parameters
-    ----------
-    url
-        The broker's address, in any spelling that `app.broker` knows.
-    transport
-        Import path of the transport, for Redis and Valkey.
+    ``transport`` is the import path of the transport for Redis and Valkey.
     """
     # Celery puts the working folder first on the import path while it loads modules of its own; what another
     # thread imports in that moment would come from there
@@ -59,10 +54,10 @@ class Channel(redis.Channel):
     """A channel to the server that redis-py reads out of the address."""
 
     def _connparams(self, asynchronous: bool = False) -> dict[str, Any]:  # noqa: FBT001, FBT002 - kombu's
-        told: dict[str, Any] = dict(parse_url(self.connection.client.hostname))  # type: ignore[no-untyped-call]
-        self.connection_class = told.pop("connection_class", Connection)
+        given: dict[str, Any] = dict(parse_url(self.connection.client.hostname))  # type: ignore[no-untyped-call]
+        self.connection_class = given.pop("connection_class", Connection)
         parameters: dict[str, Any] = super()._connparams(asynchronous)  # type: ignore[no-untyped-call]
-        parameters |= told
+        parameters |= given
         if issubclass(self.connection_class, UnixDomainSocketConnection):
             for name in ("socket_keepalive", "socket_keepalive_options"):
                 parameters.pop(name, None)
@@ -73,7 +68,7 @@ class Channel(redis.Channel):
 
 
 class Transport(redis.Transport):
-    """Kombu's Redis transport, told the whole address."""
+    """Kombu's Redis transport, given the whole address."""
 
     Channel = Channel
     can_parse_url = True

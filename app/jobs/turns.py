@@ -8,65 +8,56 @@ more urgent. Each question is a few steps down an index, whatever the length of 
 
 from __future__ import annotations
 
-from sqlalchemy import CTE, Column, ColumnElement, func, select, union, update
+from typing import Any
+
+from sqlalchemy import CTE, Column, ColumnElement, Row, func, select, union, update
 
 from app.database import Session, database_time
-from app.jobs.chunk_rows import (
-    HANDED_OUT,
-    OPEN,
-    RUNNING,
-    Unit,
-    UnitKind,
-    in_time,
-    next_chunk_of,
-    next_spread_job,
-)
 from app.jobs.records import HELD, JobStatus
+from app.jobs.rows import HANDED_OUT, OPEN, RUNNING, Unit, UnitKind, in_time, must_go_on
 from app.tables import job_chunks, jobs, owners
 
 QUEUED = jobs.c.status == JobStatus.QUEUED.value
 OWNERS_LOOKED_AT = 64  # in one turn; the others' jobs would all have to be locked by other workers
 
 
-def waiting_owners() -> CTE:
-    """Owners with queued jobs, each found by one step down the index: no look at all that is queued."""
-    return _owners(jobs.c.owner, QUEUED, "waiting")
-
-
 def _owners(column: Column[str], condition: ColumnElement[bool], name: str) -> CTE:
+    """Owners of some rows, each found by one step down an index."""
     first = select(func.min(column).label("owner")).where(condition)
     found = first.cte(name, recursive=True)
     following = select(func.min(column)).where(condition, column > found.c.owner)
     return found.union_all(select(following.scalar_subquery()).where(found.c.owner.is_not(None)))
 
 
-def running_of(owner: ColumnElement[str]) -> ColumnElement[int]:
-    """How many workers an owner's jobs and chunks have."""
-    held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), jobs.c.owner == owner)
-    flown = select(func.count()).select_from(job_chunks)
-    flown = flown.where(job_chunks.c.status == RUNNING, job_chunks.c.owner == owner)
-    return held.where(~HANDED_OUT).scalar_subquery() + flown.scalar_subquery()
+def running(*owner: ColumnElement[str]) -> ColumnElement[int]:
+    """Number of jobs, and chunks of spread ones, in workers' hands: of one owner, or of all."""
+    held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), ~HANDED_OUT)
+    flown = select(func.count()).select_from(job_chunks).where(job_chunks.c.status == RUNNING)
+    for each in owner:
+        held, flown = held.where(jobs.c.owner == each), flown.where(job_chunks.c.owner == each)
+    return held.scalar_subquery() + flown.scalar_subquery()
 
 
 def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]:
     """Owners with waiting work in the order of their turns."""
-    queued, flying = waiting_owners(), _owners(job_chunks.c.owner, job_chunks.c.status == OPEN, "flying")
+    queued = _owners(jobs.c.owner, QUEUED, "waiting")
+    flying = _owners(job_chunks.c.owner, job_chunks.c.status == OPEN, "flying")
     waiting = union(select(queued.c.owner), select(flying.c.owner)).subquery()
     return list(
         session.scalars(
             select(waiting.c.owner)
             .outerjoin(owners, owners.c.owner == waiting.c.owner)
             .where(waiting.c.owner.is_not(None))
-            .order_by(running_of(waiting.c.owner), func.coalesce(owners.c.served_at, 0.0), waiting.c.owner)
+            .order_by(running(waiting.c.owner), func.coalesce(owners.c.served_at, 0.0), waiting.c.owner)
             .limit(limit)
         )
     )
 
 
 def next_job_of(session: Session, owner: str, *, above: int | None = None) -> str | None:
-    """Id of the owner's job that should run next; one that another worker is taking is passed over.
+    """Id of the owner's next job, of a higher priority than ``above`` if that is given.
 
-    ``above``: only one of a higher priority than this.
+    A job that another worker is taking is passed over.
     """
     urgent = () if above is None else (jobs.c.priority > above,)
     return session.execute(
@@ -78,16 +69,40 @@ def next_job_of(session: Session, owner: str, *, above: int | None = None) -> st
     ).scalar_one_or_none()
 
 
+def _next_spread_job(session: Session) -> str | None:
+    """Id of a spread job that must go on; one that another worker is taking is passed over."""
+    return session.execute(
+        select(jobs.c.id).where(must_go_on()).order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True)
+    ).scalar_one_or_none()
+
+
+def _next_chunk_of(session: Session, owner: str) -> Row[*tuple[Any, ...]] | None:
+    """The owner's open chunk that should be flown next: of the most urgent job, then of the oldest."""
+    return session.execute(
+        select(job_chunks.c.job_id, job_chunks.c.generation, job_chunks.c.number, jobs.c.priority)
+        .join(jobs, jobs.c.id == job_chunks.c.job_id)
+        .where(
+            job_chunks.c.status == OPEN,
+            job_chunks.c.owner == owner,
+            jobs.c.status == JobStatus.RUNNING.value,
+            in_time(),
+        )
+        .order_by(jobs.c.priority.desc(), job_chunks.c.job_id, job_chunks.c.number)
+        .limit(1)
+        .with_for_update(skip_locked=True, of=job_chunks)
+    ).one_or_none()
+
+
 def next_unit(session: Session) -> Unit | None:
     """The work that should be done next, None when there is none to be had.
 
     A spread job that must go on comes before all turns: many workers wait for that moment's work.
     """
-    spread = next_spread_job(session)
+    spread = _next_spread_job(session)
     if spread is not None:
         return Unit(UnitKind.SPREAD, spread)
     for owner in owners_in_turn(session):
-        chunk = next_chunk_of(session, owner)
+        chunk = _next_chunk_of(session, owner)
         job_id = next_job_of(session, owner, above=None if chunk is None else chunk.priority)
         if job_id is not None:
             return Unit(UnitKind.JOB, job_id)

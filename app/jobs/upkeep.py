@@ -1,6 +1,6 @@
 """Reaper, retention and disk space inside the API process: they go on while every worker is busy for hours.
 
-Workers reap too, whenever one is free. Each change is a compare-and-set, so nobody gets in another's way.
+Workers reap too, whenever one is free. Each change is a compare-and-set, so they do not interfere.
 """
 
 from __future__ import annotations
@@ -29,16 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class Upkeep:
-    """One thread that makes a round every ten seconds.
-
-    Parameters
-    ----------
-    database : Database
-    publisher : Publisher
-        Takes the wake-up messages.
-    settings : Settings
-    reap_every_s : float
-    """
+    """One thread that makes a round every `reap_every_s`."""
 
     def __init__(
         self,
@@ -106,11 +97,11 @@ class Upkeep:
         return report
 
     def forget(self) -> bool:
-        """Make one round of retention; tell whether there is more to forget."""
+        """Make one round of retention; return whether there is more to delete."""
         if self._keep == Keep():
             return False
         with self._database.write() as session:
             forgotten = forget(session, self._keep)
         if forgotten.jobs or forgotten.trajectories:
-            log.info("forgot %d jobs and %d trajectories", forgotten.jobs, forgotten.trajectories)
+            log.info("deleted %d jobs and %d trajectories", forgotten.jobs, forgotten.trajectories)
         return forgotten.more

@@ -13,29 +13,14 @@ from dataclasses import dataclass
 from sqlalchemy import and_, func, select
 
 from app.database import Session, database_time
-from app.jobs.chunk_rows import HANDED_OUT, RUNNING
 from app.jobs.records import HELD, Job, JobStatus
-from app.tables import job_chunks, jobs, owners, workers
+from app.jobs.schemas import QueuePlace
+from app.jobs.turns import running
+from app.tables import jobs, owners, workers
 
-ALIVE_S = 60.0  # a worker that was not seen for so long is not counted on
+ALIVE_S = 60.0  # a worker that was not seen for so long does not count
 FRESH_S = 1.0  # the queue is counted again after this; a job's place among its owner's jobs always is
-RECENT = 50  # finished jobs that tell how long jobs take
-
-
-@dataclass(frozen=True, slots=True)
-class QueuePlace:
-    """Where a queued job stands.
-
-    Attributes
-    ----------
-    position : int
-        1 for the job whose turn is next, if nobody posts anything from now on.
-    eta_s : float or None
-        Until it begins, from what jobs took lately; None while nothing is known.
-    """
-
-    position: int
-    eta_s: float | None
+RECENT = 50  # finished jobs, from which follows how long jobs take
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,31 +34,15 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Census:
-    """The queue of a moment.
+    """The queue at one moment."""
 
-    Attributes
-    ----------
-    lines : mapping
-        Of each owner with jobs that wait or run.
-    took_s : mapping
-        Mean time that recent jobs of each operation took, s; None stands for all of them.
-    slots : int
-        Jobs that the live workers can run at once; 1 when none told.
-    """
-
-    lines: Mapping[str, Line]
-    took_s: Mapping[str | None, float]
-    slots: int
+    lines: Mapping[str, Line]  # of each owner with jobs that wait or run
+    took_s: Mapping[str | None, float]  # mean time of recent jobs of each operation; None: of all
+    slots: int  # jobs that the live workers can run at once, at least 1
 
 
 class QueueView:
-    """The queue as one process sees it: counted once a second, however many ask.
-
-    Parameters
-    ----------
-    clock
-        Seconds that only rise.
-    """
+    """The queue as one process sees it: counted once a second, however many ask."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -122,30 +91,23 @@ def _by_owner(session: Session, *statuses: str) -> dict[str, int]:
 
 
 def live_slots(session: Session) -> int:
-    """Jobs that the workers can run at once, as far as they told; 0 when none did."""
+    """Jobs that the live workers can run at once."""
     alive = and_(workers.c.stopped_at.is_(None), workers.c.seen_at > database_time() - ALIVE_S)
     return int(session.scalar(select(func.coalesce(func.sum(workers.c.slots), 0)).where(alive)) or 0)
 
 
-def running(session: Session) -> int:
-    """Jobs, and chunks of spread ones, in workers' hands."""
-    held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), ~HANDED_OUT)
-    flown = select(func.count()).select_from(job_chunks).where(job_chunks.c.status == RUNNING)
-    return int(session.scalar(held) or 0) + int(session.scalar(flown) or 0)
-
-
 def idle_slots(session: Session) -> int:
-    """Jobs that workers could begin now; never less than nothing."""
-    return max(live_slots(session) - running(session), 0)
+    """Jobs that workers could begin now."""
+    return max(live_slots(session) - session.execute(select(running())).scalar_one(), 0)
 
 
 def _place(census: Census, owner: str, operation: str, mine_ahead: int) -> QueuePlace:
     ahead = mine_ahead + _others_ahead(census.lines, owner, mine_ahead)
     took_s = census.took_s.get(operation, census.took_s.get(None))
     if took_s is None:
-        return QueuePlace(ahead + 1, None)
+        return QueuePlace(position=ahead + 1, eta_s=None)
     ends_needed = ahead + 1 + sum(line.running for line in census.lines.values()) - census.slots
-    return QueuePlace(ahead + 1, max(ends_needed, 0) * took_s / census.slots)
+    return QueuePlace(position=ahead + 1, eta_s=max(ends_needed, 0) * took_s / census.slots)
 
 
 def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None) -> int:
@@ -166,8 +128,8 @@ def _others_ahead(lines: Mapping[str, Line], owner: str, mine_ahead: int) -> int
     """Count the other owners' jobs that have their turn before the owner's job number `mine_ahead`.
 
     An owner's job number k (from 0) has its turn when running + k jobs of that owner have begun. In turns of
-    the same number who runs more comes first, since he was not served in the turns before, then who was
-    served least recently.
+    the same number the owner who runs more comes first, since he was not served in the turns before, then the
+    one who was served least recently.
     """
     mine = lines.get(owner, Line())
     turn = mine.running + mine_ahead

@@ -45,7 +45,7 @@ class Subscription:
             return False
         return True
 
-    def tell(self) -> None:
+    def wake(self) -> None:
         """Wake the waiting client."""
         self._news.set()
 
@@ -53,14 +53,8 @@ class Subscription:
 class JobWatcher:
     """Looks at the watched jobs every `poll_s` seconds and wakes those who wait for them.
 
-    What a look costs grows with the jobs that are watched and the clients that are woken, not with those that
-    wait.
-
-    Parameters
-    ----------
-    database : Database
-    poll_s : float
-        The longest that news of a job lies about, s; longer while a look takes a quarter of that, or more.
+    The cost of a look grows with the jobs that are watched and the clients that are woken, not with those
+    that wait. A look that takes a quarter of `poll_s` or more makes the next one later.
     """
 
     def __init__(self, database: Database, poll_s: float) -> None:
@@ -82,7 +76,7 @@ class JobWatcher:
         self.closed = True
         for subscriptions in self._subscriptions.values():
             for subscription in subscriptions:
-                subscription.tell()
+                subscription.wake()
 
     async def stop(self) -> None:
         """Stop looking."""
@@ -109,7 +103,7 @@ class JobWatcher:
                 self._numbers.pop(job_id, None)
 
     def expect(self, subscription: Subscription) -> None:
-        """Note that a client begins to wait; the next look tells it what an earlier one has seen already."""
+        """Note that a client begins to wait; the next look wakes it if an earlier one has seen its news."""
         if self._numbers.get(subscription.job_id, -1) > subscription.seen:
             self._late.add(subscription)
 
@@ -129,9 +123,9 @@ class JobWatcher:
                 continue
             finally:
                 took_s = time.monotonic() - began
-            self._tell(ids, numbers)
+            self._wake(ids, numbers)
 
-    def _tell(self, ids: list[str], numbers: dict[str, int]) -> None:
+    def _wake(self, ids: list[str], numbers: dict[str, int]) -> None:
         """Wake whoever has not seen the last event of a job, or follows one that is gone."""
         woken, self._late = self._late, set()
         for job_id in ids:
@@ -141,7 +135,7 @@ class JobWatcher:
                 woken |= self._subscriptions[job_id]
         for subscription in woken:
             if self._numbers.get(subscription.job_id, -1) > subscription.seen:
-                subscription.tell()
+                subscription.wake()
 
     def _event_numbers(self, ids: list[str]) -> dict[str, int]:
         numbers: dict[str, int] = {}

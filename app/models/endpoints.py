@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
@@ -9,7 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
 from app.errors import ExportFailed, InvalidRequest, ModelNotFound, QuotaExceeded
 from app.http.context import CallerDep, OwnerDep, ServiceDep, demands
@@ -24,7 +25,7 @@ from app.models.schemas import IdentifiedModel, ModelPage
 from morphdata.export import FormatName
 from morphdata.formats import FORMATS, format_named
 
-router = APIRouter(tags=["models"])
+router = APIRouter(tags=["models"], generate_unique_id_function=attrgetter("name"))
 
 EXPORT_WAIT_S = 5.0  # unless the client prefers another time; a free worker needs about a second
 ASK_AGAIN_S = 2  # while the job that writes the file is under way
@@ -56,7 +57,6 @@ EXPORTED: dict[int | str, dict[str, Any]] = {
 @router.get(
     "/models",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="list_models",
     summary="List identified models",
     responses=documented(InvalidRequest),
 )
@@ -74,7 +74,6 @@ def list_models(
 @router.get(
     "/models/{model_id}",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="get_model",
     summary="Get an identified model",
     responses=documented(InvalidRequest, ModelNotFound),
 )
@@ -88,7 +87,6 @@ def get_model(app: ServiceDep, owner: OwnerDep, model_id: IdPath) -> IdentifiedM
 @router.delete(
     "/models/{model_id}",
     dependencies=[demands(Scope.DATA_WRITE)],
-    operation_id="delete_model",
     summary="Delete an identified model",
     status_code=204,
     responses=documented(InvalidRequest, ModelNotFound),
@@ -106,7 +104,6 @@ def delete_model(app: ServiceDep, caller: CallerDep, model_id: IdPath) -> None:
 @router.get(
     "/models/{model_id}/export",
     dependencies=[demands(Scope.DATA_READ, Scope.JOBS_WRITE)],
-    operation_id="export_model",
     summary="Export an identified model as a file",
     description="Answer with the file if it is there within 5 s (or as long as `Prefer: wait=n` says), else "
     f"with the job that writes it: one for each model and format.\n\n{FORMATS_TEXT}",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from sqlalchemy import Row, delete, insert, select, update
+from sqlalchemy import delete, insert, select, update
 
 from app.database import Session, database_time
 from app.documents import Document, packed, unpacked
 from app.errors import ModelNotFound
-from app.jobs.records import moment
+from app.identifiers import new_identifier
+from app.jobs.store import load_request
+from app.leases import LeasedRow
 from app.models.schemas import ModelPage, ModelSummary
 from app.pages import read_page
 from app.tables import jobs, models
@@ -19,29 +19,14 @@ NAME_LENGTH = 200
 SUMMARY_COLUMNS = (models.c.id, models.c.name, models.c.job_id, models.c.links_per_wing, models.c.created_at)
 
 
-def insert_model(
-    session: Session,
-    *,
-    model_id: str,
-    owner: str,
-    job_id: str,
-    key_id: str | None,
-    request: Document,
-    identified: Document,
-) -> None:
-    """Store an identified model with all that is needed to fly it again.
+def insert_model(session: Session, job: LeasedRow, identified: Document) -> None:
+    """Store the model that a job has identified, with all that is needed to fly it again.
 
-    Parameters
-    ----------
-    key_id
-        Of the job that identified it; the model counts in this key's stored bytes until it is deleted.
-    request
-        Of the job that identified it; its aircraft, flight and options are kept.
-    identified
-        The ``model`` and its ``fit``, see `app.models.extraction`.
+    It counts in the stored bytes of the job's key until it is deleted. ``identified`` has the ``model`` and
+    its ``fit``; aircraft, flight and options are those of the job's request.
     """
-    model = identified.get("model") or {}
-    aircraft = request.get("aircraft") or {}
+    request = load_request(session, job.id)
+    model, aircraft = identified.get("model") or {}, request.get("aircraft") or {}
     links = model.get("links_per_wing")
     name = str(aircraft.get("name") or "aircraft")
     stored = packed(
@@ -53,46 +38,32 @@ def insert_model(
             "options": {**(request.get("model") or {}), "links_per_wing": links},
         }
     )
+    model_id = new_identifier("model")
     session.execute(
         insert(models).values(
             id=model_id,
-            owner=owner,
+            owner=job.owner,
             name=f"{name}, {links} links per wing"[:NAME_LENGTH],
-            job_id=job_id,
+            job_id=job.id,
             links_per_wing=links,
             document=stored,
             created_at=database_time(),
-            key_id=key_id,
+            key_id=job.key_id,
             size_bytes=len(stored),
         )
     )
-
-
-def _summary(row: Row[*tuple[Any, ...]]) -> ModelSummary:
-    return ModelSummary(
-        id=row.id,
-        name=row.name,
-        links_per_wing=row.links_per_wing,
-        job_id=row.job_id,
-        created_at=moment(row.created_at),
-    )
+    session.execute(update(jobs).where(jobs.c.id == job.id).values(model_id=model_id))
 
 
 def list_models(session: Session, owner: str, *, cursor: str | None, limit: int) -> ModelPage:
     """One page of the owner's models."""
     query = select(*SUMMARY_COLUMNS).where(models.c.owner == owner)
     rows, next_cursor = read_page(session, query, models.c.id, cursor=cursor, limit=limit)
-    return ModelPage(models=[_summary(row) for row in rows], next_cursor=next_cursor)
+    return ModelPage(models=[ModelSummary.model_validate(row) for row in rows], next_cursor=next_cursor)
 
 
 def delete_model(session: Session, owner: str, model_id: str) -> None:
-    """Delete one model; its job stays, and so do jobs that were started with it.
-
-    Raises
-    ------
-    ModelNotFound
-        When `owner` has no such model.
-    """
+    """Delete one model; its job stays, and so do jobs that were started with it."""
     deleted = session.execute(
         delete(models).where(models.c.id == model_id, models.c.owner == owner).returning(models.c.job_id)
     ).one_or_none()
@@ -102,16 +73,10 @@ def delete_model(session: Session, owner: str, model_id: str) -> None:
 
 
 def get_model(session: Session, owner: str, model_id: str) -> tuple[ModelSummary, Document]:
-    """Read one model with its document.
-
-    Raises
-    ------
-    ModelNotFound
-        When `owner` has no such model.
-    """
+    """Read one model with its document; raise `ModelNotFound` where the owner has none with this id."""
     row = session.execute(
         select(*SUMMARY_COLUMNS, models.c.document).where(models.c.id == model_id, models.c.owner == owner)
     ).one_or_none()
     if row is None:
         raise ModelNotFound(model_id)
-    return _summary(row), unpacked(row.document)
+    return ModelSummary.model_validate(row), unpacked(row.document)

@@ -5,13 +5,15 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.identify import IdentifiedParameters, SampleFit
 
 
 class ModelSummary(BaseModel):
     """An identified model without its parameters."""
+
+    model_config = ConfigDict(from_attributes=True)
 
     id: str = Field(examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"])
     name: str

@@ -14,7 +14,7 @@ from app.jobs import repository as jobs
 from app.jobs.records import JobStatus
 from app.jobs.schemas import Job
 from app.models import repository
-from app.operations.submission import Submission
+from app.operations.endpoints import Submission
 from morphdata.export import ExportRequest
 from morphdata.formats import ExportFormat
 from morphdata.operations.export import EXPORT
@@ -68,8 +68,7 @@ def exported_file(app: Service, caller: Caller, job: Job, file_format: ExportFor
             "" if error is None else error.hint,
         )
     with app.database.read() as session:
-        _, data = jobs.artifact_data(session, caller.owner, job.id, file_format.file)
-    return data
+        return jobs.artifact_data(session, caller.owner, job.id, file_format.file)
 
 
 def _request(app: Service, caller: Caller, model_id: str, file_format: ExportFormat) -> ExportRequest:

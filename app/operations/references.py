@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from app.database import Session
 from app.documents import Document
-from app.errors import JobNotFound, ModelNotFound
+from app.errors import NotFound
 from app.jobs import repository as jobs
 from app.jobs.rows import get_job
 from app.models import repository as models
@@ -24,7 +24,7 @@ from morphdata.faults import Fault, InvalidInput
 from morphdata.identify import total_rows_faults
 from morphdata.parameters import Parameters
 
-Asked = TypeVar("Asked", bound=Request)
+AnyRequest = TypeVar("AnyRequest", bound=Request)
 
 
 class Reference(NamedTuple):
@@ -40,13 +40,10 @@ class Reference(NamedTuple):
         return f"{self.at}/{self.field}"
 
 
-def resolved(session: Session, owner: str, request: Asked) -> Asked:
+def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
     """Return the request with everything inline that it refers to.
 
-    Raises
-    ------
-    InvalidInput
-        Something does not exist, or does not fit the rest of the request; every fault is named.
+    Raises `InvalidInput`, which names every fault, where something does not exist or does not fit.
     """
     found = list(_references(request))
     if not found:
@@ -59,12 +56,14 @@ def resolved(session: Session, owner: str, request: Asked) -> Asked:
             _put(document, item, RESOLVERS[item.field](session, owner, item))
         except InvalidInput as error:
             faults += error.faults
+        except NotFound as error:
+            faults.append(Fault(error.code, error.detail, item.pointer, error.hint))
     if faults:
         raise InvalidInput.of(faults)
     try:
         return type(request).parse(document)
     except InvalidInput as error:
-        raise InvalidInput.of([_told(fault, found) for fault in error.faults]) from None
+        raise InvalidInput.of([_at_its_id(fault, found) for fault in error.faults]) from None
 
 
 def _references(value: object, pointer: str = "") -> Iterator[Reference]:
@@ -82,7 +81,7 @@ def _references(value: object, pointer: str = "") -> Iterator[Reference]:
 
 
 def _put(document: Document, reference: Reference, found: Document) -> None:
-    """Put what was found in the place of an id; what the request itself says there counts more."""
+    """Put what was found in the place of an id; what the request itself says there has priority."""
     place: Any = document
     for key in reference.at.split("/")[1:]:
         place = place[int(key)] if isinstance(place, list) else place[key]
@@ -90,7 +89,7 @@ def _put(document: Document, reference: Reference, found: Document) -> None:
     place.update({**found, **place})
 
 
-def _told(fault: Fault, references: list[Reference]) -> Fault:
+def _at_its_id(fault: Fault, references: list[Reference]) -> Fault:
     """Name the id instead of a model that the client has not sent."""
     for item in references:
         if item.field != "trajectory_id" and f"{fault.pointer}/".startswith(f"{item.at}/parameters/"):
@@ -124,25 +123,17 @@ def _require_rows(session: Session, owner: str, uploads: list[Reference], reques
 
 def _flight(session: Session, owner: str, reference: Reference) -> Document:
     stored, columns = trajectories.get_trajectory(session, owner, reference.id)
-    return {"name": stored.name, **columns}
+    return {"name": stored.name, **json.loads(columns)}
 
 
 def _model(session: Session, owner: str, reference: Reference) -> Document:
-    try:
-        _, document = models.get_model(session, owner, reference.id)
-    except ModelNotFound as error:
-        raise InvalidInput.of(
-            [Fault("model_not_found", error.detail, reference.pointer, error.hint)]
-        ) from None
+    _, document = models.get_model(session, owner, reference.id)
     return {"parameters": _as_given(document["model"])}
 
 
 def _model_of_job(session: Session, owner: str, reference: Reference) -> Document:
     """Find the model that a job left, whole or as its best so far."""
-    try:
-        job = get_job(session, owner, reference.id)
-    except JobNotFound as error:
-        raise InvalidInput.of([Fault("job_not_found", error.detail, reference.pointer, error.hint)]) from None
+    job = get_job(session, owner, reference.id)
     text = jobs.result_json(session, owner, job.id)
     left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:

@@ -23,7 +23,7 @@ LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
-    """What is said of a file: its document or columns, or what is wrong with it."""
+    """Return a file's document or columns, or what is wrong with it."""
     try:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
@@ -39,7 +39,7 @@ def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
 def main(arguments: list[str]) -> None:
     """Read standard input under limits and write a frame."""
     kind, *words, rows = arguments
-    limits = Limits.of(words)
+    limits = Limits(*map(int, words))
     confine_time(limits)
     for module in LOADED_BEFORE.get(kind, ()):
         try:
@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> None:
         frame = pack({"failed": type(error).__name__})
     sys.stdout.buffer.write(frame)
     sys.stdout.buffer.flush()
-    os._exit(0)  # libraries' farewells are nobody's business, and may hang
+    os._exit(0)  # the libraries' own clean-up may hang
 
 
 if __name__ == "__main__":

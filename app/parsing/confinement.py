@@ -17,31 +17,11 @@ NICE = 5  # answering requests comes first
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of one parser process.
+    """Limits of one parser process."""
 
-    Attributes
-    ----------
-    memory_bytes : int
-        Data of the process, libraries' own included.
-    cpu_s : int
-        Time of computation.
-    wall_s : int
-        Time until the parent gives up.
-    """
-
-    memory_bytes: int = 512 * MIB
+    memory_bytes: int = 512 * MIB  # data of the process, libraries' own included
     cpu_s: int = 10
-    wall_s: int = 20
-
-    def words(self) -> list[str]:
-        """The limits as arguments of the process."""
-        return [str(self.memory_bytes), str(self.cpu_s), str(self.wall_s)]
-
-    @classmethod
-    def of(cls, words: list[str]) -> Limits:
-        """Read `words`."""
-        memory_bytes, cpu_s, wall_s = map(int, words)
-        return cls(memory_bytes, cpu_s, wall_s)
+    wall_s: int = 20  # until the parent gives up
 
 
 def confine_time(limits: Limits) -> None:

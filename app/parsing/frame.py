@@ -27,12 +27,9 @@ class BadFrame(ValueError):
 
 
 def pack(value: Any) -> bytes:
-    """Make a frame of a JSON value; `array` objects may stand in the place of lists.
+    """Make a frame of a JSON value, which may have `array` objects in the place of lists.
 
-    Raises
-    ------
-    BadFrame
-        When what is not numbers takes more than `MAX_TEXT_BYTES`.
+    Raises `BadFrame` when what is not numbers takes more than `MAX_TEXT_BYTES`.
     """
     arrays: list[tuple[bytes, bytes]] = []
     text = json.dumps(_skeleton(value, arrays), separators=(",", ":")).encode()
@@ -45,13 +42,7 @@ def pack(value: Any) -> bytes:
 
 
 def unpack(frame: bytes) -> Any:
-    """Read a frame.
-
-    Raises
-    ------
-    BadFrame
-        When it is anything else.
-    """
+    """Read a frame; raise `BadFrame` when it is anything else."""
     try:
         magic, text_bytes, count = HEAD.unpack_from(frame)
         at = HEAD.size + text_bytes

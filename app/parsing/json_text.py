@@ -20,15 +20,10 @@ UNSTORABLE = re.compile(r"[\x00\ud800-\udfff]")
 
 
 def parse_json(body: bytes) -> Any:
-    """Parse a JSON text.
+    """Parse a JSON text, with NaN and Infinity, which the schema refuses by the name of their field.
 
-    NaN and Infinity are read here, so that the schema can refuse them by the name of their field.
-
-    Raises
-    ------
-    MalformedBody
-        When it is not JSON in UTF-8, is nested too deeply, repeats a key, holds far too many items, or holds
-        a text that no database stores (half a surrogate pair, the character zero).
+    Raises `MalformedBody` when it is not JSON in UTF-8, is nested too deeply, repeats a key, holds far too
+    many items, or holds a text that no database stores (half a surrogate pair, the character zero).
     """
     if not body:
         raise MalformedBody("There is no body.", hint="Send a JSON object; /docs shows examples.")

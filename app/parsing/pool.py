@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -29,7 +30,7 @@ from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
 PIECE = 2**18
-QUEUE_S = 30.0  # a client that waits longer is better told to come again
+QUEUE_S = 30.0  # a client that waits longer should come again later
 FORMAT_FAULTS = frozenset({"unknown_format", "needs_pyarrow", "matlab_v73", "matlab_object"})
 
 logger = logging.getLogger(__name__)
@@ -42,14 +43,7 @@ class _Unanswered(Exception):
 class ParserPool:
     """Starts parser processes; owners take turns.
 
-    Parameters
-    ----------
-    turns : OwnerTurns
-        Processes at the same time, of all owners and of one.
-    limits : Limits
-        Of each process.
-    queue_s : float
-        Longest wait for one; a request that waits longer is told that the service is busy.
+    A request that waits for a process longer than `queue_s` gets the answer that the service is busy.
     """
 
     def __init__(self, turns: OwnerTurns, limits: Limits, queue_s: float = QUEUE_S) -> None:
@@ -58,15 +52,7 @@ class ParserPool:
         self._limits = limits
 
     async def json_document(self, owner: str, file: BinaryIO) -> Any:
-        """Parse the JSON text in a file of this owner, as `parse_json` would.
-
-        Raises
-        ------
-        MalformedBody
-            It is not a sensible JSON text.
-        ServiceBusy
-            Too many others are being read.
-        """
+        """Parse the JSON text in a file of this owner, as `parse_json` would."""
         try:
             answer = await self._read(owner, BODY, file)
         except _Unanswered as why:
@@ -76,27 +62,16 @@ class ParserPool:
         return answer["document"]
 
     async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> dict[str, list[float]]:
-        """Read the columns of a flight, SI units, by their standard names.
+        """Read the columns of a flight, in SI units, by their standard names.
 
         Parameters
         ----------
-        owner : str
-            Whose upload it is.
         kind : str
-            As `morphdata.samplefiles.reading.kind_of` says.
+            As `morphdata.samplefiles.reading.kind_of` returns it.
         file : binary file
             With a descriptor.
         pointer : str
             Where faults point to: ``{pointer}/{row}/{column}``.
-
-        Raises
-        ------
-        InvalidRequest
-            Naming row and column.
-        UnsupportedMediaType
-            The file is of a form that is not read here.
-        ServiceBusy
-            Too many others are being read.
         """
         try:
             answer = await self._read(owner, kind, file)
@@ -139,7 +114,8 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
     file.flush()
     file.seek(0)
     os.lseek(file.fileno(), 0, os.SEEK_SET)
-    command = [sys.executable, "-s", "-P", "-m", "app.parsing.child", kind, *limits.words(), str(MAX_ROWS)]
+    limit_words = map(str, astuple(limits))
+    command = [sys.executable, "-s", "-P", "-m", "app.parsing.child", kind, *limit_words, str(MAX_ROWS)]
     started = time.monotonic()
     with subprocess.Popen(
         command,
@@ -171,7 +147,7 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
 
 
 def _drained(pipe: Any, deadline: float) -> bytes:
-    """What comes out of a pipe; BadFrame when it is too much, TimeoutError when reading it takes too long."""
+    """Read a pipe to its end; raise BadFrame when it is too much, TimeoutError when it takes too long."""
     found = bytearray()
     ready = select.poll()
     ready.register(pipe, select.POLLIN | select.POLLHUP)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -10,7 +11,7 @@ from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
 from app.errors import (
     InvalidRequest,
@@ -33,7 +34,7 @@ from app.trajectories.schemas import (
 )
 from morphdata.refusals import escaped
 
-router = APIRouter(tags=["trajectories"])
+router = APIRouter(tags=["trajectories"], generate_unique_id_function=attrgetter("name"))
 
 MAX_NAME_BYTES = 1024
 FORM_SCHEMA: dict[str, Any] = {
@@ -44,7 +45,7 @@ FORM_SCHEMA: dict[str, Any] = {
         "file": {
             "type": "string",
             "format": "binary",
-            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), told by the ending "
+            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), recognised by the ending "
             "of its name: t, sweep_left, sweep_right, phi, theta, psi; or with units: `theta_deg`.",
         },
         "name": {
@@ -68,7 +69,6 @@ REQUEST_BODY: dict[str, Any] = {
 @router.post(
     "/trajectories",
     dependencies=[demands(Scope.DATA_WRITE)],
-    operation_id="upload_trajectory",
     summary="Upload a sample flight",
     status_code=201,
     responses=documented(*BODY_ERRORS, QuotaExceeded),
@@ -130,7 +130,6 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
 @router.get(
     "/trajectories",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="list_trajectories",
     summary="List uploaded flights",
     responses=documented(InvalidRequest),
 )
@@ -148,7 +147,6 @@ def list_trajectories(
 @router.get(
     "/trajectories/{trajectory_id}",
     dependencies=[demands(Scope.DATA_READ)],
-    operation_id="get_trajectory",
     summary="Read a sample flight back",
     response_model=Trajectory,
     responses=documented(InvalidRequest, TrajectoryNotFound),
@@ -160,7 +158,7 @@ def get_trajectory(
 ) -> Response:
     """Return an uploaded flight with its rows, in s and rad."""
     with app.database.read() as session:
-        stored, columns = repository.get_trajectory_json(session, owner, trajectory_id)
+        stored, columns = repository.get_trajectory(session, owner, trajectory_id)
     # the rows go out as they are stored: to parse and write a long flight would hold up the other requests
     text = stored.model_dump_json().encode()[:-1] + b"," + columns[1:]
     return Response(text, media_type="application/json")
@@ -169,7 +167,6 @@ def get_trajectory(
 @router.delete(
     "/trajectories/{trajectory_id}",
     dependencies=[demands(Scope.DATA_WRITE)],
-    operation_id="delete_trajectory",
     summary="Delete an uploaded flight",
     status_code=204,
     responses=documented(InvalidRequest, TrajectoryNotFound),

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
-from sqlalchemy import Row, delete, insert, select
+from sqlalchemy import delete, insert, select
 
 from app.database import Session, database_time
-from app.documents import packed, unpacked, unpacked_json
+from app.documents import unpacked_json
 from app.errors import TrajectoryNotFound
 from app.identifiers import new_identifier
-from app.jobs.records import moment
 from app.pages import read_page
 from app.tables import trajectories
 from app.trajectories.schemas import TrajectoryPage, TrajectorySummary, TrajectoryUpload
-
-Columns = dict[str, list[float]]
 
 SUMMARY_COLUMNS = (
     trajectories.c.id,
@@ -25,11 +21,6 @@ SUMMARY_COLUMNS = (
     trajectories.c.duration_s,
     trajectories.c.created_at,
 )
-
-
-def stored_form(columns: Columns) -> bytes:
-    """The columns as they are stored; this takes longer than all the rest, so it is done once."""
-    return packed(columns)
 
 
 def insert_trajectory(
@@ -52,34 +43,19 @@ def insert_trajectory(
         )
         .returning(*SUMMARY_COLUMNS)
     ).one()
-    return _summary(row)
-
-
-def _summary(row: Row[*tuple[Any, ...]]) -> TrajectorySummary:
-    return TrajectorySummary(
-        id=row.id,
-        name=row.name,
-        rows=row.rows,
-        duration_s=row.duration_s,
-        created_at=moment(row.created_at),
-    )
+    return TrajectorySummary.model_validate(row)
 
 
 def list_trajectories(session: Session, owner: str, *, cursor: str | None, limit: int) -> TrajectoryPage:
     """One page of the owner's flights."""
     query = select(*SUMMARY_COLUMNS).where(trajectories.c.owner == owner)
     rows, next_cursor = read_page(session, query, trajectories.c.id, cursor=cursor, limit=limit)
-    return TrajectoryPage(trajectories=[_summary(row) for row in rows], next_cursor=next_cursor)
+    flights = [TrajectorySummary.model_validate(row) for row in rows]
+    return TrajectoryPage(trajectories=flights, next_cursor=next_cursor)
 
 
 def delete_trajectory(session: Session, owner: str, trajectory_id: str) -> None:
-    """Delete one flight; jobs that were started with it have copies of their own.
-
-    Raises
-    ------
-    TrajectoryNotFound
-        When `owner` has no such trajectory.
-    """
+    """Delete one flight; jobs that were started with it have copies of their own."""
     deleted = session.execute(
         delete(trajectories)
         .where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
@@ -99,34 +75,11 @@ def row_counts(session: Session, owner: str, ids: Iterable[str]) -> dict[str, in
     return {row.id: row.rows for row in found}
 
 
-def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[TrajectorySummary, Columns]:
-    """Read one flight with its rows.
-
-    Raises
-    ------
-    TrajectoryNotFound
-        When `owner` has no such trajectory.
-    """
-    row = _row(session, owner, trajectory_id)
-    return _summary(row), unpacked(row.document)
-
-
-def get_trajectory_json(session: Session, owner: str, trajectory_id: str) -> tuple[TrajectorySummary, bytes]:
-    """Read one flight with its rows as the JSON text that is stored.
-
-    Raises
-    ------
-    TrajectoryNotFound
-        When `owner` has no such trajectory.
-    """
-    row = _row(session, owner, trajectory_id)
-    return _summary(row), unpacked_json(row.document)
-
-
-def _row(session: Session, owner: str, trajectory_id: str) -> Row[*tuple[Any, ...]]:
+def get_trajectory(session: Session, owner: str, trajectory_id: str) -> tuple[TrajectorySummary, bytes]:
+    """Read one flight with its rows as the stored JSON text; raise `TrajectoryNotFound` without one."""
     row = session.execute(
         select(trajectories).where(trajectories.c.id == trajectory_id, trajectories.c.owner == owner)
     ).one_or_none()
     if row is None:
         raise TrajectoryNotFound(trajectory_id)
-    return row
+    return TrajectorySummary.model_validate(row), unpacked_json(row.document)

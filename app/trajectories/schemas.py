@@ -25,6 +25,8 @@ class TrajectoryUpload(TrajectoryColumns):
 class TrajectorySummary(BaseModel):
     """An uploaded flight without its rows."""
 
+    model_config = ConfigDict(from_attributes=True)
+
     id: str = Field(examples=["traj_01k0c3v9fh8x2m4n6p8q0r2s4t"])
     name: str
     rows: int

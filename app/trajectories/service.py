@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import PurePosixPath
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.database import Session
+from app.documents import packed
 from app.errors import InvalidRequest
 from app.http.context import Caller
 from app.keys.quota import charge
 from app.parsing.pool import refusal
-from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.fault import FileFault, as_sentence
@@ -21,13 +22,7 @@ from morphdata.samples import sample_name
 
 
 def file_kind(filename: str) -> str:
-    """What an uploaded file is, by its name.
-
-    Raises
-    ------
-    UnsupportedMediaType
-        When files of its kind are not read.
-    """
+    """What an uploaded file is, by its name; raise `UnsupportedMediaType` for a kind that is not read."""
     try:
         return kind_of(PurePosixPath(filename).suffix)
     except FileFault as fault:
@@ -35,13 +30,7 @@ def file_kind(filename: str) -> str:
 
 
 def upload_of(columns: dict[str, list[float]], filename: str, name: str | None) -> TrajectoryUpload:
-    """Make an upload of a file's columns.
-
-    Raises
-    ------
-    InvalidRequest
-        Naming row and column.
-    """
+    """Make an upload of a file's columns, or raise `InvalidRequest` naming row and column."""
     faults = [
         Fault(fault.code, as_sentence(fault.detail), f"/file{_place(fault)}", as_sentence(fault.hint))
         for fault in flight_faults(columns)  # before the document is made, which has other names for them
@@ -68,14 +57,8 @@ def _place(fault: FileFault) -> str:
 
 
 def store_trajectory(session: Session, caller: Caller, upload: TrajectoryUpload) -> TrajectorySummary:
-    """Store a flight.
-
-    Raises
-    ------
-    QuotaExceeded
-        When the caller's key may not store that much more.
-    """
-    document = stored_form(upload.model_dump(exclude={"name"}))
+    """Store a flight, or raise `QuotaExceeded`."""
+    document = packed(upload.model_dump(exclude={"name"}))
     charge(session, caller.key_id, size_bytes=len(document))
     stored = insert_trajectory(session, caller.owner, caller.key_id, upload, document)
     note(session, caller, Action.TRAJECTORY_POST, stored.id)

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from app.audit.records import Action
-from app.audit.service import note
+from app.audit.repository import note
 from app.errors import (
     BodyTooLarge,
     InvalidRequest,

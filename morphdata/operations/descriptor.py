@@ -42,6 +42,8 @@ class Operation(Generic[Asked]):
         ``summary(request)`` gives the few small facts that a listing of jobs shows.
     begin : str
         Where its work begins, ``package.module:function``; only workers import it.
+    files : tuple of str
+        Names of the files that a job may leave, as shell patterns.
     deadline_s : callable
         ``deadline_s(request)`` gives the time, s, after which a running job is ended; None leaves that to the
         service.
@@ -62,6 +64,7 @@ class Operation(Generic[Asked]):
     cost: Callable[[Asked], BaseModel]
     summary: Callable[[Asked], Summary]
     begin: str
+    files: tuple[str, ...] = ("result.json",)
     deadline_s: Callable[[Asked], float | None] = lambda _request: None
     model_in: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda _result: None
 

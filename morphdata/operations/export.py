@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from morphdata.export import ExportCost, ExportRequest, ExportResult
+from morphdata.formats import FORMATS
 from morphdata.operations.descriptor import Operation
 
 TRIM_CORE_S = 1.0  # the lattice at the reference shape, and its trim; to an order of magnitude
@@ -33,4 +34,5 @@ EXPORT = Operation(
     cost=lambda _request: ExportCost(core_s=TRIM_CORE_S),
     summary=_summary,
     begin="worker.operations.export:begin",
+    files=("result.json", *(each.file for each in FORMATS)),
 )

@@ -50,5 +50,6 @@ OPTIMIZE = Operation(
     cost=_cost,
     summary=_summary,
     begin="worker.operations.optimisation:begin",
+    files=("result.json", "schedule.csv", "schedules.*", "departures.*", "pareto.*"),
     deadline_s=after_budget(REPORT_TIME_S),
 )

@@ -47,4 +47,5 @@ SIMULATE = Operation(
     cost=_cost,
     summary=_summary,
     begin="worker.operations.simulation:begin",
+    files=("result.json", "flight.*"),
 )

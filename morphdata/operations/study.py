@@ -49,6 +49,7 @@ STUDY = Operation(
     cost=_cost,
     summary=_summary,
     begin="worker.operations.study:begin",
+    files=("result.json", "study.*"),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=_recommended,
 )

@@ -22,7 +22,6 @@ from sqlalchemy import event, select
 
 from app.database import Database, Session, upgrade
 from app.documents import unpacked
-from app.jobs.chunk_rows import Unit, UnitKind
 from app.jobs.chunks import (
     claim_chunk,
     finish_chunk,
@@ -31,10 +30,10 @@ from app.jobs.chunks import (
     must_be_taken_over,
     take_over,
 )
-from app.jobs.creation import Terms
 from app.jobs.reaper import reap
 from app.jobs.records import ChunkClaim, Claim, JobStatus
-from app.jobs.store import claim_job, create_job, finish_job, load_checkpoint, load_request
+from app.jobs.rows import Unit, UnitKind
+from app.jobs.store import Terms, claim_job, create_job, finish_job, load_checkpoint, load_request
 from app.jobs.turns import next_unit
 from app.tables import job_results
 from tests.worker.spread.flocks import Flock, alone
@@ -279,7 +278,7 @@ class Simulation:
             step = next(iter(work.steps(None, lambda: False)))
         else:
             assert brought is not None
-            step = work.told(checkpoint, brought.outcomes, brought.elapsed_s)
+            step = work.combine(checkpoint, brought.outcomes, brought.elapsed_s)
         tasks = work.tasks(step.checkpoint, self.plan.chunks)
         if tasks is None:
             document = work.outcome(step.checkpoint).document

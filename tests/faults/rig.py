@@ -20,10 +20,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database, upgrade
 from app.documents import unpacked
-from app.jobs.creation import Terms
 from app.jobs.queue import publish
 from app.jobs.records import Job
-from app.jobs.store import create_job, get_job
+from app.jobs.store import Terms, create_job, get_job
 from app.tables import job_results, jobs
 from morphid import serve
 from morphid.broker import LOOPBACK, free_port

@@ -76,7 +76,7 @@ def test_the_walk_finds_the_trees() -> None:
     """Of every tree some leaves are among them."""
     names = {kind.__name__ for kind in ERRORS}
     assert names >= {"TrimNotFound", "UnreadableCheckpoint", "QuotaExceeded", "CommandError", "FileFault"}
-    assert names >= {"WorkRefused", "HttpProblem", "Interrupted", "UnknownOperation"}
+    assert names >= {"StorageFull", "HttpProblem", "Interrupted", "UnknownOperation"}
 
 
 @pytest.mark.parametrize("kind", ERRORS, ids=lambda kind: kind.__name__)

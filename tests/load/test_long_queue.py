@@ -8,9 +8,8 @@ from collections.abc import Callable
 import httpx
 import pytest
 
-from app.jobs.creation import Terms
 from app.jobs.queue import publish
-from app.jobs.store import create_job, get_job
+from app.jobs.store import Terms, create_job, get_job
 from tests.faults.rig import OWNER, Rig
 from tests.load.conftest import Tell
 from tests.load.figures import Times, timed

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 
 from app.settings import Settings
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, EXAMPLE_MATERIAL
-from morphdata.faults import InvalidInput
+from morphdata.faults import InvalidInput, MorphError
 from morphdata.identify import EXAMPLE_REQUEST
 from morphdata.operations import operation_named
 from morphdata.optimize import EXAMPLE_OPTIMIZATION
@@ -25,7 +25,7 @@ from morphdata.simulate import EXAMPLE_SIMULATION
 from morphdata.study import EXAMPLE_STUDY
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.morphdata.mutations import mutated
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 Document = dict[str, Any]
 
@@ -140,7 +140,7 @@ def refused_by_library(operation: str, document: Document) -> list[str]:
         return [fault.pointer for fault in error.faults]
     try:
         find_operation(operation)(document, 1)
-    except WorkRefused as error:
+    except MorphError as error:
         if error.code == InvalidInput.code and error.pointer not in COMPUTED:
             return [error.pointer]
     return []

@@ -12,10 +12,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from morphdata.faults import Interrupted, InvalidInput
 from morphid.exits import Exit
 from morphid.main import app
 from morphid.request import Request
-from worker.operations import Outcome, Step, Stop, WorkInterrupted, WorkRefused
+from worker.operations import Outcome, Step, Stop
 
 RUNNER = CliRunner()
 Document = dict[str, Any]
@@ -47,7 +48,7 @@ class PlayedWork:
         yield Step(progress={"fraction": 0.5, "phase": "polish"}, checkpoint=b"first")
         os.kill(os.getpid(), signal.SIGINT)
         if stop():
-            raise WorkInterrupted
+            raise Interrupted
 
     def outcome(self, _checkpoint: bytes) -> Outcome:
         """Never reached."""
@@ -121,7 +122,7 @@ def test_a_refusal_names_the_option(
     """What the library refuses by its JSON pointer is told with the option that brought it in."""
 
     def refuse(_request: Document) -> PlayedWork:
-        raise WorkRefused("invalid_input", "it will not do", pointer=pointer, hint="do better")
+        raise InvalidInput("it will not do", pointer=pointer, hint="do better")
 
     play_work(refuse)
     ended = RUNNER.invoke(app, [*command(examples), "--seed", "3", "--links", "3", "--json", "-"])

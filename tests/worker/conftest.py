@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from app.database import Database, upgrade
-from app.jobs.creation import Terms
 from app.jobs.records import Job
-from app.jobs.store import create_job, get_job
+from app.jobs.store import Terms, create_job, get_job
+from morphdata.faults import Interrupted
 from worker.numerics import Kernels
-from worker.operations import Begin, Document, Outcome, Step, Stop, WorkInterrupted
+from worker.operations import Begin, Document, Outcome, Step, Stop
 from worker.runner import Runner
 
 OWNER = "local"
@@ -40,9 +40,9 @@ class Walk:
             while time.monotonic() < until:
                 time.sleep(0.01)
                 if stop():
-                    raise WorkInterrupted
+                    raise Interrupted
             if stop():
-                raise WorkInterrupted
+                raise Interrupted
             if state["step"] == self.request.get("fail_at"):
                 raise FAILURES[self.request["failure"]]
             seed = (1664525 * state["seed"] + 1013904223) % 2**32

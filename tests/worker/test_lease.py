@@ -6,10 +6,11 @@ import threading
 import time
 
 from app.database import Database
+from app.jobs.records import StopReason
 from app.jobs.store import claim_job, request_cancel
 from tests.waiting import until
 from tests.worker.conftest import OWNER, Queue
-from worker.lease import LeaseKeeper, StopReason
+from worker.lease import LeaseKeeper
 from worker.runner import never
 
 

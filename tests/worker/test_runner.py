@@ -17,10 +17,10 @@ from app.jobs.reaper import reap
 from app.jobs.records import JobStatus
 from app.jobs.store import claim_job, request_cancel
 from app.tables import artifacts, job_events, job_results
+from morphdata.faults import InvalidInput
 from tests.worker.conftest import FAILURES, OWNER, Queue, Walk
 from worker.attempt import Ending
-from worker.operations import WorkRefused
-from worker.retry import Retry
+from worker.lease import LeaseKeeper
 from worker.runner import Runner
 
 MakeRunner = Callable[..., Runner]
@@ -172,9 +172,7 @@ def test_heartbeats_keep_a_long_step_alive(queue: Queue, database: Database, mak
     ("failure", "expected"),
     [
         (
-            WorkRefused(
-                "invalid_input", "the span is negative", pointer="/aircraft/span_m", hint="give a length"
-            ),
+            InvalidInput("the span is negative", pointer="/aircraft/span_m", hint="give a length"),
             {
                 "code": "invalid_input",
                 "detail": "the span is negative",
@@ -218,9 +216,9 @@ def test_a_database_that_restarts_is_waited_for(
     """Two refused connections cost a pause each, not the job."""
     job_id = queue.add(steps=3)
     pauses: list[float] = []
-    real = Retry.write
+    real = LeaseKeeper.write
 
-    def flaky(self: Retry, write: Callable[..., bool], **how: bool) -> None:
+    def flaky(self: LeaseKeeper, write: Callable[..., bool], **how: bool) -> None:
         def refuse_twice(connection: Any) -> bool:
             if len(pauses) < 2:
                 raise OperationalError("UPDATE", {}, Exception("the database is starting up"))
@@ -229,7 +227,7 @@ def test_a_database_that_restarts_is_waited_for(
         self._sleep = pauses.append
         real(self, refuse_twice, **how)
 
-    monkeypatch.setattr(Retry, "write", flaky)
+    monkeypatch.setattr(LeaseKeeper, "write", flaky)
     assert make_runner().run_next() == (Ending.SUCCEEDED, job_id)
     assert pauses == [0.5, 1.0]
 

@@ -1,8 +1,7 @@
-"""The work of the operations: what each has to offer a worker, and where it begins.
+"""What an operation offers a worker, and where its work begins.
 
-The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported
-on first use, so that the pool's parent process never loads the compiler; for the same reason such modules
-translate the library's errors.
+The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported on
+first use, because the pool's parent process must never load the compiler.
 """
 
 from __future__ import annotations
@@ -12,46 +11,20 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
-from morphdata.faults import Pickled
+from morphdata.faults import MorphError
 from morphdata.operations import operation_named
 
 Document = dict[str, Any]
 Stop = Callable[[], bool]
 
 
-class WorkInterrupted(Exception):
-    """The work saw its stop signal and ended between two chunks; the last step's checkpoint holds."""
-
-
-class WorkRefused(Pickled, Exception):
-    """The work cannot be done as requested; carries what the user is told.
-
-    Parameters
-    ----------
-    code : stable, for programs.
-    detail : a sentence.
-    pointer : JSON pointer to the field at fault, "" for the whole.
-    hint : what to do about it.
-    """
-
-    def __init__(self, code: str, detail: str, *, pointer: str = "", hint: str = "") -> None:
-        super().__init__(detail)
-        self.code = code
-        self.detail = detail
-        self.pointer = pointer
-        self.hint = hint
-
-
 @dataclass(frozen=True, slots=True)
 class Step:
     """One step of long work.
 
-    Parameters
-    ----------
-    progress : what the user sees: ``fraction`` (0..1), ``phase`` and ``message``; of a search also
-        ``generation``, ``best_cost`` and ``flights``.
-    checkpoint : complete state; work begun from it goes on to the bit-identical end. Empty where there is
-        nothing to go on from: the next attempt begins anew.
+    ``progress`` has a ``fraction`` (0..1), a ``phase`` and a ``message``; that of a search also
+    ``generation``, ``best_cost`` and ``flights``. The ``checkpoint`` is the complete state: work resumed from
+    it ends bit-identically. An empty one means that the next attempt starts again.
     """
 
     progress: Document
@@ -60,85 +33,58 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What finished (or interrupted) work leaves behind.
-
-    Parameters
-    ----------
-    document : the result, in the names that API.md fixes.
-    artifacts : file name -> content.
-    """
+    """The result document of finished or interrupted work, and its files by name."""
 
     document: Document
     artifacts: Mapping[str, bytes] = field(default_factory=dict)
 
 
 class Work(Protocol):
-    """Long work as an iterator of steps with serialisable state."""
+    """Long work as an iterator of steps with serialisable state.
+
+    `steps` and `outcome` raise `Interrupted` soon after ``stop()`` has turned true, and a `MorphError` when
+    the request cannot be carried out.
+    """
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
-        """Give one step after another.
-
-        Raises
-        ------
-        WorkInterrupted : soon after ``stop()`` turned true.
-        WorkRefused : what was asked cannot be done.
-        """
+        """Yield one step after another."""
 
     def outcome(self, checkpoint: bytes) -> Outcome:
-        """Give the result at the last step's checkpoint, with everything that belongs to it.
-
-        Raises
-        ------
-        WorkInterrupted : soon after the ``stop()`` of the steps turned true.
-        """
+        """Return the result at the last step's checkpoint, with all its files."""
 
     def best_so_far(self, checkpoint: bytes) -> Outcome | None:
-        """Give the result at any checkpoint, within a second: someone waits for the job to end.
-
-        None for work that has nothing to show before its end.
-        """
+        """Return the result at any checkpoint within a second; None where there is none before the end."""
 
 
 @runtime_checkable
 class SpreadWork(Work, Protocol):
-    """Work whose steps other workers can take part in."""
+    """Work whose steps can be computed in parts by several workers."""
 
-    def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
-        """Give what the step after a checkpoint needs, in at most so many parts that fly on their own.
-
-        None where that step is not made of such parts.
-        """
+    def tasks(self, checkpoint: bytes, max_parts: int) -> list[bytes] | None:
+        """Divide the step after a checkpoint into independent parts; None for a step that has none."""
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
-        """Give the outcome of one part, the same whoever flies it and whatever else it flies.
+        """Return the outcome of one part, which does not depend on the worker or on the other parts."""
 
-        Raises
-        ------
-        WorkInterrupted : soon after ``stop()`` turned true.
-        """
-
-    def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Give the step after a checkpoint from the outcomes of all its parts, in their order."""
+    def combine(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
+        """Return the step after a checkpoint from the outcomes of all its parts, in their order."""
 
 
 Begin = Callable[[Document, int], Work]
 
 
-class UnknownOperation(Pickled, LookupError):
+class UnknownOperation(MorphError):
     """This worker does not know the operation of a job; a newer one may."""
+
+    code = "unknown_operation"
 
 
 def find_operation(name: str) -> Begin:
-    """Import the function that begins an operation.
-
-    Raises
-    ------
-    UnknownOperation : no such operation.
-    """
+    """Import the function that begins an operation; raise `UnknownOperation` where there is none."""
     try:
         operation = operation_named(name)
     except LookupError as error:
-        raise UnknownOperation(f"this worker cannot run it: {error}") from None
+        raise UnknownOperation(f"this worker cannot run it: {error}", hint="update the workers") from None
     module, _, function = operation.begin.partition(":")
     begin: Begin = getattr(import_module(module), function)
     return begin

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from morphcore.export.formats import Export
 from morphdata.export import ExportRequest
 from worker.operations import Document, Outcome, Step, Stop
-from worker.operations.library_work import library_errors, result_file
+from worker.operations.library_work import result_file
 
-NOTHING_TO_GO_ON_FROM = b""
+NO_CHECKPOINT = b""
 
 
 class ExportWork:
@@ -26,16 +26,14 @@ class ExportWork:
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
         """Trim the model and write the file."""
         del checkpoint, stop
-        with library_errors():
-            self._export.data()
+        self._export.data()
         message = f"{self._export.format.file} written"
-        yield Step({"fraction": 1.0, "phase": "export", "message": message}, NOTHING_TO_GO_ON_FROM)
+        yield Step({"fraction": 1.0, "phase": "export", "message": message}, NO_CHECKPOINT)
 
     def outcome(self, checkpoint: bytes) -> Outcome:  # noqa: ARG002 - the file is in the export
         """Give the file, and what there is to say of it."""
-        with library_errors():
-            document = self._export.to_document()
-            return Outcome(document, {**result_file(document), self._export.format.file: self._export.data()})
+        document = self._export.to_document()
+        return Outcome(document, {**result_file(document), self._export.format.file: self._export.data()})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
         """Give nothing: half a file is no result."""
@@ -47,8 +45,7 @@ def begin(request: Document, threads: int) -> ExportWork:
 
     Raises
     ------
-    WorkRefused : the model is not of this aircraft.
+    InvalidInput : the model is not of this aircraft.
     """
     del threads
-    with library_errors():
-        return ExportWork(Export(ExportRequest.parse(request)))
+    return ExportWork(Export(ExportRequest.parse(request)))

@@ -14,55 +14,42 @@ from morphcore.identify import Identification, IdentifyResult, identification_fr
 from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphdata.identify import IdentifyRequest
 from worker.operations import Document, Step, Stop
-from worker.operations.library_work import SearchWork, library_errors, shown
+from worker.operations.library_work import SearchWork, shown
 
 Array = NDArray[np.float64]
 
 
-class IdentificationWork(SearchWork[IdentifyResult]):
-    """An identification, whose generations other workers can fly parts of.
-
-    Parameters
-    ----------
-    run : the library's search.
-    """
+class IdentificationWork(SearchWork):
+    """An identification whose generations can be flown in parts by several workers."""
 
     def __init__(self, run: Identification) -> None:
         super().__init__(run, _files)
         self._identification = run
 
-    def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
-        """Give the next step's search points in parts; None where it needs more than their costs."""
+    def tasks(self, checkpoint: bytes, max_parts: int) -> list[bytes] | None:
+        """Divide the next step's search points; None where the step needs more than their costs."""
         try:
             task = self._identification.task(checkpoint)
         except UnreadableCheckpoint:  # `steps` begins again
             return None
-        return None if task is None else [_packed(part) for part in task.parts(most)]
+        return None if task is None else [_packed(part) for part in task.parts(max_parts)]
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
-        """Give the costs of some search points."""
-        with library_errors():
-            return _packed(self._identification.task_costs(_unpacked(task), stop))
+        """Return the costs of some search points."""
+        return _packed(self._identification.task_costs(_unpacked(task), stop))
 
-    def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Go on with the search by the costs of all parts; begin it again where they answer no checkpoint."""
+    def combine(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
+        """Continue the search with the costs of all parts; begin again where the checkpoint is unreadable."""
         costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
-        with library_errors():
-            try:
-                return shown(self._identification.tell(checkpoint, costs, wall_s=elapsed_s))
-            except UnreadableCheckpoint:
-                return next(self.steps(checkpoint, self._stop))
+        try:
+            return shown(self._identification.tell(checkpoint, costs, wall_s=elapsed_s))
+        except UnreadableCheckpoint:
+            return next(self.steps(checkpoint, self._stop))
 
 
 def begin(request: Document, threads: int) -> IdentificationWork:
-    """Check the request and prepare the search.
-
-    Raises
-    ------
-    WorkRefused : the request cannot be flown.
-    """
-    with library_errors():
-        return IdentificationWork(identification_from_request(IdentifyRequest.parse(request), threads))
+    """Check the request and prepare the search."""
+    return IdentificationWork(identification_from_request(IdentifyRequest.parse(request), threads))
 
 
 def _files(result: IdentifyResult, document: Document) -> dict[str, bytes]:

@@ -7,18 +7,12 @@ from morphcore.export.schedule_tables import schedule_tables
 from morphcore.optimise import ScheduleResult, optimisation_from_request
 from morphdata.optimize import OptimizeRequest
 from worker.operations import Document
-from worker.operations.library_work import SearchWork, library_errors
+from worker.operations.library_work import SearchWork
 
 
-def begin(request: Document, threads: int) -> SearchWork[ScheduleResult]:
-    """Check the request and prepare the searches.
-
-    Raises
-    ------
-    WorkRefused : the request cannot be flown, or no schedule keeps its limits.
-    """
-    with library_errors():
-        return SearchWork(optimisation_from_request(OptimizeRequest.parse(request), threads), _files)
+def begin(request: Document, threads: int) -> SearchWork:
+    """Check the request and prepare the searches."""
+    return SearchWork(optimisation_from_request(OptimizeRequest.parse(request), threads), _files)
 
 
 def _files(result: ScheduleResult, document: Document) -> dict[str, bytes]:

@@ -7,18 +7,12 @@ from morphcore.identify.study import study_from_request
 from morphcore.identify.study_result import StudyResult
 from morphdata.study import StudyRequest
 from worker.operations import Document
-from worker.operations.library_work import SearchWork, library_errors
+from worker.operations.library_work import SearchWork
 
 
-def begin(request: Document, threads: int) -> SearchWork[StudyResult]:
-    """Check the request and prepare the searches.
-
-    Raises
-    ------
-    WorkRefused : the request cannot be flown.
-    """
-    with library_errors():
-        return SearchWork(study_from_request(StudyRequest.parse(request), threads), _files)
+def begin(request: Document, threads: int) -> SearchWork:
+    """Check the request and prepare the searches."""
+    return SearchWork(study_from_request(StudyRequest.parse(request), threads), _files)
 
 
 def _files(_result: StudyResult, document: Document) -> dict[str, bytes]:

@@ -11,8 +11,8 @@ from app.database import Database
 from app.documents import packed, sealed
 from app.errors import QuotaExceeded
 from app.jobs import store
-from app.jobs.creation import Origin, Terms
 from app.jobs.reaper import reap
+from app.jobs.store import Origin, Terms
 from app.keys import quota
 from app.keys.records import Quota
 from app.tables import idempotency_keys, job_events, job_results, jobs, owners

@@ -8,6 +8,7 @@ import pytest
 from sqlalchemy import Table, func, insert, select, update
 
 from app.database import Database, database_time
+from app.documents import packed
 from app.jobs import retention, store
 from app.jobs.retention import Keep, forget
 from app.jobs.rows import FULL_HISTORY, SPARSE_STEP
@@ -21,7 +22,7 @@ from app.tables import (
     models,
     trajectories,
 )
-from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectoryUpload
 from tests.app.jobs.test_store import OWNER, RESULT, claimed, new_job
 
@@ -93,8 +94,8 @@ def test_old_flights_and_deeds_go(database: Database) -> None:
     columns = dict.fromkeys(names, column)
     upload = TrajectoryUpload(name="flight", **columns)
     with database.write() as session:
-        old = insert_trajectory(session, OWNER, None, upload, stored_form(columns))
-        young = insert_trajectory(session, OWNER, None, upload, stored_form(columns))
+        old = insert_trajectory(session, OWNER, None, upload, packed(columns))
+        young = insert_trajectory(session, OWNER, None, upload, packed(columns))
         session.execute(
             update(trajectories)
             .where(trajectories.c.id == old.id)

@@ -13,9 +13,9 @@ from sqlalchemy import func, select, update
 from app.database import Database, database_time
 from app.errors import IdempotencyConflict, JobNotFound
 from app.jobs import store
-from app.jobs.creation import Terms
 from app.jobs.reaper import reap
-from app.jobs.records import Claim, Job, JobStatus
+from app.jobs.records import Claim, Job, JobStatus, StopReason
+from app.jobs.store import Terms
 from app.tables import artifacts, job_events, job_results, jobs, models
 
 OWNER = "local"
@@ -97,7 +97,7 @@ def test_stale_worker_changes_nothing(database: Database) -> None:
         lambda s, c: store.save_progress(s, c, {"fraction": 0.9}, b"late"),
         lambda s, c: store.finish_job(s, c, "succeeded", result=RESULT),
         store.release_job,
-        lambda s, c: store.renew_lease(s, c).held,
+        lambda s, c: store.renew_lease(s, c) is not StopReason.LOST,
     ]
     before = current(database, job.id)
     for write in writes:
@@ -209,9 +209,7 @@ def test_cancel_in_every_state(database: Database) -> None:
     with database.write() as session:
         assert store.request_cancel(session, OWNER, job.id).status is JobStatus.CANCELLING
         assert store.request_cancel(session, OWNER, job.id).status is JobStatus.CANCELLING
-        state = store.renew_lease(session, claim)
-        assert state.held
-        assert state.cancel_requested
+        assert store.renew_lease(session, claim) is StopReason.CANCEL
         assert store.finish_job(session, claim, "cancelled", result=RESULT)
     after = current(database, job.id)
     assert (after.status, after.partial, after.model_id) == (JobStatus.CANCELLED, True, None)
@@ -301,9 +299,9 @@ def test_deadline_counts_from_the_first_claim(database: Database) -> None:
     assert current(database, job.id).deadline_at is None
     claim = claimed(database, job.id, lease_s=HOUR_S)
     with database.write() as session:
-        assert not store.renew_lease(session, claim, HOUR_S).deadline_passed
+        assert store.renew_lease(session, claim, HOUR_S) is None
         session.execute(update(jobs).values(deadline_at=database_time() - 1.0))
-        assert store.renew_lease(session, claim, HOUR_S).deadline_passed
+        assert store.renew_lease(session, claim, HOUR_S) is StopReason.DEADLINE
         assert reap(session).expired == ()
         assert reap(session, deadline_grace_s=0.0).expired == (job.id,)
         assert not store.finish_job(session, claim, "succeeded", result=RESULT)

@@ -12,10 +12,10 @@ from sqlalchemy import func, insert, select, update
 from app.database import Database, downgrade, upgrade
 from app.jobs import store
 from app.jobs.chunks import hand_out
-from app.jobs.creation import Origin
 from app.jobs.reaper import reap
 from app.jobs.records import Claim
 from app.jobs.repository import delete_job
+from app.jobs.store import Origin
 from app.keys import quota
 from app.models.repository import delete_model
 from app.tables import (

@@ -10,9 +10,9 @@ from sqlalchemy import delete, update
 
 from app.database import Database, database_time
 from app.jobs import store
-from app.jobs.chunk_rows import Unit, UnitKind
-from app.jobs.creation import Terms
 from app.jobs.records import Claim
+from app.jobs.rows import Unit, UnitKind
+from app.jobs.store import Terms
 from app.jobs.turns import next_job_of, next_unit, owners_in_turn
 from app.tables import jobs, owners
 from tests.app.jobs.test_store import new_job

@@ -7,8 +7,8 @@ from sqlalchemy import insert, select, update
 
 from app.database import Database, database_time
 from app.jobs import store
-from app.jobs.creation import Terms
 from app.jobs.records import Job
+from app.jobs.store import Terms
 from app.jobs.waiting import FRESH_S, QueueView, count_queue, queue_place
 from app.tables import jobs, workers
 from tests.app.jobs.test_store import new_job

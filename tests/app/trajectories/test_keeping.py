@@ -7,9 +7,10 @@ from typing import Any
 from sqlalchemy import select
 
 from app.database import Database
+from app.documents import packed
 from app.jobs import store
 from app.tables import audit_log
-from app.trajectories.repository import insert_trajectory, stored_form
+from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectoryUpload
 from tests.app.calls import fault, post
 from tests.app.request_documents import RESULT, SAMPLE_NAMES, identify_document, sample_document
@@ -33,7 +34,7 @@ def of_someone(database: Database) -> str:
     columns = {column: sample[column] for column in COLUMNS}
     upload = TrajectoryUpload(name="theirs", **columns)
     with database.write() as session:
-        return insert_trajectory(session, "someone", None, upload, stored_form(columns)).id
+        return insert_trajectory(session, "someone", None, upload, packed(columns)).id
 
 
 def deeds(database: Database, target: str) -> list[Any]:

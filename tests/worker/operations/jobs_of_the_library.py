@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from typing import Any
 
 from sqlalchemy import select
@@ -16,6 +17,7 @@ from app.documents import unpacked
 from app.jobs.records import Job
 from app.jobs.store import create_job, get_job, request_cancel
 from app.tables import artifacts, job_results
+from morphdata.operations import operation_named
 from tests.identification_request import EXAMPLES, identification
 from worker.attempt import Ending
 from worker.numerics import Kernels
@@ -73,6 +75,12 @@ def optimisation(**parts: Any) -> Document:
         "verify": "none",
         **parts,
     }
+
+
+def undeclared(files: Iterable[str], operation: str) -> list[str]:
+    """Names of files that the operation's descriptor does not declare."""
+    patterns = operation_named(operation).files
+    return [name for name in files if not any(fnmatch(name, pattern) for pattern in patterns)]
 
 
 @dataclass

@@ -8,7 +8,7 @@ import pytest
 
 from morphcore.identify.identification import VERSION
 from tests.identification_request import identification
-from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker
+from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, undeclared
 from worker.attempt import Ending
 from worker.operations import find_operation
 from worker.operations.identification import IdentificationWork
@@ -33,7 +33,9 @@ def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any]) -> None:
     work = find_operation("identify")(request, 1)
     steps = list(work.steps(None, lambda: False))
     assert len(steps) > 3
-    whole = work.outcome(steps[-1].checkpoint).document
+    outcome = work.outcome(steps[-1].checkpoint)
+    assert undeclared(outcome.artifacts, "identify") == []
+    whole = outcome.document
     for cut in (0, len(steps) - 2):
         resumed = find_operation("identify")(request, 1)
         *_, last = resumed.steps(steps[cut].checkpoint, lambda: False)
@@ -55,9 +57,9 @@ def test_parts_of_another_version_are_not_used() -> None:
     assert len(parts) == 2
     old = step.checkpoint.replace(VERSION.encode(), b"identification 3")
     assert work.tasks(old, 4) is None
-    told = work.told(old, [work.fly(part, lambda: False) for part in parts], 0.1)
-    assert told.progress["phase"] == "baseline"
-    assert told.progress["message"].endswith(BEGUN_AGAIN)
+    again = work.combine(old, [work.fly(part, lambda: False) for part in parts], 0.1)
+    assert again.progress["phase"] == "baseline"
+    assert again.progress["message"].endswith(BEGUN_AGAIN)
 
 
 def test_a_model_that_flies_nothing_is_a_failed_job(worker: RealWorker) -> None:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import pytest
 
-from morphcore.errors import InvalidInput, MorphError
+from morphcore.errors import InvalidInput
 from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.stopping import Interrupted, heed
-from worker.operations import Document, Stop, WorkInterrupted, WorkRefused
-from worker.operations.library_work import BEGUN_AGAIN, SearchWork, library_errors
+from worker.attempt import error_document
+from worker.operations import Document, Stop
+from worker.operations.library_work import BEGUN_AGAIN, SearchWork
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Count:
     best_so_far = result
 
 
-def work() -> SearchWork[Counted]:
+def work() -> SearchWork:
     """Count as the runner sees it."""
     return SearchWork(Count(), lambda result, document: {"n.txt": f"{result.count} {document}".encode()})
 
@@ -98,24 +99,21 @@ def test_the_result_comes_as_a_file_too() -> None:
 
 
 def test_a_stop_is_an_interruption() -> None:
-    """What the library calls interrupted the runner calls so too."""
-    with pytest.raises(WorkInterrupted):
+    """The library's own signal reaches the runner."""
+    with pytest.raises(Interrupted):
         list(work().steps(None, lambda: True))
 
 
 def test_a_refusal_keeps_its_words() -> None:
-    """Code, sentence, pointer and hint of the library's error reach the user, from result and begin alike."""
-    with pytest.raises(WorkRefused) as refused:
+    """Code, sentence, pointer and hint of the library's error reach the user."""
+    with pytest.raises(InvalidInput) as refused:
         work().outcome(b"3")
-    error = refused.value
-    assert (error.code, error.detail, error.pointer, error.hint) == (
-        "invalid_input",
-        "three",
-        "/count",
-        "count on",
-    )
-    with pytest.raises(WorkRefused, match="plain"), library_errors():
-        raise MorphError("plain")
+    assert error_document(refused.value, "job_1") == {
+        "code": "invalid_input",
+        "detail": "three",
+        "pointer": "/count",
+        "hint": "count on",
+    }
 
 
 def test_a_stop_between_two_pictures_is_heeded() -> None:
@@ -130,7 +128,7 @@ def test_a_stop_between_two_pictures_is_heeded() -> None:
 
     searched = SearchWork(Count(), files)
     *_, last = searched.steps(None, lambda: bool(drawn))
-    with pytest.raises(WorkInterrupted):
+    with pytest.raises(Interrupted):
         searched.outcome(last.checkpoint)
     assert drawn == ["a"]
     assert searched.best_so_far(last.checkpoint).document == {"count": 5}

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from morphcore.simulate.schedule import scheduled
+from morphdata.faults import MorphError
 from morphdata.optimize import OptimizeResult
 from morphdata.schedules import load_schedules
-from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation
+from tests.worker.operations.jobs_of_the_library import COARSE, RealWorker, optimisation, undeclared
 from tests.worker.operations.test_study import timeless
 from worker.attempt import Ending
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 TABLES = {"schedule.csv", "schedules.csv", "departures.csv"}
 PICTURES = {f"{name}.{kind}" for name in ("schedules", "departures") for kind in ("svg", "png")}
@@ -34,6 +35,7 @@ def test_an_optimisation_ends_with_a_comparison(worker: RealWorker, tmp_path: Pa
     assert result.variation.optimum.flexible is None
     files = worker.files(job_id)
     assert set(files) == {"result.json", *TABLES, *PICTURES}
+    assert undeclared(files, "optimize") == []
     path = tmp_path / "schedule.csv"
     path.write_bytes(files["schedule.csv"])
     given = load_schedules(path).left
@@ -102,7 +104,7 @@ def test_a_cancelled_optimisation_keeps_its_best(
 def test_limits_that_no_schedule_keeps_are_refused() -> None:
     """What only the search space shows is refused with its place before anything is flown."""
     limits = {"max_rate_rad_s": 0.63, "max_accel_rad_s2": 1000.0}
-    with pytest.raises(WorkRefused) as refused:
+    with pytest.raises(MorphError) as refused:
         find_operation("optimize")(optimisation(limits=limits), 1)
     assert refused.value.code == "invalid_input"
     assert refused.value.hint

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from morphcore import load_trajectory
+from morphdata.faults import MorphError
 from morphdata.simulate import SimulateResult
-from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation
+from tests.worker.operations.jobs_of_the_library import RealWorker, parameters, simulation, undeclared
 from worker.attempt import Ending
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 
 @pytest.mark.parametrize(
@@ -36,6 +37,7 @@ def test_each_model_flies(worker: RealWorker, model: dict[str, object]) -> None:
     assert np.isclose(result.trajectory.sweep_left_rad[-1], 0.4)
     files = worker.files(job_id)
     assert set(files) == {"result.json", "flight.csv", "flight.svg", "flight.png"}
+    assert undeclared(files, "simulate") == []
     assert json.loads(files["result.json"]) == worker.result(job_id)
     assert worker.job(job_id).model_id is None
 
@@ -86,6 +88,6 @@ def test_a_spline_beyond_its_hinge_is_refused() -> None:
         }
     }
     work = find_operation("simulate")(request, 1)
-    with pytest.raises(WorkRefused) as refused:
+    with pytest.raises(MorphError) as refused:
         next(work.steps(None, lambda: False))
     assert (refused.value.code, refused.value.pointer) == ("invalid_input", "/schedules/both")

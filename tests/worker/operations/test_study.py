@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from morphdata.faults import MorphError
 from morphdata.study import StudyResult
-from tests.worker.operations.jobs_of_the_library import RealWorker, study
+from tests.worker.operations.jobs_of_the_library import RealWorker, study, undeclared
 from worker.attempt import Ending
-from worker.operations import WorkRefused, find_operation
+from worker.operations import find_operation
 
 TIMES = {"flight_s", "identify_s", "wall_s", "plan_s", "reason"}  # measured, or telling what was measured
 
@@ -32,6 +33,7 @@ def test_a_study_ends_with_rows_and_a_recommendation(worker: RealWorker) -> None
     assert result.recommended.links_per_wing in {1, 2}
     files = worker.files(job_id)
     assert set(files) == {"result.json", "study.csv", "study.svg", "study.png"}
+    assert undeclared(files, "study") == []
     assert len(list(csv.reader(io.StringIO(files["study.csv"].decode())))) == 3
     assert worker.job(job_id).model_id is not None
 
@@ -65,6 +67,6 @@ def test_a_cancelled_study_keeps_its_rows(worker: RealWorker) -> None:
 
 def test_a_bad_list_is_refused() -> None:
     """The library's own check of the list reaches the user with its place."""
-    with pytest.raises(WorkRefused) as refused:
+    with pytest.raises(MorphError) as refused:
         find_operation("study")(study(2, 2), 1)
     assert refused.value.pointer == "/model/links_per_wing/1"

@@ -14,9 +14,8 @@ from sqlalchemy import select
 
 from app.database import Database
 from app.documents import unpacked
-from app.jobs.creation import Terms
 from app.jobs.records import Job
-from app.jobs.store import create_job, get_job
+from app.jobs.store import Terms, create_job, get_job
 from app.tables import job_chunks, job_events, job_results
 from tests.app.conftest import database, database_url, postgres_server
 from tests.worker.spread.flocks import find_flock

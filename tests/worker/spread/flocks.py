@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from worker.operations import Begin, Document, Outcome, Step, Stop, WorkInterrupted, WorkRefused
+from morphdata.faults import Interrupted, InvalidInput
+from worker.operations import Begin, Document, Outcome, Step, Stop
 
 Hook = Callable[[int, list[int]], None]
 
@@ -32,22 +33,22 @@ class Flock:
             checkpoint = json.dumps({"generation": 0, "places": self._first(), "best": 2**63}).encode()
             yield self._step(checkpoint)
         while (parts := self.tasks(checkpoint, 1)) is not None:
-            step = self.told(checkpoint, [self.fly(part, stop) for part in parts], 0.0)
+            step = self.combine(checkpoint, [self.fly(part, stop) for part in parts], 0.0)
             checkpoint = step.checkpoint
             yield step
 
     def _first(self) -> list[int]:
         return [hashed(self.request.get("seed", 7), bird) for bird in range(self.request["birds"])]
 
-    def tasks(self, checkpoint: bytes, most: int) -> list[bytes] | None:
+    def tasks(self, checkpoint: bytes, max_parts: int) -> list[bytes] | None:
         """Give the places of the next generation in parts."""
         state = json.loads(checkpoint)
         if state["generation"] >= self.request["generations"]:
             return None
         count = len(state["places"])
-        most = min(most, count)
-        bounds = [part * count // most for part in range(most + 1)]
-        parts = [state["places"][bounds[k] : bounds[k + 1]] for k in range(most)]
+        parts_made = min(max_parts, count)
+        bounds = [part * count // parts_made for part in range(parts_made + 1)]
+        parts = [state["places"][bounds[k] : bounds[k + 1]] for k in range(parts_made)]
         return [json.dumps([state["generation"], part]).encode() for part in parts]
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
@@ -56,15 +57,15 @@ class Flock:
         if self._before_flight is not None:
             self._before_flight(generation, places)
         if generation == self.request.get("refuse_at"):
-            raise WorkRefused("diverged", "the flock fell from the sky", hint="fewer birds")
+            raise InvalidInput("the flock fell from the sky", hint="fewer birds")
         until = time.monotonic() + self.request.get("pause_s", 0.0) * len(places)
         while time.monotonic() < until or stop():
             if stop():
-                raise WorkInterrupted
+                raise Interrupted
             time.sleep(0.005)
         return json.dumps([hashed(place, 1) for place in places]).encode()
 
-    def told(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:  # noqa: ARG002 - keeps no times
+    def combine(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:  # noqa: ARG002 - keeps no times
         """Move every bird by the costs of all."""
         state = json.loads(checkpoint)
         costs = [cost for outcome in outcomes for cost in json.loads(outcome)]

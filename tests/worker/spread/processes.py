@@ -16,9 +16,8 @@ from sqlalchemy import select
 
 from app.database import Database
 from app.documents import unpacked
-from app.jobs.creation import Terms
 from app.jobs.records import Job, JobStatus
-from app.jobs.store import create_job, get_job
+from app.jobs.store import Terms, create_job, get_job
 from app.tables import job_results
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -10,11 +10,9 @@ import pytest
 from sqlalchemy import update
 
 from app.database import database_time
-from app.jobs.chunk_reaper import LOSSES_PER_ATTEMPT
-from app.jobs.creation import Terms
-from app.jobs.reaper import reap
+from app.jobs.reaper import LOSSES_PER_ATTEMPT, reap
 from app.jobs.records import JobStatus
-from app.jobs.store import request_cancel
+from app.jobs.store import Terms, request_cancel
 from app.tables import job_chunks, jobs
 from tests.worker.spread.conftest import FLOCK, OWNER, Killed, Spread
 from tests.worker.spread.flocks import alone
@@ -200,7 +198,7 @@ def test_a_chunk_that_is_refused_fails_the_job(spread: Spread) -> None:
     endings = spread.work(spread.runner())
     assert endings[-1] is Ending.FAILED
     job = spread.job(job_id)
-    assert (job.error or {})["code"] == "diverged"
+    assert (job.error or {})["detail"] == "the flock fell from the sky"
     assert (spread.result(job_id) or {})["generation"] == 3
     assert job.partial
     assert spread.chunks(job_id) == []

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.jobs.chunk_rows import UnitKind
-from app.jobs.creation import Terms
+from app.jobs.rows import UnitKind
+from app.jobs.store import Terms
 from app.jobs.turns import next_unit
 from tests.worker.spread.conftest import Spread
 from worker.attempt import Ending
