@@ -10,6 +10,7 @@ from benchmarks.accuracy import lattice_cost, step_error
 from benchmarks.against_mujoco import against_mujoco
 from benchmarks.batch_speed import batch_speed
 from benchmarks.growth import growth_with_links
+from benchmarks.hinge_speed import hinge_speed
 from benchmarks.kernel_alone import kernel_alone
 from benchmarks.machine import machine
 from benchmarks.memory import swarm_memory
@@ -45,6 +46,7 @@ def _counted(bench: Bench) -> Figures:
 # in this order; each gives entries of the figures
 SECTIONS: Mapping[str, Section] = {
     "batch": batch_speed,
+    "hinges": lambda bench: {"hinges": hinge_speed(bench)},
     "kernel": lambda bench: {"kernel": kernel_alone(bench)},
     "single_flight": lambda bench: {"single_flight": single_flights(bench)},
     "flexible": lambda bench: {"flexible": flexible_flight(bench)},

@@ -22,16 +22,15 @@ CANT = {"name": "cant", "axis": [0.2, 0.3, 0.9], "position_m": [0.05, 0.35, -0.0
 
 
 def many_hinges(rng: np.random.Generator) -> Aircraft:
-    """The odd aircraft on two hinges a surface, skew ones among them, each at a place of its own."""
+    """The odd aircraft on two hinges a surface, skew ones among them, each at a place of its own.
+
+    (More than a skew one and another make more turns than MuJoCo has joints in a body.)
+    """
     aircraft = odd_aircraft(rng)
     kinds: dict[str, list[dict[str, Any]]] = {
         "right wing": [{"axis": "z"}, {"axis": "x"}],
         "left wing": [{"name": "cant", "axis": SKEW}, {"axis": "z"}],
-        "left fin": [
-            {"axis": "y"},
-            {"name": "twist", "axis": [1.0, 1.0, -2.0]},
-            {"name": "roll", "axis": "x"},
-        ],
+        "left fin": [{"axis": "y"}, {"name": "twist", "axis": [1.0, 1.0, -2.0]}],
     }
     surfaces = []
     for surface in aircraft.surfaces:
