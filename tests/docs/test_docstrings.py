@@ -33,7 +33,9 @@ CHECKS_OF_FUNCTIONS = {"PR01": "a parameter is missing", "RT01": "no Returns sec
 def test_what_users_call_is_numpydoc(name: str) -> None:
     """Every parameter with type and description, every section one that numpydoc knows."""
     checks = CHECKS | (CHECKS_OF_FUNCTIONS if name in FUNCTIONS else {})
-    found = [f"{code}: {text}" for code, text in validate(f"morphcore.{name}")["errors"] if code in checks]
+    exported = getattr(morphcore, name)
+    errors = validate(f"{exported.__module__}.{exported.__name__}")["errors"]
+    found = [f"{code}: {text}" for code, text in errors if code in checks]
     assert not found
 
 
