@@ -23,7 +23,7 @@ from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
 
-LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # there flap and lag of a gimbal turn about the same axis
+LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # there flap and edgewise axis of a gimbal turn about the same axis
 
 
 def chain_flight(

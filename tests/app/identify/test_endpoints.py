@@ -238,7 +238,7 @@ def test_full_aircraft_is_accepted(service: RunningService) -> None:
     wing["hinge"].update(min_rad=-0.1, max_rad=1.2)
     other["section"] = {
         "ei_flap_n_m2": 5e4,
-        "ei_lag_n_m2": 5e5,
+        "ei_edge_n_m2": 5e5,
         "gj_n_m2": 3e4,
         "mass_per_length_kg_m": 15.0,
         "inertia_per_length_kg_m": [0.1, 0.2, 0.1],
