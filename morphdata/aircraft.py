@@ -155,7 +155,7 @@ class Section(Document):
     """Section properties given outright, instead of those of a solid box."""
 
     ei_flap_n_m2: Stiffness
-    ei_lag_n_m2: Stiffness
+    ei_edge_n_m2: Stiffness
     gj_n_m2: Stiffness
     mass_per_length_kg_m: float = Field(gt=0.0, le=1e5)
     inertia_per_length_kg_m: list[Annotated[float, Field(ge=0.0, le=1e6)]] = Field(

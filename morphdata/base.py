@@ -17,13 +17,16 @@ from pydantic import (
     ConfigDict,
     FailFast,
     Field,
+    GetJsonSchemaHandler,
     ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, faults_of
+from morphdata.renamed import FORMER_NOTE, RENAMED
 from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
@@ -130,9 +133,22 @@ class Document(BaseModel):
         if not isinstance(given, dict):
             return given
         whole = _whole_fields(cls)
-        return {
+        listed = {
             name: _whole(_listed(value)) if name in whole else _listed(value) for name, value in given.items()
         }
+        return _under_current_names(listed, _renamed_fields(cls))
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Describe the old names of renamed fields, too, as deprecated."""
+        schema = handler(core_schema)
+        described = handler.resolve_ref_schema(schema)
+        if handler.mode == "validation":
+            for former, name in _renamed_fields(cls).items():
+                _describe_former(described, former, name)
+        return schema
 
 
 def _brief(value: Any) -> str:
@@ -154,6 +170,44 @@ def _whole_fields(model: type[BaseModel]) -> tuple[str, ...]:
     """Names of the fields whose only numbers are whole ones."""
     kinds = {name: set(_kinds(field.annotation)) for name, field in model.model_fields.items()}
     return tuple(name for name, found in kinds.items() if int in found and float not in found)
+
+
+@cache
+def _renamed_fields(model: type[BaseModel]) -> dict[str, str]:
+    """Today's names of a model's fields by their old ones."""
+    return {former: name for former, name in RENAMED.items() if name in model.model_fields}
+
+
+def _under_current_names(given: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:
+    """Rename fields that are given by their old names; results, which carry both, may be given unchanged."""
+    for former, name in renamed.items():
+        if former in given and name in given and given[former] != given[name]:
+            fault = Fault(
+                "given_twice",
+                f"{name} and {former} are both given, with different values.",
+                f"/{former}",
+                f"Leave {former} out: it is the former name of {name}.",
+            )
+            raise PydanticCustomError(FAULTS, "a field is given twice", {FAULTS: (fault,)})
+    return {
+        renamed.get(name, name): value
+        for name, value in given.items()
+        if renamed.get(name, name) == name or renamed[name] not in given
+    }
+
+
+def _describe_former(schema: JsonSchemaValue, former: str, name: str) -> None:
+    """Add a field's old name to a model's schema: one of both names is then needed, not the new one."""
+    properties, required = schema["properties"], schema.get("required", [])
+    properties[former] = {
+        **properties[name],
+        "title": former,
+        "description": FORMER_NOTE.format(name=name),
+        "deprecated": True,
+    }
+    properties[former].pop("default", None)
+    if name in required:
+        required.remove(name)
 
 
 def _kinds(annotation: Any) -> Iterator[Any]:

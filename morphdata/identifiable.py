@@ -51,7 +51,7 @@ IDENTIFIABLE: list[Identifiable] = [
         "lift_factor", 0.0, 10.0, positive=True, value=Annotated[float, Field(gt=0.0, le=100.0)], default=1.0
     ),
     Identifiable(
-        "centre_shift_m",
+        "ac_offset_m",
         -50.0,
         50.0,
         value=Annotated[float, Field(ge=-100.0, le=100.0)],

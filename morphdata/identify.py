@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
-from pydantic import ConfigDict, Field, create_model
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document, Result
@@ -17,6 +17,7 @@ from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
+from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name, under_both_spellings
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
@@ -30,7 +31,10 @@ MIN_EVOLUTION = 4  # models of a generation of CMA-ES: of fewer the best half is
 if TYPE_CHECKING:
     Correction = str
 else:
-    Correction = Literal[corrections()]
+    Correction = Annotated[
+        Literal[corrections()],
+        WithJsonSchema({"type": "string", "enum": both_spellings(corrections())}),
+    ]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
@@ -98,16 +102,24 @@ def _bound_faults(name: str, low: float, high: float, limit: Identifiable) -> It
         )
 
 
+def _current_corrections(given: Any) -> Any:
+    """Take old names of corrections, also next to their new ones, as results list them."""
+    if not (isinstance(given, list) and all(isinstance(name, str) for name in given)):
+        return given
+    present = set(given)
+    return [current_name(name) for name in given if name not in RENAMED or RENAMED[name] not in present]
+
+
 class SoughtModel(Document):
     """A model whose parameters are searched: wings of rigid links with gimbal joints."""
 
     separate_wings: Annotated[bool, Option("--separate-wings", MODEL)] = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
-    aero_coefficients: list[Correction] | None = Field(
+    aero_coefficients: Annotated[list[Correction] | None, BeforeValidator(_current_corrections)] = Field(
         default=None,
-        max_length=len(corrections()),
-        description="Aerodynamic corrections that are sought; the others keep their neutral values. "
+        max_length=len(both_spellings(corrections())),
+        description="Aerodynamic corrections that are searched; the others keep their neutral values. "
         "Left out: those that the training samples determine, which are all, but `profile_drag` only if one "
         "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad).",
     )
@@ -365,9 +377,20 @@ class AeroCorrections(Result):
     """Identified aerodynamic corrections."""
 
     lift_factor: float
-    centre_shift_m: float
+    ac_offset_m: float = Field(description="Aerodynamic-centre offset, forward positive.")
+    centre_shift_m: float | None = Field(
+        default=None,
+        description=FORMER_NOTE.format(name="ac_offset_m"),
+        json_schema_extra={"deprecated": True},
+    )
     profile_drag: float
     lag_s: float
+
+    @model_validator(mode="before")
+    @classmethod
+    def _both_spellings(cls, given: Any) -> Any:
+        """Complete what an earlier version has stored."""
+        return under_both_spellings(given) if isinstance(given, dict) else given
 
 
 class IdentifiedParameters(Result):
@@ -375,8 +398,8 @@ class IdentifiedParameters(Result):
 
     links_per_wing: int
     division: list[Any] = Field(description="Share of the span of each link.")
-    stiffness_nm_rad: list[Any] = Field(description="Per joint [flap, torsion, lag].")
-    damping_nms_rad: list[Any] = Field(description="Per joint [flap, torsion, lag].")
+    stiffness_nm_rad: list[Any] = Field(description="Per joint [flap, torsion, edgewise].")
+    damping_nms_rad: list[Any] = Field(description="Per joint [flap, torsion, edgewise].")
     aero: AeroCorrections
 
 
@@ -389,7 +412,7 @@ class SearchReport(Result):
     generations: int
     wall_s: float
     aero_coefficients: list[Correction] | None = Field(
-        default=None, description="Aerodynamic corrections that were sought."
+        default=None, description="Aerodynamic corrections that were searched."
     )
     history: list[dict[str, Any]]
 
@@ -401,7 +424,8 @@ class Uncertainty(Result):
     """How well the samples determine the parameters.
 
     Names are `division.1`, `stiffness_nm_rad.joint_1.flap`, `lag_s`, ...; where wings are separate, `wing_1.`
-    stands before them.
+    stands before them. Throughout version 0.2 objects and lists of names have the former spellings, too:
+    `...joint_1.lag` of `...joint_1.edgewise`, `centre_shift_m` of `ac_offset_m`.
     """
 
     method: str | None = Field(

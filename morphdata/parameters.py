@@ -17,7 +17,7 @@ from morphdata.refusals import escaped
 
 MAX_LINKS = 8
 MAX_WINGS = 16
-AXES = 3  # flap, torsion, lag
+AXES = 3  # flap, torsion, edgewise
 SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
 RAGGED = -1  # length of rows that differ in length
 
@@ -26,7 +26,7 @@ EXAMPLE_PARAMETERS: dict[str, Any] = {
     "division": [0.42, 0.58],
     "stiffness_nm_rad": [[41000.0, 68000.0, 380000.0]],
     "damping_nms_rad": [[160.0, 270.0, 1500.0]],
-    "aero": {"lift_factor": 1.06, "centre_shift_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
+    "aero": {"lift_factor": 1.06, "ac_offset_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
 }
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -94,7 +94,7 @@ class Parameters(Document):
         description="Share of the span of each link; one list per wing where wings are separate."
     )
     stiffness_nm_rad: Joints | Annotated[list[Joints], Field(max_length=MAX_WINGS)] = Field(
-        description="Per joint [flap, torsion, lag]; one list per wing where wings are separate."
+        description="Per joint [flap, torsion, edgewise]; one list per wing where wings are separate."
     )
     damping_nms_rad: Joints | Annotated[list[Joints], Field(max_length=MAX_WINGS)] = Field(
         description="The same of the dampings."
@@ -190,7 +190,7 @@ def has_flown(fit: Any) -> bool:
 
 
 class WholeResult(Document):
-    """A whole result of an identification: only its `model` is looked at."""
+    """A whole result of an identification, or an exported model: only its `model` is looked at."""
 
     model: Parameters
     fit: Unread = None
@@ -199,6 +199,12 @@ class WholeResult(Document):
     cost: Unread = None
     partial: Unread = None
     warnings: Unread = None
+    # of the export format `json`, `morphdata.export.ModelFile`
+    aircraft: Unread = None
+    flight: Unread = None
+    origin: Unread = None
+    notice: Unread = None
+    morphid_version: Unread = None
 
     @model_serializer
     def _only_the_model(self) -> Parameters:

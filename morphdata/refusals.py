@@ -5,12 +5,14 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 
 from morphdata.faults import Fault
+from morphdata.renamed import sent_name
 
 MAX_FAULTS = 20
 MAX_POINTER = 300  # characters: a field's name may be a megabyte
@@ -74,7 +76,8 @@ def _faults(error: Mapping[str, Any], document: Any, model: type[BaseModel]) -> 
     pointer = _pointer(error["loc"], document, named=kind in ("missing", "extra_forbidden"))
     if kind == FAULTS:
         for fault in context[FAULTS]:
-            yield fault.under(pointer)
+            under = fault.under(pointer)
+            yield replace(under, pointer=_as_sent(under.pointer, document))
     elif kind == "extra_forbidden":
         yield Fault("unknown_field", "There is no such field.", pointer, _unknown_hint(error["loc"], model))
     else:
@@ -94,6 +97,8 @@ def _pointer(location: Sequence[str | int], document: Any, *, named: bool) -> st
     value = document
     tokens: list[str] = []
     for position, part in enumerate(location):
+        if isinstance(value, dict) and isinstance(part, str):
+            part = sent_name(part, value)  # noqa: PLW2901 - an old name is named as it was sent
         inside_list = isinstance(value, list) and isinstance(part, int) and part < len(value)
         if inside_list or (isinstance(value, dict) and part in value):
             value = value[part]
@@ -101,6 +106,21 @@ def _pointer(location: Sequence[str | int], document: Any, *, named: bool) -> st
             continue  # a tag such as "inline" or "float": not part of the document
         tokens.append(f"/{escaped(part)}")
     return "".join(tokens)[:MAX_POINTER]
+
+
+def _as_sent(pointer: str, document: Any) -> str:
+    """Name renamed fields of a JSON pointer as the document does."""
+    value, tokens = document, []
+    for token in pointer.split("/")[1:]:
+        name = sent_name(token, value) if isinstance(value, dict) else token
+        tokens.append(f"/{name}")
+        if isinstance(value, dict):
+            value = value.get(name)
+        elif isinstance(value, list) and token.isdecimal() and int(token) < len(value):
+            value = value[int(token)]
+        else:
+            value = None
+    return "".join(tokens)
 
 
 def _shown(value: Any) -> str:

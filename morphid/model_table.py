@@ -7,11 +7,12 @@ from typing import Any
 
 from rich.table import Table
 
+from morphdata.renamed import current_name, current_names
 from morphid.screen import new_table, short
 
 Document = Mapping[str, Any]
 
-AXES = ("flap", "torsion", "lag")
+AXES = ("flap", "torsion", "edgewise")
 JOINTS = ("stiffness_nm_rad", "damping_nms_rad")
 
 
@@ -35,7 +36,8 @@ def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
                 for axis, value in zip(AXES, values, strict=True):
                     yield f"{wing}{name}.joint_{j}.{axis}", value
     own_corrections = set.intersection(*map(set, named.values())) if named else set()
-    for name, value in model["aero"].items():
+    aero = {current_name(name): value for name, value in model["aero"].items()}
+    for name, value in aero.items():
         yield from (
             ((f"{wing}{name}", own) for wing, own in wings(name))
             if name in own_corrections
@@ -46,8 +48,9 @@ def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
 def model_table(result: Document) -> Table:
     """Show every parameter with its 95 % interval; grey are those that the samples do not determine."""
     model, uncertainty = result["model"], result.get("uncertainty") or {}
-    intervals = uncertainty.get("interval_95") or {}
-    unseen, bound = uncertainty.get("undetermined") or (), uncertainty.get("at_bound") or ()
+    intervals = {current_name(name): ends for name, ends in (uncertainty.get("interval_95") or {}).items()}
+    unseen = current_names(uncertainty.get("undetermined") or ())
+    bound = current_names(uncertainty.get("at_bound") or ())
     title = f"Equivalent model, {model['links_per_wing']} links per wing"
     caption = "grey: the samples do not determine it" if unseen else None
     table = new_table("parameter", "value", "± 95 %", title=title, caption=caption)
@@ -77,5 +80,5 @@ def shown_interval(interval: Sequence[float | None]) -> str:
 
 def at_bound_line(result: Document) -> str:
     """Give a line that lists the parameters that ended at a bound of the search; "" without any."""
-    names = (result.get("uncertainty") or {}).get("at_bound") or ()
+    names = current_names((result.get("uncertainty") or {}).get("at_bound") or ())
     return f"At a bound of the search: {', '.join(names)}" if names else ""

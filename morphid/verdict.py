@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from morphdata.renamed import current_names
+
 Document = Mapping[str, Any]
 
 ANGLES = ("phi", "theta", "psi")
@@ -56,9 +58,10 @@ def verdict(result: Document, use: str) -> Verdict:
 
 
 def _judge_parameters(uncertainty: Document) -> Iterator[Judgement]:
-    unknown = uncertainty.get("undetermined") or ()
+    unknown = current_names(uncertainty.get("undetermined") or ())
     # a parameter that has no effect on the fit may end anywhere, at its bound too
-    stopped = [name for name in uncertainty.get("at_bound") or () if name not in unknown]
+    at_bound = current_names(uncertainty.get("at_bound") or ())
+    stopped = [name for name in at_bound if name not in unknown]
     if stopped:
         reason = f"The search stopped at a bound of {_names(stopped)}: the best value may lie outside."
         step = "Widen model.bounds of these parameters if physics allows it, or change the number of links."

@@ -13,7 +13,7 @@ from morphdata.samplefiles.csv_table import write_table
 Document = dict[str, Any]
 
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SWEEPS = ("sweep_left", "sweep_right")  # of samples that do not name their drives
+SWEEPS = ("sweep_left", "sweep_right")  # of documents that do not name their drives
 MODELS = ("measured", "rigid", "initial", "identified")
 LONGEST_STEM = 100  # characters: with prefix and ending a file name stays below the limits of file systems
 DEFAULT_STEM = "sample"
@@ -59,8 +59,7 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Returns
     -------
-    File name ``curves_<sample>.csv`` -> UTF-8 text: time_s, the drives, then ``<model>_<angle>_rad``. Where
-    a flight diverged its cells are empty.
+    Columns time_s, the drives, then ``<model>_<angle>_rad``. Where a flight diverged its cells are empty.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)
@@ -69,8 +68,7 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
 def curve_table(sample: Document) -> bytes:
     """Write one sample's time histories; see `curve_tables`."""
-    columns: dict[str, Sequence[float | None]] = {"time_s": sample["time_s"]}
-    columns |= {name: sample[name] for name in drive_columns(sample)}
+    columns = {name: sample[name] for name in ("time_s", *drive_columns(sample))}
     columns |= {
         f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
     }
@@ -112,6 +110,12 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
     }
 
 
+def drive_columns(document: Document) -> list[str]:
+    """Names of the columns of a sample's or a flight's drives, those of which there are any."""
+    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
+    return [name for name in names if name in document]
+
+
 def study_table(document: Document) -> bytes:
     """Write a study's rows with the units of the document; what is not known is empty."""
     rows = document["rows"]
@@ -132,9 +136,3 @@ def _table(columns: Mapping[str, Sequence[float | str | None]], digits: int) -> 
     text = io.StringIO()
     write_table(text, columns, (map(cell, row) for row in zip(*columns.values(), strict=True)))
     return text.getvalue().encode()
-
-
-def drive_columns(document: Document) -> list[str]:
-    """Names of the columns of a sample's or a flight's drives, those of which there are any."""
-    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
-    return [name for name in names if name in document]

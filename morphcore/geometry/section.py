@@ -23,7 +23,7 @@ class SectionProperties:
     """
 
     ei_flap: Array
-    ei_lag: Array
+    ei_edge: Array
     gj: Array
     mass: Array
     inertia_x: Array
@@ -37,7 +37,7 @@ def given_section(section: Section, chord: Array) -> SectionProperties:
     ix, iy, iz = section.inertia_per_length_kg_m
     return SectionProperties(
         ei_flap=section.ei_flap_n_m2 * ones,
-        ei_lag=section.ei_lag_n_m2 * ones,
+        ei_edge=section.ei_edge_n_m2 * ones,
         gj=section.gj_n_m2 * ones,
         mass=section.mass_per_length_kg_m * ones,
         inertia_x=ix * ones,
@@ -64,7 +64,7 @@ def solid_box(material: Material, chord: Array, thickness: float) -> SectionProp
     mass = material.density_kg_m3 * chord * height
     return SectionProperties(
         ei_flap=material.youngs_modulus_pa * chord * height**3 / 12,
-        ei_lag=material.youngs_modulus_pa * height * chord**3 / 12,
+        ei_edge=material.youngs_modulus_pa * height * chord**3 / 12,
         gj=material.shear_modulus_pa * torsion_constant(chord, height),
         mass=mass,
         inertia_x=mass * height**2 / 12,

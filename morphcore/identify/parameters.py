@@ -14,6 +14,7 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, phys
 from morphcore.models.parameters import CutSurface, Parameter
 from morphcore.models.transforms import Transform
 from morphdata.identify import Bounds
+from morphdata.renamed import current_name, current_names
 
 Array = NDArray[np.float64]
 Interval = tuple[float | None, float | None]
@@ -253,7 +254,8 @@ class SearchSpace:
         }
 
     def parameter(self, name: str) -> Parameter:
-        """The kind of a named parameter."""
+        """The kind of a named parameter; its former name is accepted, too."""
+        name = current_name(name)
         return next(unknown.parameter for unknown in self.unknowns if name in unknown.names)
 
 
@@ -281,22 +283,25 @@ def search_space(
     InvalidInput
         A bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
     """
-    Bounds.parse({name: list(pair) for name, pair in (bounds or {}).items()}, "/model/bounds")
+    given_bounds = Bounds.parse(
+        {name: list(pair) for name, pair in (bounds or {}).items()}, "/model/bounds"
+    ).given()
     corrections = [parameter.name for parameter in model.parameters if parameter.correction]
     for index, name in enumerate(aero_coefficients or ()):
-        if name not in corrections:
+        if current_name(name) not in corrections:
             raise InvalidInput(
                 f"{name!r} is not an aerodynamic correction",
                 pointer=f"/model/aero_coefficients/{index}",
                 hint=f"use some of {', '.join(corrections)}",
             )
-    free = tuple(name for name in corrections if aero_coefficients is None or name in aero_coefficients)
+    chosen = corrections if aero_coefficients is None else current_names(aero_coefficients)
+    free = tuple(name for name in corrections if name in chosen)
     fixed = physical_guess(model, separate_wings=separate_wings)
     unknowns = []
     for parameter in model.parameters:
         for prefix, surfaces in _owners(model, parameter, separate_wings=separate_wings):
             searched = parameter.name in free or not parameter.correction
-            given = (bounds or {}).get(parameter.name) if searched else None
+            given = given_bounds.get(parameter.name) if searched else None
             unknowns.append(_unknown(model, fixed, parameter, prefix, surfaces, given, searched=searched))
     return SearchSpace(model=model, unknowns=tuple(unknowns), free_aero=free, fixed=fixed)
 

@@ -20,6 +20,7 @@ from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
+from morphdata.renamed import both_spellings
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -137,7 +138,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         fits=fits,
         uncertainty=certainty,
         search={
-            "aero_coefficients": list(space.free_aero),
+            "aero_coefficients": both_spellings(space.free_aero),
             "method": settings.method,
             "seed": settings.seed,
             "flights": state.flights,

@@ -29,6 +29,7 @@ from morphcore.threads import one_blas_thread, use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, Search, SoughtModel
+from morphdata.renamed import both_spellings
 from morphdata.study import StudiedModels, StudyRequest
 
 LINKS = tuple(StudiedModels().links_per_wing)
@@ -230,7 +231,7 @@ class Study:
             plan_s=state.plan_s,
             rounds=len(state.rounds),
             search={
-                "aero_coefficients": list(self.runs[0].space.free_aero),
+                "aero_coefficients": both_spellings(self.runs[0].space.free_aero),
                 "method": self.search.method,
                 "seed": self.search.seed,
                 "flights": state.flights,

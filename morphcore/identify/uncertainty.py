@@ -2,8 +2,8 @@
 
 Bard (1974), section 7-5: with residuals r and Jacobian A at the optimum, cov(x) = s^2 (A^T A)^-1, s^2 = r^T r
 / (m - d). Intervals are Student's in the coordinate in which a parameter is searched, and so of its own shape
-in its own unit: of factors for what is positive (stiffness, damping, lag), of log-odds for a share of the
-span, even to both sides for the rest.
+in its own unit: of factors for what is positive (stiffness, damping, circulation lag), of log-odds for a
+share of the span, even to both sides for the rest.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from scipy.special import stdtrit
 
 from morphcore.identify.parameters import Interval, SearchSpace
 from morphcore.shown import Shown
+from morphdata.renamed import both_spellings, under_both_spellings
 
 Array = NDArray[np.float64]
 
@@ -57,12 +58,14 @@ class Uncertainty(Shown):
         correlation = self.covariance / np.maximum(np.outer(spread, spread), 1e-300)
         return {
             "method": METHOD,
-            "standard_error": {
-                n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)
-            },
-            "interval_95": {name: list(interval) for name, interval in self.intervals.items()},
-            "undetermined": list(self.undetermined),
-            "at_bound": list(self.at_bound),
+            "standard_error": under_both_spellings(
+                {n: _finite(v) for n, v in zip(self.parameter_names, self.standard_error, strict=True)}
+            ),
+            "interval_95": under_both_spellings(
+                {name: list(interval) for name, interval in self.intervals.items()}
+            ),
+            "undetermined": both_spellings(self.undetermined),
+            "at_bound": both_spellings(self.at_bound),
             "coordinates": list(self.names),
             "correlation": np.clip(correlation, -1.0, 1.0).round(6).tolist(),
             "singular_values": self.singular_values.tolist(),
@@ -70,11 +73,13 @@ class Uncertainty(Shown):
             "unidentifiable": [
                 {
                     "spread": _finite(self.noise_rad / value) if value > 0 else None,
-                    "direction": {
-                        name: round(float(part), 3)
-                        for name, part in zip(self.names, direction, strict=True)
-                        if abs(part) >= NEGLIGIBLE_PART
-                    },
+                    "direction": under_both_spellings(
+                        {
+                            name: round(float(part), 3)
+                            for name, part in zip(self.names, direction, strict=True)
+                            if abs(part) >= NEGLIGIBLE_PART
+                        }
+                    ),
                 }
                 for value, direction in zip(self.singular_values, self.directions, strict=True)
                 if self.noise_rad > UNSEEN_SPREAD * value
@@ -88,7 +93,7 @@ def no_uncertainty(at_bound: tuple[str, ...]) -> dict[str, Any]:
         "standard_error": {},
         "interval_95": {},
         "undetermined": [],
-        "at_bound": list(at_bound),
+        "at_bound": both_spellings(at_bound),
         "correlation": [],
         "unidentifiable": [],
     }

@@ -28,6 +28,7 @@ from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.parameters import MAX_LINKS
+from morphdata.renamed import RENAMED, current_name
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -41,8 +42,8 @@ class ParameterBatch(Shown):
     ----------
     values : mapping of str to ndarray
         By the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span that sum
-        to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and lag;
-        ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``centre_shift_m`` (forward positive) and
+        to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and edgewise;
+        ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``ac_offset_m`` (forward positive) and
         ``lag_s`` (p,): those of its largest surface, others have them in proportion to their chords.
     surfaces : tuple of tuples of str, optional
         Names of the surfaces of each set. None: one set is that of all flexible surfaces, which are one
@@ -52,9 +53,14 @@ class ParameterBatch(Shown):
     values: Mapping[str, Array]
     surfaces: tuple[tuple[str, ...], ...] | None = None
 
+    def __post_init__(self) -> None:
+        if any(name in RENAMED for name in self.values):
+            current = {current_name(name): value for name, value in self.values.items()}
+            object.__setattr__(self, "values", current)
+
     def __getitem__(self, name: str) -> Array:
-        """The values of one parameter."""
-        return self.values[name]
+        """The values of one parameter; its former name is accepted, too."""
+        return self.values[current_name(name)]
 
     @property
     def particles(self) -> int:
@@ -83,6 +89,7 @@ class ParameterBatch(Shown):
         KeyError
             It has no such parameter.
         """
+        values = {current_name(name): value for name, value in values.items()}
         if not values.keys() <= self.values.keys():
             raise KeyError(f"of {', '.join(values)} only {', '.join(self.values)} are parameters")
         return replace(self, values={**self.values, **values})

@@ -121,7 +121,7 @@ def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:
     sections = []
     for i in range(distance_m.size):
         stiffness = np.diag(
-            [properties.ei_flap[i], properties.gj[i], properties.ei_lag[i], shear[i], axial[i], shear[i]]
+            [properties.ei_flap[i], properties.gj[i], properties.ei_edge[i], shear[i], axial[i], shear[i]]
         )
         sections.append(Section(stiffness, section_inertia(properties, i, np.array([arm, 0.0, 0.0]))))
     return sections

@@ -12,7 +12,7 @@ from morphcore.multibody.kernels.hinge import H_ORIGIN
 Array = NDArray[np.float64]
 
 
-# flap and lag of a gimbal turn the other way in the mirror image, torsion does not
+# flap and edgewise angle of a gimbal turn the other way in the mirror image, torsion does not
 REFLECTED_GIMBAL = np.array([-1.0, 1.0, -1.0])
 
 
@@ -38,7 +38,7 @@ def _first_joints(model: ChainModel) -> NDArray[np.int64]:
 
 
 def gimbal_rotation(angles: Array) -> Array:
-    """Rotation (..., 3, 3) link to parent of gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(lag)."""
+    """Rotation (..., 3, 3) link to parent of gimbal angles (..., 3): Rx(flap) Ry(torsion) Rz(edgewise)."""
     (s1, s2, s3), (c1, c2, c3) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
     rows = [
         [c2 * c3, -c2 * s3, s2],

@@ -58,7 +58,7 @@ def link_masses(surface: Surface, edges: Array) -> Array:
 
 
 def joint_stiffness(surface: Surface, edges: Array) -> Array:
-    """Beam theory's guess (particles, n - 1, 3) for flap, torsion and lag, N m/rad.
+    """Beam theory's guess (particles, n - 1, 3) for flap, torsion and edgewise, N m/rad.
 
     A joint stands for the beam between the centres of its two links: 1/k is the integral of 1/EI (of 1/GJ)
     over it, EI / l on a uniform beam.
@@ -70,7 +70,7 @@ def joint_stiffness(surface: Surface, edges: Array) -> Array:
     section = surface.section_at(stations.ravel())
     compliance = [
         (weight / value.reshape(stations.shape)).sum(-1)
-        for value in (section.ei_flap, section.gj, section.ei_lag)
+        for value in (section.ei_flap, section.gj, section.ei_edge)
     ]
     return np.asarray(1.0 / np.stack(compliance, axis=-1))
 

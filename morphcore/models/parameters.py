@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Scope = Literal["surface", "pair", "aircraft"]
 
-AXIS_NAMES = ("flap", "torsion", "lag")
+AXIS_NAMES = ("flap", "torsion", "edgewise")
 STIFFNESS_FACTOR = 10.0  # either way from beam theory: a chain of few links is off by less than three
 DAMPING_FACTOR = 30.0
 LEAST_DAMPING_S = 1e-6  # of the stiffness: where the search for the damping of undamped wings begins
@@ -92,7 +92,7 @@ class SurfaceRows:
     links : ndarray, shape (p, n, LINK_ROWS)
         The rows that articulated.py and loads.py name (``L_...``).
     stiffness, damping : ndarray, shape (p, 3 (n - 1))
-        Of flap, torsion and lag of each gimbal, N m/rad and N m s/rad.
+        Of flap, torsion and edgewise of each gimbal, N m/rad and N m s/rad.
     overlap : ndarray, shape (p, 2 strips n)
         For each strip and link the share of the strip, and the middle of that share in link axes, m.
     touched : ndarray of int, shape (p, n, 2)
@@ -342,8 +342,8 @@ LIFT_FACTOR = Parameter(
     default=NEUTRAL_LIFT_FACTOR,
 )
 
-CENTRE_SHIFT = Parameter(
-    name="centre_shift_m",
+AC_OFFSET = Parameter(
+    name="ac_offset_m",
     unit="m",
     transform=lambda surface: Linear(CENTRE_UNIT_CHORDS * _chord(surface)),
     bounds=lambda cut: Linear(CENTRE_UNIT_CHORDS * _chord(cut.surface)).box(
@@ -385,7 +385,7 @@ CHAIN_PARAMETERS: list[Parameter] = [
     STIFFNESS,
     DAMPING,
     LIFT_FACTOR,
-    CENTRE_SHIFT,
+    AC_OFFSET,
     PROFILE_DRAG,
     LAG,
 ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
 from morphdata.parameters import AXES, MirroredParameters, Parameters, SurfaceParameters, WholeResult
+from morphdata.renamed import under_both_spellings
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -95,9 +96,12 @@ def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
         "links_per_wing": batch.links,
         "separate_wings": not flat,
         **{name: (values[name][0] if flat else values[name]).tolist() for name in structure},
-        "aero": {
-            p.name: float(values[p.name] if p.scope == "aircraft" else values[p.name][0]) for p in corrections
-        },
+        "aero": under_both_spellings(
+            {
+                p.name: float(values[p.name] if p.scope == "aircraft" else values[p.name][0])
+                for p in corrections
+            }
+        ),
     }
     if batch.surfaces is not None:
         own = [*structure, *(p.name for p in corrections if p.scope != "aircraft")]

@@ -176,6 +176,18 @@ class FlightPlan(Shown):
             ),
         )
 
+    def instants(self, rows: NDArray[np.int64]) -> FlightPlan:
+        """What the plan has at some grid times alone, to evaluate there; it cannot be flown."""
+        return replace(
+            self,
+            angles=self.angles[rows],
+            rates=self.rates[rows],
+            accelerations=self.accelerations[rows],
+            hinges=np.ascontiguousarray(self.hinges[rows]),
+            wind_N=np.ascontiguousarray(self.wind_N[rows]),
+            table=replace(self.table, position=self.table.position[rows]),
+        )
+
     @cached_property
     def mean_accelerations(self) -> Array:
         """(steps, s, 6) of the surfaces against the fuselage over each step, in W, rad/s^2 and m/s^2.

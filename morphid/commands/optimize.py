@@ -93,8 +93,8 @@ def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
 
 def knot_table(schedule: Mapping[str, Any]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
-    angle = f"{label(schedule.get('drive') or 'sweep')}, rad"
-    table = new_table("time, s", angle, title="Knots of the spline", left=0)
+    drive = label(schedule.get("drive") or "sweep")
+    table = new_table("time, s", f"{drive}, rad", title="Knots of the spline", left=0)
     for time_s, angle_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
         table.add_row(f"{time_s:.4f}", f"{angle_rad:.4f}")
     return table

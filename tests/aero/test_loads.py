@@ -138,7 +138,7 @@ def test_cutting_a_wing_changes_nothing(links):
 def test_corrections():
     """The lift factor scales circulation and what it induces; the centre's shift moves the force."""
     model = example_model(1)
-    plain, shifted = dragless(model), dragless(model, centre_shift_m=np.array([0.02]))
+    plain, shifted = dragless(model), dragless(model, ac_offset_m=np.array([0.02]))
     lifted = dragless(model, lift_factor=np.array([1.2]))
     base, moved, more = (
         lane_loads(model, batch, *settled(model, batch, (0.3, 0.3), SINKING)).wrench

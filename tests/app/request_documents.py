@@ -86,13 +86,18 @@ def optimize_document() -> Document:
     }
 
 
+def export_document() -> Document:
+    """Build a valid request for an export."""
+    return {**_vehicle(), "model": {"parameters": copy.deepcopy(RESULT["model"])}, "format": "npz"}
+
+
 RESULT: Document = {
     "model": {
         "links_per_wing": 2,
         "division": [0.5, 0.5],
         "stiffness_nm_rad": [[1.0, 2.0, 3.0]],
         "damping_nms_rad": [[0.1, 0.2, 0.3]],
-        "aero": {"lift_factor": 1.0, "centre_shift_m": 0.0, "profile_drag": 0.01, "lag_s": 0.0},
+        "aero": {"lift_factor": 1.0, "ac_offset_m": 0.0, "profile_drag": 0.01, "lag_s": 0.0},
     },
     "fit": [
         {
@@ -115,6 +120,14 @@ RESULT: Document = {
         "history": [{"generation": 1, "best_cost": 1.0}],
     },
     "cost": {"rigid_flight_s": 0.1, "equivalent_flight_s": 0.2, "flexible_flight_s": None},
+}
+
+EXPORT_RESULT: Document = {
+    "format": "npz",
+    "file": "model.npz",
+    "media_type": "application/x-npz",
+    "size_bytes": 8000,
+    "sha256": "0" * 64,
 }
 
 STUDY_RESULT: Document = {

@@ -21,14 +21,14 @@ UNCERTAINTY: Document = {
         "division.1": [0.4784, 0.5216],
         "stiffness_nm_rad.joint_1.flap": [0.9584, 1.0416],
         "stiffness_nm_rad.joint_1.torsion": [1.2, 3.4],
-        "stiffness_nm_rad.joint_1.lag": [None, None],
+        "stiffness_nm_rad.joint_1.edgewise": [None, None],
         "damping_nms_rad.joint_1.flap": [None, 0.31],
-        "damping_nms_rad.joint_1.lag": [0.002, 45.0],
+        "damping_nms_rad.joint_1.edgewise": [0.002, 45.0],
         "lift_factor": [0.99498, 1.00502],
     },
     "at_bound": ["damping_nms_rad.joint_1.torsion"],
     "correlation": [[1.0]],
-    "undetermined": ["damping_nms_rad.joint_1.lag", "stiffness_nm_rad.joint_1.lag"],
+    "undetermined": ["damping_nms_rad.joint_1.edgewise", "stiffness_nm_rad.joint_1.edgewise"],
     "unidentifiable": [],
 }
 WARNINGS: list[Document] = [

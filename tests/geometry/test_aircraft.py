@@ -129,7 +129,7 @@ def read_flight(document: Any, pointer: str = "/flight") -> FlightDocument:
 
 WING = "/surfaces/0"
 INERTIA_ABOUT_THE_SPAN = f"{WING}/section/inertia_per_length_kg_m/1"
-SECTION = {"ei_flap_n_m2": 1.0, "ei_lag_n_m2": 1.0, "gj_n_m2": 1.0, "mass_per_length_kg_m": 1.0}
+SECTION = {"ei_flap_n_m2": 1.0, "ei_edge_n_m2": 1.0, "gj_n_m2": 1.0, "mass_per_length_kg_m": 1.0}
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ SECTION = {"ei_flap_n_m2": 1.0, "ei_lag_n_m2": 1.0, "gj_n_m2": 1.0, "mass_per_le
         (f"{WING}/hinge/position_m", [0.0, None, 0.0], f"{WING}/hinge/position_m/1"),
         (f"{WING}/hinge", ..., None),
         (f"{WING}/sweep_m", 1.0, None),
-        (f"{WING}/section", {"ei_flap_n_m2": 1.0}, f"{WING}/section/ei_lag_n_m2"),
+        (f"{WING}/section", {"ei_flap_n_m2": 1.0}, f"{WING}/section/ei_edge_n_m2"),
         (f"{WING}/section", SECTION | {"inertia_per_length_kg_m": [1, 0, 1]}, INERTIA_ABOUT_THE_SPAN),
         (f"{WING}/elastic_axis_offset_m", 0.31, None),
         (f"{WING}/material/poisson_ratio", -0.995, None),

@@ -54,7 +54,7 @@ def test_the_reference_wing() -> None:
     """The examples' wing, 0.3 x 0.1 m of density 500 kg/m^3 and E = 2.1 GPa, computed by hand."""
     box = solid_box(WOOD, np.array([0.3]), 0.1)
     assert box.ei_flap[0] == pytest.approx(52_500.0)  # 2.1e9 x 0.3 x 0.1^3 / 12
-    assert box.ei_lag[0] == pytest.approx(472_500.0)  # 2.1e9 x 0.1 x 0.3^3 / 12
+    assert box.ei_edge[0] == pytest.approx(472_500.0)  # 2.1e9 x 0.1 x 0.3^3 / 12
     assert box.gj[0] == pytest.approx(2.1e9 / 2.6 * 0.263 * 0.3e-3, rel=2e-3)  # 3 : 1 rectangle
     assert box.mass[0] == pytest.approx(15.0)
     assert box.inertia_x[0] == pytest.approx(0.0125)
@@ -79,13 +79,13 @@ def test_a_given_section_is_taken_as_given() -> None:
     """Properties given outright hold at every station, whatever the chord."""
     given = Section(
         ei_flap_n_m2=1.0,
-        ei_lag_n_m2=2.0,
+        ei_edge_n_m2=2.0,
         gj_n_m2=3.0,
         mass_per_length_kg_m=4.0,
         inertia_per_length_kg_m=[5.0, 6.0, 7.0],
     )
     section = given_section(given, np.array([0.3, 0.1]))
     for name, value in zip(
-        ("ei_flap", "ei_lag", "gj", "mass", "inertia_x", "inertia_y", "inertia_z"), range(1, 8), strict=True
+        ("ei_flap", "ei_edge", "gj", "mass", "inertia_x", "inertia_y", "inertia_z"), range(1, 8), strict=True
     ):
         np.testing.assert_array_equal(getattr(section, name), [value, value])

@@ -82,7 +82,7 @@ def test_sections_follow_the_taper() -> None:
     wing = surface("right", "z")
     section = wing.section_at([0.0, 3.0])
     assert section.ei_flap[0] / section.ei_flap[1] == pytest.approx(2.0)
-    assert section.ei_lag[0] / section.ei_lag[1] == pytest.approx(8.0)
+    assert section.ei_edge[0] / section.ei_edge[1] == pytest.approx(8.0)
     assert wing.section_at(1.0).mass.shape == (1,)
 
 

@@ -234,7 +234,7 @@ def test_one_link_has_only_corrections_to_find() -> None:
         reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=1), QUICK
     )
     document = run.result(last(run).checkpoint).to_document()
-    assert run.space.names == ("lift_factor", "centre_shift_m", "lag_s")
+    assert run.space.names == ("lift_factor", "ac_offset_m", "lag_s")
     assert document["model"]["stiffness_nm_rad"] == []
 
 

@@ -66,7 +66,7 @@ def test_corrections_that_are_not_sought_stay_neutral() -> None:
     assert sought.names[-1] == "lift_factor"
     batch = sought.decode(sought.upper)
     assert batch["profile_drag"][0, 0] == 0.01
-    assert batch["centre_shift_m"][0] == 0.0
+    assert batch["ac_offset_m"][0] == 0.0
 
 
 def test_separate_wings_double_the_structural_unknowns() -> None:

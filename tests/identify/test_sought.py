@@ -19,7 +19,7 @@ from tests.identify.flights import (
     shortened,
 )
 
-AERO_COEFFICIENTS = ("lift_factor", "centre_shift_m", "profile_drag", "lag_s")
+AERO_COEFFICIENTS = ("lift_factor", "ac_offset_m", "profile_drag", "lag_s")
 WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag")
 LISTED = ("profile_drag", "lag_s")
 

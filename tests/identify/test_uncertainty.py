@@ -33,10 +33,10 @@ def test_an_unseen_parameter_is_reported() -> None:
     space = search_space(chain_model(reference_aircraft(), reference_flight(), 2))
     rng = np.random.default_rng(1)
     matrix, noise = rng.normal(size=(200, space.dimension)), rng.normal(0.0, 0.1, 200)
-    blind = space.names.index("damping_nms_rad.joint_1.lag")
+    blind = space.names.index("damping_nms_rad.joint_1.edgewise")
     matrix[:, blind] = 0.0
     (direction,) = uncertainty(space, space.guess, noise, matrix).to_document()["unidentifiable"]
-    assert set(direction["direction"]) == {"damping_nms_rad.joint_1.lag"}
+    assert set(direction["direction"]) == {"damping_nms_rad.joint_1.edgewise"}
 
 
 def test_standard_errors_cover_the_truth() -> None:
@@ -47,8 +47,8 @@ def test_standard_errors_cover_the_truth() -> None:
     degrees of freedom lies in 0.4..2.0 with 99.8 per cent probability.
     """
     model = chain_model(reference_aircraft(), reference_flight(), 2)
-    space = search_space(model, aero_coefficients=["lift_factor", "centre_shift_m"])
-    chosen = np.array([space.names.index("lift_factor"), space.names.index("centre_shift_m")])
+    space = search_space(model, aero_coefficients=["lift_factor", "ac_offset_m"])
+    chosen = np.array([space.names.index("lift_factor"), space.names.index("ac_offset_m")])
     truth = space.guess.copy()
     truth[chosen] = [0.3, 0.5]
     clean = synthetic(space.decode(truth), right_rad=0.5)
@@ -123,7 +123,7 @@ def test_a_parameter_at_its_bound_is_open_there() -> None:
     bounded = space.names.index("damping_nms_rad.joint_2.flap")
     x[bounded] = space.lower[bounded]
     x[space.names.index("log_ratio.1")] = space.upper[space.names.index("log_ratio.1")]
-    jacobian[:, space.names.index("stiffness_nm_rad.joint_1.lag")] *= 1e-4
+    jacobian[:, space.names.index("stiffness_nm_rad.joint_1.edgewise")] *= 1e-4
     document = uncertainty(space, x, noise, jacobian).to_document()
     assert document["at_bound"] == ["division.1", "damping_nms_rad.joint_2.flap"]
     low, high = document["interval_95"]["damping_nms_rad.joint_2.flap"]
@@ -132,8 +132,8 @@ def test_a_parameter_at_its_bound_is_open_there() -> None:
         high > space.flatten(space.decode(x))[0][space.parameter_names.index("damping_nms_rad.joint_2.flap")]
     )
     assert document["interval_95"]["division.1"][1] is None
-    assert document["interval_95"]["stiffness_nm_rad.joint_1.lag"] == [None, None]
-    assert document["undetermined"] == ["stiffness_nm_rad.joint_1.lag"]
+    assert document["interval_95"]["stiffness_nm_rad.joint_1.edgewise"] == [None, None]
+    assert document["undetermined"] == ["stiffness_nm_rad.joint_1.edgewise"]
 
 
 def test_what_is_not_searched_has_no_interval() -> None:

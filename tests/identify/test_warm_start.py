@@ -26,7 +26,7 @@ MODEL = {
     "division": [0.45, 0.55],
     "stiffness_nm_rad": [[41e3, 68e3, 380e3]],
     "damping_nms_rad": [[160.0, 270.0, 1500.0]],
-    "aero": {"lift_factor": 1.06, "centre_shift_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
+    "aero": {"lift_factor": 1.06, "ac_offset_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
 }
 
 

@@ -160,7 +160,7 @@ def random_batch(
         damping_nms_rad=guess["damping_nms_rad"]
         * np.exp(rng.uniform(-1.5, 1.5, size=guess["stiffness_nm_rad"].shape)),
         lift_factor=rng.uniform(0.8, 1.2, size=particles),
-        centre_shift_m=rng.uniform(-0.03, 0.03, size=particles),
+        ac_offset_m=rng.uniform(-0.03, 0.03, size=particles),
         profile_drag=rng.uniform(0.0, 0.05, size=guess["profile_drag"].shape),
         lag_s=guess["lag_s"] * np.exp(rng.uniform(-1.0, 1.0, size=particles)),
     )

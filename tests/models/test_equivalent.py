@@ -65,7 +65,7 @@ def test_physical_guess_has_beta_damping():
     guess = physical_guess(model)
     np.testing.assert_allclose(guess["damping_nms_rad"], 0.004 * guess["stiffness_nm_rad"])
     assert guess["lift_factor"][0] == 1.0
-    assert guess["centre_shift_m"][0] == 0.0
+    assert guess["ac_offset_m"][0] == 0.0
     assert guess["profile_drag"][0, 0] == 0.01
     assert guess["division"].shape == (1, 1, 3)
 

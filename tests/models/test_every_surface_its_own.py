@@ -102,7 +102,7 @@ def uneven(model: ChainModel, *, separate_wings: bool) -> ParameterBatch:
     return guess.changed(
         stiffness_nm_rad=guess["stiffness_nm_rad"] * factor[:, None, None],
         damping_nms_rad=guess["damping_nms_rad"] * factor[:, None, None] ** 2,
-        centre_shift_m=np.array([0.01]),
+        ac_offset_m=np.array([0.01]),
         lift_factor=np.array([1.1]),
     )
 
@@ -159,11 +159,11 @@ def test_lengths_and_times_are_in_proportion_to_chords() -> None:
     """An offset of the aerodynamic centre and a lag are those of the largest surface, wherever it stands."""
     for names in ORDERS:
         model = chain(names)
-        batch = physical_guess(model).changed(centre_shift_m=np.array([0.02]), lag_s=np.array([0.004]))
+        batch = physical_guess(model).changed(ac_offset_m=np.array([0.02]), lag_s=np.array([0.004]))
         tail, wing = (model.on_surface(batch, names.index(f"right {part}")) for part in ("tail", "wing"))
-        assert wing["centre_shift_m"][0] == 0.02
+        assert wing["ac_offset_m"][0] == 0.02
         assert wing["lag_s"][0] == 0.004
-        assert tail["centre_shift_m"][0] == pytest.approx(0.02 * 0.25 / 0.4)
+        assert tail["ac_offset_m"][0] == pytest.approx(0.02 * 0.25 / 0.4)
         assert tail["lag_s"][0] == pytest.approx(0.004 * 0.25 / 0.4)
 
 

@@ -53,7 +53,7 @@ def test_links_are_where_the_tree_has_them(links):
 
 
 def test_small_angles_commute():
-    """Flap, torsion and lag of a gimbal are rotations about x, y, z: to first order a cross product."""
+    """Flap, torsion and edgewise of a gimbal are rotations about x, y, z: to first order a cross product."""
     angles = 1e-6 * np.array([1.0, -2.0, 3.0])
     expected = np.eye(3) + np.array(
         [[0.0, -angles[2], angles[1]], [angles[2], 0.0, -angles[0]], [-angles[1], angles[0], 0.0]]

@@ -131,7 +131,7 @@ def test_tapered_joints_add_compliances():
     centres = 0.5 * (edges[0, 1:] + edges[0, :-1])
     stations = np.linspace(*centres, 20_001)
     section = surface.section_at(stations)
-    for axis, value in enumerate((section.ei_flap, section.gj, section.ei_lag)):
+    for axis, value in enumerate((section.ei_flap, section.gj, section.ei_edge)):
         compliance = np.trapezoid(1.0 / value, stations)
         # four Gauss points: 1e-5 on this taper
         assert joint_stiffness(surface, edges)[0, 0, axis] == pytest.approx(1.0 / compliance, rel=1e-4)

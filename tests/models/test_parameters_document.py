@@ -20,7 +20,7 @@ DOCUMENT: dict[str, Any] = {
     "division": [0.4, 0.6],
     "stiffness_nm_rad": [[5e4, 6e4, 4e5]],
     "damping_nms_rad": [[200.0, 250.0, 1800.0]],
-    "aero": {"lift_factor": 1.1, "centre_shift_m": -0.002, "profile_drag": 0.012, "lag_s": 0.004},
+    "aero": {"lift_factor": 1.1, "ac_offset_m": -0.002, "profile_drag": 0.012, "lag_s": 0.004},
 }
 
 
@@ -31,7 +31,7 @@ def _random_batch(rng: np.random.Generator, links: int, wings: int) -> Parameter
             "stiffness_nm_rad": rng.uniform(1e3, 1e6, (2, wings, links - 1, 3)),
             "damping_nms_rad": rng.uniform(0.0, 1e3, (2, wings, links - 1, 3)),
             "lift_factor": rng.uniform(0.5, 2.0, 2),
-            "centre_shift_m": rng.normal(0.0, 0.01, 2),
+            "ac_offset_m": rng.normal(0.0, 0.01, 2),
             "profile_drag": np.tile(rng.uniform(0.0, 0.1, (2, 1)), wings),
             "lag_s": rng.uniform(0.0, 0.01, 2),
         }

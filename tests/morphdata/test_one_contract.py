@@ -46,7 +46,7 @@ TAIL = {
     "material": EXAMPLE_MATERIAL,
     "section": {
         "ei_flap_n_m2": 5e4,
-        "ei_lag_n_m2": 5e5,
+        "ei_edge_n_m2": 5e5,
         "gj_n_m2": 3e4,
         "mass_per_length_kg_m": 15.0,
         "inertia_per_length_kg_m": [0.1, 0.2, 0.1],

@@ -13,7 +13,7 @@ PARAMETERS: dict[str, Any] = {  # of the order of what the example flights give
     "division": [0.42, 0.58],
     "stiffness_nm_rad": [[41000.0, 68000.0, 380000.0]],
     "damping_nms_rad": [[160.0, 270.0, 1500.0]],
-    "aero": {"lift_factor": 1.06, "centre_shift_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
+    "aero": {"lift_factor": 1.06, "ac_offset_m": 0.002, "profile_drag": 0.011, "lag_s": 0.004},
     "lattice": {"chordwise": 1, "spanwise": 4},
 }
 

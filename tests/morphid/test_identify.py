@@ -64,12 +64,12 @@ def test_the_choices_reach_the_service(examples: Path, tmp_path: Path, play: Pla
 def test_bounds_are_options_too(examples: Path, play: Play) -> None:
     """What a hint calls ``model.bounds.lag_s`` is ``--bounds lag_s=...``, several at once or repeated."""
     played = play(PlayedService("identify", RESULT))
-    bounds = ("--bounds", "lag_s=0.001:0.01", "lift_factor=0.8:1.2", "--bounds", "centre_shift_m=-0.1:0.1")
+    bounds = ("--bounds", "lag_s=0.001:0.01", "lift_factor=0.8:1.2", "--bounds", "ac_offset_m=-0.1:0.1")
     ended = RUNNER.invoke(app, [*arguments(examples), *bounds, "--separate-wings"])
     assert ended.exit_code == Exit.OK, ended.output
     assert played.body["model"] == {
         "separate_wings": True,
-        "bounds": {"lag_s": [0.001, 0.01], "lift_factor": [0.8, 1.2], "centre_shift_m": [-0.1, 0.1]},
+        "bounds": {"lag_s": [0.001, 0.01], "lift_factor": [0.8, 1.2], "ac_offset_m": [-0.1, 0.1]},
     }
 
 

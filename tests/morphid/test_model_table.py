@@ -25,16 +25,16 @@ MODEL = {
     "division": [0.45, 0.55],
     "stiffness_nm_rad": [[41e3, 68e3, 380e3]],
     "damping_nms_rad": [[160.0, 270.0, 1500.0]],
-    "aero": {"lift_factor": 1.06, "centre_shift_m": 0.002, "profile_drag": 0.01, "lag_s": 0.004},
+    "aero": {"lift_factor": 1.06, "ac_offset_m": 0.002, "profile_drag": 0.01, "lag_s": 0.004},
 }
 UNCERTAINTY = {
     "interval_95": {
         "division.1": [0.4, 0.5],
         "stiffness_nm_rad.joint_1.flap": [39e3, None],
-        "damping_nms_rad.joint_1.lag": [None, None],
+        "damping_nms_rad.joint_1.edgewise": [None, None],
         "lag_s": [None, 0.005],
     },
-    "undetermined": ["damping_nms_rad.joint_1.lag"],
+    "undetermined": ["damping_nms_rad.joint_1.edgewise"],
     "at_bound": ["stiffness_nm_rad.joint_1.flap"],
 }
 WARNING = {
@@ -92,7 +92,7 @@ def test_rows_have_intervals_and_marks() -> None:
     ]
     assert len(grey) == 1
     assert "\x1b[2m" in grey[0]
-    assert "damping_nms_rad.joint_1.lag" in grey[0]
+    assert "damping_nms_rad.joint_1.edgewise" in grey[0]
 
 
 def plain(line: str) -> str:

@@ -81,8 +81,8 @@ class FreshModel:
         own = batch.select(slice(particle, particle + 1))
         values = [model.on_surface(own, s) for s in range(len(model.aircraft.surfaces))]
         self.lift_factor = float(own["lift_factor"][0])
-        shift = np.array([value["centre_shift_m"][0] for value in values])
-        self.centre_shift_L = np.outer(np.repeat(shift, model.surfaces[:, 1]), [1.0, 0.0, 0.0])
+        shift = np.array([value["ac_offset_m"][0] for value in values])
+        self.ac_offset_L = np.outer(np.repeat(shift, model.surfaces[:, 1]), [1.0, 0.0, 0.0])
         self.bodies, self.origins = link_bodies(model)
         lag_s = np.array([value["lag_s"][0] for value in values])
         per_ring = lag_s[model.lattice.table.panel_surface] / JONES_MEAN_LAG
@@ -198,7 +198,7 @@ class FreshModel:
         on_links = np.einsum("kba,eb->eka", R_BL, forces.force_B)
         force_L = np.einsum("ek,eka->ka", self.edges[..., 0], on_links)
         moment_L = np.cross(self.edges[..., 1:], on_links).sum(axis=0)
-        moment_L += np.cross(self.centre_shift_L, force_L)
+        moment_L += np.cross(self.ac_offset_L, force_L)
         return FreshLoads(self._on_bodies(force_L, moment_L, v_L, omega_L, R_BL, wind_B), circulation)
 
     def lagged(self, circulation: Array, lag: Array, length_s: float) -> Array:

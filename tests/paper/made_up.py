@@ -115,7 +115,7 @@ def _model() -> Document:
         "division": [0.2, 0.5, 0.3],
         "stiffness_nm_rad": [[5e4, 5e4, 5e5], [3e4, 4e4, 5e5]],
         "damping_nms_rad": [200.0, [100.0, 200.0, 2000.0]],
-        "aero": {"lift_factor": 0.99, "centre_shift_m": -0.001, "profile_drag": 0.01, "lag_s": 0.004},
+        "aero": {"lift_factor": 0.99, "ac_offset_m": -0.001, "profile_drag": 0.01, "lag_s": 0.004},
     }
 
 

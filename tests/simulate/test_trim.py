@@ -202,7 +202,7 @@ def test_tip_under_a_uniform_load(links, axis, sign):
     tips, model = uniformly_loaded(links, load=-sign * load, axis=axis)
     wing = model.aircraft.surfaces[0]
     section = wing.section_at(np.zeros(1))
-    rigidity = float((section.ei_flap if axis == 2 else section.ei_lag)[0])
+    rigidity = float((section.ei_flap if axis == 2 else section.ei_edge)[0])
     beam = 15.0 * load * 3.0**4 / (8.0 * rigidity)
     expected = sign * beam * (1.0 - 1.0 / links) ** 2
     np.testing.assert_allclose(tips[:, axis], expected, rtol=1e-4)

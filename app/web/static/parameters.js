@@ -4,7 +4,7 @@
 const AXES = ["flap", "torsion", "edgewise"];
 const AERO = {
   lift_factor: "Lift factor",
-  centre_shift_m: "Aerodynamic-centre offset, m",
+  ac_offset_m: "Aerodynamic-centre offset, m",
   profile_drag: "Profile drag coefficient",
   lag_s: "Circulation lag, s",
 };
@@ -14,6 +14,15 @@ const GROUPS = {
   damping_nms_rad: "Damping, N m s/rad",
   aero: "Aerodynamic corrections",
 };
+
+/* A parameter's name today; results carry former names next to it (morphdata/renamed.py). */
+const RENAMED = { centre_shift_m: "ac_offset_m", lag: "edgewise" };
+function currentName(name) {
+  const parts = name.split("."), last = parts.pop();
+  return [...parts, RENAMED[last] ?? last].join(".");
+}
+const currentNames = (names) => [...new Set((names ?? []).map(currentName))];
+const underCurrentNames = (values) => Object.fromEntries(Object.entries(values ?? {}).map(([name, value]) => [currentName(name), value]));
 
 /* Who has parameters of its own: [[prefix of their names, the same for people, the parameters], ...]. */
 function parameterSets(model) {
@@ -31,10 +40,9 @@ function parameterGroups(model) {
     name: `${prefix}division.${i + 1}`, title: `${of}link ${i + 1}`, value,
   })));
   const joints = (field) => sets.flatMap(([prefix, of, own]) => (own[field] ?? []).flatMap((row, joint) => [row].flat().map((value, i) => {
-    const axis = AXES[i] === "edgewise" ? "lag" : AXES[i]; // its name in documents
-    return { name: `${prefix}${field}.joint_${joint + 1}.${axis}`, title: `${of}joint ${joint + 1}, ${AXES[i]}`, value };
+    return { name: `${prefix}${field}.joint_${joint + 1}.${AXES[i]}`, title: `${of}joint ${joint + 1}, ${AXES[i]}`, value };
   })));
-  const aero = Object.entries(model.aero ?? {}).flatMap(([name, value]) => {
+  const aero = Object.entries(underCurrentNames(model.aero)).flatMap(([name, value]) => {
     const title = AERO[name] ?? name.replaceAll("_", " ");
     const each = sets.filter(([, , own]) => own[name] !== undefined); // corrections that each surface has
     if (!each.length) return [{ name, title, value }];
@@ -44,34 +52,34 @@ function parameterGroups(model) {
   return Object.entries(groups).filter(([, rows]) => rows.length).map(([group, rows]) => [GROUPS[group], rows]);
 }
 
-/* A parameter's name for people: "stiffness_nm_rad.joint_1.lag" is "stiffness, joint 1, edgewise". */
+/* A parameter's name for people: "stiffness_nm_rad.joint_1.edgewise" is "stiffness, joint 1, edgewise". */
 function parameterTitle(name) {
   if (AERO[name]) return AERO[name].replace(/, [ms]$/, "").toLowerCase();
-  const words = { stiffness_nm_rad: "stiffness", damping_nms_rad: "damping", lag: "edgewise", division: "share of the span", log_ratio: "share of the span" };
+  const words = { stiffness_nm_rad: "stiffness", damping_nms_rad: "damping", division: "share of the span", log_ratio: "share of the span" };
   return name.split(".").map((part) => words[part] ?? (/^\d+$/.test(part) ? `link ${part}` : part.replaceAll("_", " "))).join(", ");
 }
 
 /* Names of the parameters that the samples do not determine. */
 function undeterminedNames(uncertainty) {
-  const open = Object.entries(uncertainty?.interval_95 ?? {}).filter(([, [low, high]]) => low === null && high === null);
-  return new Set([...(uncertainty?.undetermined ?? []), ...open.map(([name]) => name)]);
+  const open = Object.entries(underCurrentNames(uncertainty?.interval_95)).filter(([, [low, high]]) => low === null && high === null);
+  return new Set([...currentNames(uncertainty?.undetermined), ...open.map(([name]) => name)]);
 }
 
 /* Why a parameter has no interval or a doubtful one; null where there is nothing to say. */
 function remark(name, result, undetermined) {
-  const searched = result.search?.aero_coefficients;
+  const searched = result.search?.aero_coefficients && currentNames(result.search.aero_coefficients);
   const kind = name.split(".").at(-1);
   if (AERO[kind] && searched && !searched.includes(kind)) return "kept fixed, not searched";
   const said = [
     undetermined.has(name) ? "not determined: the samples fit about as well with another value" : null,
-    result.uncertainty?.at_bound?.includes(name) ? "at its bound: the best value may lie outside" : null,
+    currentNames(result.uncertainty?.at_bound).includes(name) ? "at its bound: the best value may lie outside" : null,
   ];
   return said.filter(Boolean).join("; ") || null;
 }
 
 /* The row of a parameter, and one below it where there is something to say. */
 function parameterRows({ name, title, value }, result, undetermined) {
-  const [shown, spread] = showMeasured(value, result.uncertainty?.interval_95?.[name]);
+  const [shown, spread] = showMeasured(value, underCurrentNames(result.uncertainty?.interval_95)[name]);
   const why = remark(name, result, undetermined), grey = undetermined.has(name) ? "undetermined" : "";
   const row = element("tr", { class: grey }, element("th", { scope: "row" }, title), element("td", { class: "number" }, shown), element("td", { class: "number" }, spread));
   return why ? [row, element("tr", { class: "remark" }, element("td", { colspan: 3 }, why))] : [row];
@@ -94,11 +102,47 @@ function modelCard(result, title = "Identified model") {
   return card(
     title, { help: "parameters" },
     element("p", { class: "soft" }, `${count(result.model.links_per_wing, "link")} per wing; joints and links are counted from the root.`),
-    namesLine("At a bound", result.uncertainty?.at_bound),
+    namesLine("At a bound", currentNames(result.uncertainty?.at_bound)),
     element("table", { class: "parameters" }, head, ...bodies),
   );
 }
 
 function namesLine(title, names) {
   return names?.length ? element("p", {}, element("b", {}, `${title}: `), names.map(parameterTitle).join("; ")) : null;
+}
+
+/* ---- export ---- */
+
+const FORMATS = document.body.dataset.formats.split(" ");
+
+/* Fetch an exported file, however long its job takes; `say(text)` shows how far it is. */
+async function fetchExport(path, say) {
+  for (;;) {
+    const answer = await request(path, { headers: { Accept: "*/*" } });
+    if (answer.status !== 202) return answer;
+    say("A job is writing the file …");
+    await new Promise((wake) => setTimeout(wake, 1000 * Number(answer.headers.get("Retry-After") ?? 2)));
+  }
+}
+
+/* The identified model as a file of each format. */
+function exportCard(model) {
+  if (!model) return null;
+  const said = element("p", { class: "soft", role: "status" });
+  const say = (text) => { said.textContent = text; };
+  const save = async (format) => {
+    say("");
+    try {
+      const answer = await fetchExport(`/models/${model}/export?format=${format}`, say);
+      const [, name] = /filename="([^"]+)"/.exec(answer.headers.get("Content-Disposition"));
+      const url = URL.createObjectURL(await answer.blob());
+      element("a", { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10000);
+      say("");
+    } catch (error) {
+      say([error.message, error.problem?.hint].filter(Boolean).join(" "));
+    }
+  };
+  const buttons = FORMATS.map((format) => element("button", { on: { click: () => save(format) } }, format));
+  return card("Export the model", { help: "export" }, element("div", { class: "row" }, ...buttons), said);
 }

@@ -1,10 +1,10 @@
-"""Gimbal joints of the articulated-body pass: flap (x), torsion (y), lag (z) as one joint of three freedoms.
+"""Gimbal joints of the articulated-body pass: flap (x), torsion (y), edgewise (z) in one joint.
 
 A gimbal's scratch has ``JOINT_ROWS`` rows: rotation R child -> parent (9), S's second column's sine and
 cosine (2), bias acceleration (6), U = I S (18), inverse of S^T I S + added diagonal (00 01 02 11 12 22), and
 u = tau - S^T p (3).
 
-The joint rates' projection is S = [R's first row; (sin lag, cos lag, 0); (0, 0, 1)] in link axes.
+The joint rates' projection is S = [R's first row; (sin e, cos e, 0); (0, 0, 1)]; e: edgewise angle.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
         b0, b1, b2 = inertia[6, l], inertia[7, l], inertia[8, l]
         b3, b4, b5 = inertia[9, l], inertia[10, l], inertia[11, l]
         b6, b7, b8 = inertia[12, l], inertia[13, l], inertia[14, l]
-        # U = I S, columns flap (f), torsion (t), lag (g)
+        # U = I S, columns flap (f), torsion (t), edgewise (g)
         f0, t0, g0 = i0 * s10 + i1 * s11 + i2 * s12, i0 * s20 + i1 * s21, i2
         f1, t1, g1 = i1 * s10 + i3 * s11 + i4 * s12, i1 * s20 + i3 * s21, i4
         f2, t2, g2 = i2 * s10 + i4 * s11 + i5 * s12, i2 * s20 + i4 * s21, i5

@@ -105,19 +105,19 @@ def joint_forces(lanes, stiffness, damping, q, v, last, before, last_rate, befor
         x, x1, x2 = q[i : i + 3], last[i : i + 3], before[i : i + 3]
         y, y1, y2 = v[i : i + 3], last_rate[i : i + 3], before_rate[i : i + 3]
         for l in range(len(lanes)):
-            flap, torsion, lag = (
+            flap, torsion, edgewise = (
                 x[0, l] + remembered(x1[0, l], x2[0, l], step),
                 x[1, l] + remembered(x1[1, l], x2[1, l], step),
                 x[2, l] + remembered(x1[2, l], x2[2, l], step),
             )
-            flap_rate, torsion_rate, lag_rate = (
+            flap_rate, torsion_rate, edgewise_rate = (
                 y[0, l] + remembered(y1[0, l], y2[0, l], step),
                 y[1, l] + remembered(y1[1, l], y2[1, l], step),
                 y[2, l] + remembered(y1[2, l], y2[2, l], step),
             )
             t[0, l], a[0, l] = spring(k[0, l], c[0, l], flap, flap_rate, g)
             t[1, l], a[1, l] = spring(k[1, l], c[1, l], torsion, torsion_rate, g)
-            t[2, l], a[2, l] = spring(k[2, l], c[2, l], lag, lag_rate, g)
+            t[2, l], a[2, l] = spring(k[2, l], c[2, l], edgewise, edgewise_rate, g)
 
 
 @kernel
@@ -137,11 +137,11 @@ def joint_slopes(lanes, v, acceleration, last_rate, before_rate, step, angle_slo
         y, y1, y2 = v[i : i + 3], last_rate[i : i + 3], before_rate[i : i + 3]
         a, angle, rate = acceleration[i : i + 3], angle_slope[i : i + 3], rate_slope[i : i + 3]
         for l in range(len(lanes)):
-            flap, torsion, lag = a[0, l], a[1, l], a[2, l]
+            flap, torsion, edgewise = a[0, l], a[1, l], a[2, l]
             angle[0, l] = y[0, l] + remembered(y1[0, l], y2[0, l], step) + g * flap
             angle[1, l] = y[1, l] + remembered(y1[1, l], y2[1, l], step) + g * torsion
-            angle[2, l] = y[2, l] + remembered(y1[2, l], y2[2, l], step) + g * lag
-            rate[0, l], rate[1, l], rate[2, l] = flap, torsion, lag
+            angle[2, l] = y[2, l] + remembered(y1[2, l], y2[2, l], step) + g * edgewise
+            rate[0, l], rate[1, l], rate[2, l] = flap, torsion, edgewise
 
 
 @inlined

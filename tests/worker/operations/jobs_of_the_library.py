@@ -60,7 +60,7 @@ def parameters() -> Document:
         "division": [0.5, 0.5],
         "stiffness_nm_rad": [[35000.0, 45000.0, 315000.0]],
         "damping_nms_rad": [[140.0, 180.0, 1260.0]],
-        "aero": {"lift_factor": 1.0, "centre_shift_m": 0.0, "profile_drag": 0.01, "lag_s": 0.004},
+        "aero": {"lift_factor": 1.0, "ac_offset_m": 0.0, "profile_drag": 0.01, "lag_s": 0.004},
     }
 
 
