@@ -10,14 +10,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 UV_INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt
 
-# two targets at once, both to their ends, each target's output in one piece where this make can do that
-SIDE_BY_SIDE = $(MAKE) --no-print-directory --keep-going --jobs=2 $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
+# some targets at once, all to their ends, each target's output in one piece where this make can do that
+AT_ONCE = $(MAKE) --no-print-directory --keep-going $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
+SIDE_BY_SIDE = $(AT_ONCE) --jobs=2
 
 # a found `python3.11` may be a version manager's empty shim, so each candidate is asked to run
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow faults faults-postgres faults-others conformance bench check openapi locked format clean
+.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library faults faults-postgres faults-others conformance bench check openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -50,38 +51,51 @@ demo: $(VENV)/.stamp-server  ## identify a model from the example flights throug
 serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 	@exec $(BIN)/morphid serve
 
-test: setup  ## the tests (under 12 minutes on two cores)
-	@$(SIDE_BY_SIDE) test-api test-library
-	@$(SIDE_BY_SIDE) test-command test-services
+# all suites at once, on two cores too: tests of services wait for processes, sockets and limits of time while
+# the library calculates, and no core is idle at the end
+test: setup  ## the tests (some five minutes on two cores)
+	@$(call timed,$(AT_ONCE) --jobs=4 test-api test-library test-command test-services)
 
-# the API loads no kernels and the library opens no sockets, so one waits while the other calculates; whole
-# services have both and come afterwards
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
 	models morphdata multibody optimise paper search simulate)
-COMMAND_TESTS := tests/morphid tests/clients
+# the command, and whatever else uses the one live service of a test run
+COMMAND_TESTS := tests/morphid tests/clients tests/browser/test_page.py tests/worker/spread/test_live.py
+
+# runs a command and says afterwards how long it took
+timed = began=$$SECONDS; $(1); ended=$$?; echo "$@: $$((SECONDS - began)) s"; exit $$ended
 
 test-api: setup
-	@$(BIN)/pytest -q $(API_TESTS)
+	@$(call timed,$(BIN)/pytest -q $(API_TESTS))
 
 test-library: setup
-	@$(BIN)/pytest -q $(LIBRARY_TESTS)
+	@$(call timed,$(BIN)/pytest -q $(LIBRARY_TESTS))
 
 test-command: setup
-	@$(BIN)/pytest -q $(COMMAND_TESTS)
+	@$(call timed,$(BIN)/pytest -q $(COMMAND_TESTS))
 
 test-services: setup
-	@$(BIN)/pytest -q $(foreach tests,$(API_TESTS) $(LIBRARY_TESTS) $(COMMAND_TESTS),--ignore=$(tests))
+	@$(call timed,$(BIN)/pytest -q $(addprefix --ignore=,$(API_TESTS) $(LIBRARY_TESTS) $(COMMAND_TESTS)))
+
+SLOW_TESTS := $(BIN)/pytest -q --timeout 1800
 
 test-slow: setup  ## the long proofs
-	@$(BIN)/pytest -q -m slow --timeout 1800
+	@# tests of response times and of speed run alone
+	@$(call timed,$(SIDE_BY_SIDE) slow-services slow-library && $(SLOW_TESTS) -m "slow and timed")
+
+slow-services: setup
+	@$(call timed,$(SLOW_TESTS) -m "slow and not timed" $(addprefix --ignore=,$(LIBRARY_TESTS)))
+
+slow-library: setup
+	@$(call timed,$(SLOW_TESTS) -m "slow and not timed" $(LIBRARY_TESTS))
 
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
 	@# both pairs run at the same time, because most of the time they wait; tests of response times run alone
 	@$(SIDE_BY_SIDE) faults-postgres faults-others
 	@$(FAULT_TESTS) -m timed
 
-FAULT_TESTS := $(BIN)/pytest -q -s tests/faults --timeout 900
+SPREAD_KILL := tests/worker/spread/test_spread_swarm.py::test_a_killed_process_costs_its_chunk
+FAULT_TESTS := $(BIN)/pytest -q -s tests/faults $(SPREAD_KILL) --timeout 900
 
 faults-postgres: setup
 	@$(FAULT_TESTS) -m "not timed" -k postgres

@@ -153,6 +153,21 @@ class JobNotFinished(Conflict, code="job_not_finished", title="The job has not e
         super().__init__(f"Job {job_id} is {status}.", "#path/job_id", hint)
 
 
+class ExportFailed(Conflict, code="export_failed", title="The model was not exported"):
+    """The job that writes an exported file has ended without it; reports what the job reports."""
+
+    def __init__(self, job_id: str, job_code: str, detail: str, pointer: str, hint: str) -> None:
+        again = f"DELETE /jobs/{job_id} to have it tried again."
+        super().__init__(detail, pointer, f"{hint} {again}".strip())
+        self.code = job_code
+        self.job_id = job_id
+
+    @property
+    def members(self) -> dict[str, Any]:
+        """Where the job is."""
+        return {"job": f"/jobs/{self.job_id}"}
+
+
 class TooManyWebhooks(Conflict, code="too_many_webhooks", title="There are too many webhooks"):
     """The owner has as many webhooks as one may have."""
 
@@ -188,9 +203,9 @@ class MissingScope(ServiceError, status=403, code="missing_scope", title="The AP
     pointer = "#header/Authorization"
     hint = "Use a key with this scope: `morphid keys create --scope ...`; GET /me shows what yours may do."
 
-    def __init__(self, scopes: list[str]) -> None:
+    def __init__(self, missing: list[str], scopes: list[str]) -> None:
+        super().__init__(f"The key lacks the scope {' '.join(missing)}.")
         needed = " ".join(scopes)
-        super().__init__(f"The key lacks the scope {needed}.")
         self.challenge = (
             f'Bearer realm="MorphID", error="insufficient_scope", scope="{needed}"'  # RFC 6750, 3.1
         )

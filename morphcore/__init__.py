@@ -1,7 +1,7 @@
 """MorphID's numeric library: equivalent models of sweep-morphing aircraft from sample flights.
 
-The functions ``identify`` and ``simulate`` share their names with the rooms that hold them, and win: import
-what lies inside a room by ``from morphcore.identify.settings import ...``.
+The functions ``identify``, ``simulate`` and ``export`` share their names with the rooms that hold them, and
+win: import what lies inside a room by ``from morphcore.identify.settings import ...``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 _collecting = gc.isenabled()
 gc.disable()  # the imports leave no garbage, and looking for it takes a twentieth of their time
 try:
+    from morphcore.export.formats import export
     from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
     from morphcore.simulate.flight import Simulation, simulate
     from morphcore.simulate.trajectory import Trajectory, load_trajectory
@@ -40,6 +41,7 @@ __all__ = [
     "Simulation",
     "Trajectory",
     "__version__",
+    "export",
     "identification_from_request",
     "identify",
     "load_aircraft",

@@ -11,6 +11,7 @@ MORPH = "Morph"
 LIMITS = "Limits"
 MODEL = "Model"
 SEARCH = "Search"
+OUTPUT = "Execution and output"
 
 
 @dataclass(frozen=True, slots=True)

@@ -190,7 +190,7 @@ def has_flown(fit: Any) -> bool:
 
 
 class WholeResult(Document):
-    """A whole result of an identification: only its `model` is looked at."""
+    """A whole result of an identification, or an exported model: only its `model` is looked at."""
 
     model: Parameters
     fit: Unread = None
@@ -199,6 +199,12 @@ class WholeResult(Document):
     cost: Unread = None
     partial: Unread = None
     warnings: Unread = None
+    # of the export format `json`, `morphdata.export.ModelFile`
+    aircraft: Unread = None
+    flight: Unread = None
+    origin: Unread = None
+    notice: Unread = None
+    morphid_version: Unread = None
 
     @model_serializer
     def _only_the_model(self) -> Parameters:

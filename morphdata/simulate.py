@@ -10,12 +10,13 @@ from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import MAX_ROWS, MIN_ROWS, Document, Result
+from morphdata.channel_choice import CHANNELS_TEXT, RequestedChannels, channels_faults
 from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
-from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
+from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
@@ -95,6 +96,9 @@ class SimulateRequest(Request):
     environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
         default=None, description="Gust and turbulence; still air without."
     )
+    channels: Annotated[RequestedChannels | None, Option("--channels", OUTPUT)] = Field(
+        default=None, description=CHANNELS_TEXT
+    )
 
     @property
     def rows(self) -> int:
@@ -125,6 +129,9 @@ class SimulateRequest(Request):
                 "/duration_s",
                 f"At most {MAX_STEPS[self.model.kind]}: reduce duration_s, or choose a longer model.step_s.",
             )
+        gravity_m_s2 = self.flight.gravity_m_s2
+        for fault in channels_faults(self.channels or [], self.model.kind, gravity_m_s2):
+            yield fault.under("/channels")
         if self.model.kind != "rigid":
             yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         if isinstance(self.model, KnownModel):
@@ -157,7 +164,7 @@ class TrimState(Result):
 
 
 class SimulatedTrajectory(Result):
-    """Columns of the flight: those of a sample, and body rates, velocity, position and wing tips.
+    """Columns of the flight: those of a sample, then those of its channels, with the units in their names.
 
     Every drive of the aircraft has its column, `fold_left_rad`.
     """

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
@@ -22,6 +24,7 @@ KERNEL_FREE = (
     "morphdata",
 )  # folders of tests that call no compiled code
 REMEMBERED = "morphid/compiled_kernels"  # key in pytest's cache
+COMPILING = "compiling kernels (a minute, once; before the tests and outside their time limits)"
 COMPILE = "from morphcore.warming import warm_up, warm_up_further; warm_up(); warm_up_further()"
 
 
@@ -51,6 +54,8 @@ def compile_before(
 ) -> None:
     """Compile the kernels unless no collected test needs them or this was done before.
 
+    Of several test runs that begin at once, one compiles and the others wait for it.
+
     Parameters
     ----------
     session : pytest.Session
@@ -63,9 +68,20 @@ def compile_before(
     cache = getattr(session.config, "cache", None)  # not with `-p no:cacheprovider`
     if os.environ.get("NUMBA_DISABLE_JIT") == "1" or not needs_kernels(item.path for item in session.items):
         return
-    if cache is not None and cache.get(REMEMBERED, None) == fingerprint():
+    if cache is None:
+        say(COMPILING)
+        compiling()
         return
-    say("compiling kernels (a minute, once; before the tests and outside their time limits)")
-    compiling()
-    if cache is not None:
-        cache.set(REMEMBERED, fingerprint())
+    with alone(Path(cache.mkdir("morphid")) / "compiling.lock"):
+        if cache.get(REMEMBERED, None) != fingerprint():
+            say(COMPILING)
+            compiling()
+            cache.set(REMEMBERED, fingerprint())
+
+
+@contextmanager
+def alone(file: Path) -> Iterator[None]:
+    """Wait until no other process is in such a block with the same file; one that dies leaves it."""
+    with file.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.database import Database
+from app.database_address import sqlite_url
 
 ROOT = Path(__file__).resolve().parent.parent
 MORPHID = Path(sys.executable).with_name("morphid")  # the command, as it is installed
@@ -71,7 +72,7 @@ class LiveService:
 
     def database(self) -> Database:
         """Open its job store beside it."""
-        return Database(f"sqlite:///{self.data_dir / 'morphid.sqlite3'}")
+        return Database(sqlite_url(self.data_dir / "morphid.sqlite3"))
 
     def logs(self) -> str:
         """Give the ends of its logs."""

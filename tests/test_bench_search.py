@@ -15,6 +15,8 @@ from benchmarks.run import run_benchmarks
 from benchmarks.search import search_figures, search_table
 from benchmarks.setting import QUICK, Figures
 from benchmarks.table import benchmark_table
+from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.simulate.trajectory import Trajectory
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 
 
@@ -54,8 +56,9 @@ def test_the_benchmark_judges_the_worst_run(monkeypatch: pytest.MonkeyPatch) -> 
     """Its share, worst count and median time are those of the runs."""
     clock = itertools.count()
 
-    def shorter(*args: Any, **options: Any) -> Figures:
-        return search_figures(*args, **options, links_per_wing=1, most_sets=100)
+    def shorter(aircraft: Aircraft, flight: Flight, samples: list[Trajectory], **options: Any) -> Figures:
+        beginnings = [shortened(sample, 60) for sample in samples]
+        return search_figures(aircraft, flight, beginnings, **options, links_per_wing=1, most_sets=100)
 
     monkeypatch.setattr(search, "search_figures", shorter)
     figures = run_benchmarks(

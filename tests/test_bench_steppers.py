@@ -60,7 +60,9 @@ def test_compiled_step_is_the_stepper_in_python(swinging):
         np.testing.assert_allclose(compiled[:: round(0.02 / step_s)], python, rtol=0, atol=off_rad)
 
 
-@pytest.mark.parametrize("name", STEPPERS)
+@pytest.mark.parametrize(
+    "name", [name if name == SHIPPED else pytest.param(name, marks=pytest.mark.slow) for name in STEPPERS]
+)
 def test_every_candidate_converges_with_its_order(swinging, name):
     """Halving the step divides the error by two to its order at least, to the same attitude for all.
 
@@ -116,6 +118,7 @@ def test_order_for_a_foreign_matrix(name):
     assert np.log2(errors[0] / errors[1]) > ANY_A.get(name, 2) - 0.15
 
 
+@pytest.mark.slow
 def test_diagram_and_table(examples: Path):
     """One stage in 10 ms errs by less than two do; counts are stages over time; the picture draws."""
     sample = load_trajectory(examples / "train_rate_0.8.csv")

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,11 +20,12 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LATE = ("cma", "pyswarms", "matplotlib", "scipy.stats", "pyarrow", "scipy.io", "rich", "typer", "pandas")
 
 
-def modules_after(statement: str) -> set[str]:
+@cache
+def modules_after(statement: str) -> frozenset[str]:
     """Names of all modules that a fresh process has after a statement."""
     program = f"{statement}; import json, sys; print(json.dumps(sorted(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    return set(json.loads(done.stdout.splitlines()[-1]))
+    return frozenset(json.loads(done.stdout.splitlines()[-1]))
 
 
 def test_importing_loads_no_package_that_one_call_needs() -> None:

@@ -102,7 +102,7 @@ async def _allowed(
 ) -> None:
     missing = [name for name in needed.scopes if name not in caller.scopes]
     if missing:
-        raise MissingScope(missing)
+        raise MissingScope(missing, needed.scopes)
 
 
 def demands(*scopes: Scope) -> Any:

@@ -10,10 +10,11 @@ from sqlalchemy import insert
 
 from app.database import Session, database_time
 from app.tables import artifacts
+from morphdata.formats import FORMATS
 
 ARTIFACT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,159}")  # a plain file name: no folder, no dot file
 
-MEDIA_TYPES = {
+SHOWN_TYPES = {  # by a browser, in its window
     ".svg": "image/svg+xml",
     ".png": "image/png",
     ".csv": "text/csv; charset=utf-8",
@@ -21,6 +22,7 @@ MEDIA_TYPES = {
     ".html": "text/html; charset=utf-8",
     ".txt": "text/plain; charset=utf-8",
 }
+MEDIA_TYPES = {**{each.ending: each.media_type for each in FORMATS}, **SHOWN_TYPES}
 OTHER_FILES = "application/octet-stream"
 # scripts in a plot or report never run with the service's rights, and nothing is guessed to be a page
 HEADERS = {
@@ -37,7 +39,7 @@ def media_type(name: str) -> str:
 
 def artifact_headers(name: str) -> dict[str, str]:
     """Headers of the answer that carries a file; a plain name needs no quoting."""
-    shown = "attachment" if media_type(name) == OTHER_FILES else "inline"
+    shown = "inline" if media_type(name) in SHOWN_TYPES.values() else "attachment"
     return {**HEADERS, "Content-Disposition": f'{shown}; filename="{name}"'}
 
 

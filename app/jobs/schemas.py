@@ -74,6 +74,7 @@ class RequestSummary(BaseModel):
     samples: list[SampleSummary] = []
     duration_s: float | None = Field(default=None, description="Of the flight or of the morph.")
     final_rad: float | None = Field(default=None, description="Sweep at the end of the morph.")
+    format: str | None = Field(default=None, description="Of an exported file.")
 
 
 class QueuePlace(BaseModel):

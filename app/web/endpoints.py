@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -11,6 +12,8 @@ from fastapi.responses import FileResponse, HTMLResponse
 from starlette.applications import Starlette
 from starlette.staticfiles import StaticFiles
 
+from morphdata.channels import CHANNELS
+from morphdata.formats import FORMATS
 from morphdata.operations import OPERATIONS
 
 STATIC = Path(__file__).parent / "static"
@@ -33,11 +36,25 @@ async def page() -> HTMLResponse:
 
 @cache
 def _page_text() -> str:
-    """Build the page: the operations' names and what they do come from their descriptors."""
-    names = " ".join(operation.name for operation in OPERATIONS)
-    lines = (f"<dt>{escape(item.name)}</dt><dd>{escape(item.help)}</dd>" for item in OPERATIONS)
-    text = PAGE.read_text(encoding="utf-8").replace("{operation_names}", escape(names))
-    return text.replace("{operations_help}", "\n        ".join(lines))
+    """Build the page: names and help of operations, channels and export formats come from their lists."""
+    units = {item.name: "" if item.unit == "1" else f", {item.unit}" for item in CHANNELS}
+    text = PAGE.read_text(encoding="utf-8")
+    for place, found in {
+        "{operation_names}": escape(" ".join(item.name for item in OPERATIONS)),
+        "{format_names}": escape(" ".join(item.name for item in FORMATS)),
+        "{operations_help}": _definitions((item.name, item.help) for item in OPERATIONS),
+        "{channels_help}": _definitions(
+            (item.name + units[item.name], item.description) for item in CHANNELS
+        ),
+        "{formats_help}": _definitions((item.name, item.title) for item in FORMATS),
+    }.items():
+        text = text.replace(place, found)
+    return text
+
+
+def _definitions(items: Iterable[tuple[str, str]]) -> str:
+    """Lines of a list of terms and what they mean."""
+    return "\n        ".join(f"<dt>{escape(name)}</dt><dd>{escape(what)}</dd>" for name, what in items)
 
 
 @router.get("/docs")

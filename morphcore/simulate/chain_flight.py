@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
-from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
-from morphcore.models.kinematics import tip_positions, whole_joints
+from morphcore.models.kinematics import link_poses, tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
-from morphcore.simulate.record import FlightRecord, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.torque import torques_and_rates
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.stopping import Stop
 
@@ -32,6 +33,7 @@ def chain_flight(
     grid: TimeGrid,
     at: NDArray[np.int64],
     *,
+    parts: frozenset[Part] = frozenset(),
     start: StartMode,
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
@@ -40,7 +42,7 @@ def chain_flight(
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. Others as in `flight.simulate`.
+    at : (k,) rows of the grid to report. parts : of the record to fill in. Others as in `flight.simulate`.
     """
     plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch))
     flown = plan.flown(model)
@@ -48,9 +50,13 @@ def chain_flight(
     constants = lane_constants(flown, batch, grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
     state = trimmed_state(flown, batch, plan, found)
-    rows, chunks = JOINTS + flown.coordinates, []
-    for chunk in fly_batch(flown, plan, constants, state, record_rows=rows, stop=stop):
-        chunks.append(chunk.rows[..., 0])
+    rows, chunks, states = JOINTS + flown.coordinates, [], []
+    wanted = flown.state_rows if "loads" in parts else rows
+    for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
+        chunks.append(chunk.rows[:, :rows, 0].copy())  # a view would keep the whole states
+        if "loads" in parts:  # of the whole states only what is reported is kept
+            inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
+            states.append(chunk.rows[at[inside] - chunk.first, :, 0])
         yield chunk.first / grid.steps, None
     history = np.concatenate(chunks)
     turned = np.abs(history[:, JOINTS:]).max(axis=1, initial=0.0)
@@ -65,17 +71,26 @@ def chain_flight(
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
+    tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
+    loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
     if plan.halved and model.mirror is not None:  # the other half did the same
-        angles, tips_z = model.mirror.spread_hinges(angles), model.mirror.spread(tips_z)
+        spread = model.mirror.spread
+        angles, tips_z = model.mirror.spread_hinges(angles), spread(tips_z)
+        tips_twist = None if tips_twist is None else spread(tips_twist)
+        if loads is not None and loads.hinge_torque is not None:
+            loads = replace(loads, hinge_torque=model.mirror.spread_hinges(loads.hinge_torque))
         found = replace(found, q_joint=whole_joints(model, found.q_joint))
     record = FlightRecord(
         euler=euler_from_quaternion(quaternion),
         omega_B=history[:, OMEGA:VELOCITY],
         velocity_N=velocity_N,
         position_N=history[:, POSITION:JOINTS],
+        wind_N=plan.wind_N[at],
         angles=angles,
         tips_z=tips_z,
         trim=found,
+        tips_twist=tips_twist,
+        loads=loads,
     )
     yield 1.0, record
 
@@ -84,10 +99,34 @@ def _tips_z(
     model: ChainModel, batch: ParameterBatch, plan: FlightPlan, q_joint: Array, at: NDArray[np.int64]
 ) -> Array:
     """Tips below their roots along z of B, (k, s), m."""
-    surfaces = len(model.aircraft.surfaces)
-    level = np.zeros((surfaces, HINGE_ROWS))
-    level[:, :9] = np.eye(3).ravel()
     # in wing axes all times are one batch; the hinges turn them afterwards
-    tips_W = tip_positions(model, batch.select(np.zeros(at.size, dtype=np.int64)), level, q_joint)
+    tips_W = tip_positions(model, _repeated(batch, at.size), _level_hinges(model), q_joint)
     down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
     return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))
+
+
+def _tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
+    """Twist of the tips against their roots, (k, s), rad: torsion of Rx(flap) Ry(torsion) Rz(edgewise)."""
+    R_WL, _ = link_poses(model, _repeated(batch, q_joint.shape[0]), _level_hinges(model), q_joint)
+    last = model.surfaces[:, 0] + model.surfaces[:, 1] - 1
+    return np.arcsin(np.clip(R_WL[:, last, 0, 2], -1.0, 1.0))
+
+
+def _level_hinges(model: ChainModel) -> Array:
+    """Hinges (s, HINGE_ROWS) that turn nothing: what hangs on them is seen in wing axes."""
+    level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
+    level[:, :9] = np.eye(3).ravel()
+    return level
+
+
+def _repeated(batch: ParameterBatch, times: int) -> ParameterBatch:
+    """The one parameter set at so many times."""
+    return batch.select(np.zeros(times, dtype=np.int64))
+
+
+def _loads(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array, at: NDArray[np.int64]
+) -> Loads:
+    """Accelerations and torques of whole states (k, state_rows) at the rows ``at`` of the grid."""
+    torque, rates = torques_and_rates(model, plan.instants(at), constants, states)
+    return Loads(velocity_rate_B=rates, hinge_torque=torque)

@@ -284,7 +284,7 @@ class FlexibleRun:
 
     Attributes
     ----------
-    records : (steps + 1, RECORD + s) of the steps flown, `kernels.flexible_step`. row : the last one.
+    records : (steps + 1, RECORD + 2 s) of the steps flown, `kernels.flexible_step`. row : the last one.
     """
 
     def __init__(
@@ -320,7 +320,7 @@ class FlexibleRun:
             turn=np.zeros((7, 3)),
             vector=np.zeros((3, 6)),
         )
-        self.records: Array = np.zeros((grid.steps + 1, RECORD + model.roots.size))
+        self.records: Array = np.zeros((grid.steps + 1, RECORD + 2 * model.roots.size))
         flight.structure(state.poses, state.V, state.A)
         self._form_matrix()
 

@@ -11,8 +11,9 @@ from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
+from morphcore.simulate.kernels.flexible_step import RECORD
 from morphcore.simulate.plan import TimeGrid
-from morphcore.simulate.record import FlightRecord, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop, heed
@@ -29,6 +30,7 @@ def flexible_flight(
     grid: TimeGrid,
     at: NDArray[np.int64],
     *,
+    parts: frozenset[Part] = frozenset(),
     start: StartMode,
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
@@ -37,7 +39,7 @@ def flexible_flight(
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. Others as in `flight.simulate`.
+    at : (k,) rows of the grid to report. parts : of the record to fill in. Others as in `flight.simulate`.
     """
     times = grid.times_s
     wind_N = (
@@ -57,14 +59,19 @@ def flexible_flight(
             run.fly_to(min(first + CHUNK_STEPS, grid.steps))
     history = _history(run.records)
     require_sound(history, history[:, 6:9], model.flight, times)
-    history = history[at]
+    history, records = history[at], run.records[at]
+    tips = model.roots.size
+    sines = records[:, RECORD + tips :]
     record = FlightRecord(
         euler=history[:, :3],
         omega_B=history[:, 3:6],
         velocity_N=history[:, 6:9],
         position_N=history[:, 9:12],
+        wind_N=wind_N[at],
         angles=path.angle[at],
         tips_z=history[:, 12:],
+        tips_twist=np.arcsin(np.clip(sines, -1.0, 1.0)) if "twist" in parts else None,
+        loads=Loads(records[:, 21:24]) if "loads" in parts else None,
         trim=Trim(
             alpha=np.array([trim.alpha]),
             force_B=trim.force_B[None],
@@ -82,4 +89,7 @@ def _history(records: Array) -> Array:
     R_NB = records[:, :9].reshape(-1, 3, 3)
     velocity_N = np.einsum("kij,kj->ki", R_NB, records[:, 12:15])
     euler = np.stack([euler_from_rotation(R) for R in R_NB])
-    return np.concatenate([euler, records[:, 9:12], velocity_N, records[:, 15:]], axis=1)
+    tips = (records.shape[1] - RECORD) // 2
+    return np.concatenate(
+        [euler, records[:, 9:12], velocity_N, records[:, 15:18], records[:, RECORD : RECORD + tips]], axis=1
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -20,6 +20,7 @@ from morphcore.models.flexible import flexible_model
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
+from morphcore.simulate.channels import channel_columns, parts_of, requested_channels
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
 from morphcore.simulate.hinge_schedules import (
@@ -29,7 +30,7 @@ from morphcore.simulate.hinge_schedules import (
     require_ranges,
 )
 from morphcore.simulate.plan import STEP_S, TimeGrid, time_grid
-from morphcore.simulate.record import FlightRecord, recorded_trajectory
+from morphcore.simulate.record import FlightRecord, Part, recorded_trajectory
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trajectory import Trajectory
@@ -52,18 +53,20 @@ ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 class Simulation(Shown):
     """A flown flight.
 
-    trajectory : attitude and drives (rad) over time; in ``extra`` p, q, r (rad/s, in B), vx, vy, vz (m/s)
-    and x, y, z (m) of the reference point in N, tip_left_z and tip_right_z (m, below the wing's root along z
-    of B).
+    trajectory : attitude and drives (rad) over time; in ``extra`` the columns of the channels that were
+    requested, by default p, q, r (rad/s, in B), vx, vy, vz (m/s) and x, y, z (m) of the reference point in N,
+    tip_left_z and tip_right_z (m, below the wing's root along z of B).
     trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none
     of the flexible model).
     step_s : the longest time step that was allowed, s. warnings : what the method does not answer for.
+    start_tips_z : by side, the tip of its first hinged surface at the start, m below its root.
     """
 
     trajectory: Trajectory
     trim: Trim
     step_s: float
     warnings: tuple[ResultWarning, ...] = ()
+    start_tips_z: Mapping[str, float] = field(default_factory=dict)
 
     def summary(self) -> Summary:
         """How the flight began, and how far the attitude went."""
@@ -104,6 +107,7 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     rng: np.random.Generator | None = None,
     lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
+    channels: Sequence[str] | None = None,
     stop: Stop | None = None,
 ) -> Simulation:
     """Fly one aircraft through prescribed motions of its drives.
@@ -125,17 +129,20 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     environment : gust and turbulence on top of the flight's wind. rng : source of the turbulence.
     lattice : panels of each surface and core of their vortices.
     elements : of each flexible surface, in the flexible model.
+    channels : names of ``morphdata.channels.CHANNELS``: the columns of ``trajectory.extra``, conventions in
+        `morphcore.simulate.channels`. None: those of the example flights.
     stop : asked several times a second; True raises Interrupted.
 
     Raises
     ------
-    InvalidInput : a schedule leaves its hinge's range or moves no drive, or an argument makes no sense.
+    InvalidInput : a schedule leaves its hinge's range or moves no drive, a channel is unknown or not of this
+        model, or an argument makes no sense.
     TrimNotFound : there is no steady level flight. FlightDiverged : the flight left the model's domain.
     """
     steps = flight_steps(
         Aircraft.of(aircraft), Flight.of(flight), schedules, model=model, duration_s=duration_s,
         output_step_s=output_step_s, step_s=step_s, start=start, environment=environment, rng=rng,
-        lattice=lattice, elements=elements, stop=stop,
+        lattice=lattice, elements=elements, channels=channels, stop=stop,
     )  # fmt: skip
     return next(step.simulation for step in steps if step.simulation is not None)
 
@@ -154,12 +161,14 @@ def flight_steps(  # noqa: PLR0913 - as above
     rng: np.random.Generator | None = None,
     lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
+    channels: Sequence[str] | None = None,
     stop: Stop | None = None,
 ) -> Iterator[FlightStep]:
     """Fly as `simulate` does, step by step: the fraction flown several times a second, the flight at last.
 
     Aircraft and flight are resolved; they need not be within the limits of documents.
     """
+    wanted = requested_channels(channels, _kind(model), flight.gravity_m_s2)
     flyer = _flyer(aircraft, flight, model, lattice, elements)
     longest_s = flyer.step_s if step_s is None else step_s
     times = _output_times(schedules, duration_s, output_step_s, longest_s)
@@ -179,13 +188,16 @@ def flight_steps(  # noqa: PLR0913 - as above
             grid = time_grid(times, longest_s)
         air = _air(environment, flight, rng)
         at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
-        for fraction, record in flyer.fly(each, grid, at, start=start, air_velocity_N=air, stop=stop):
+        flown = flyer.fly(each, grid, at, parts=parts_of(wanted), start=start, air_velocity_N=air, stop=stop)
+        for fraction, record in flown:
             if record is None:
                 yield FlightStep(fraction)
             else:
-                flown = recorded_trajectory(aircraft, times, record)
+                columns = channel_columns(wanted, record, aircraft, flight)
+                trajectory = recorded_trajectory(aircraft, times, record, columns)
                 warnings = _warnings(aircraft, flight, times, record, smooth)
-                yield FlightStep(1.0, Simulation(flown, record.trim, longest_s, warnings))
+                tips = _start_tips(aircraft, record)
+                yield FlightStep(1.0, Simulation(trajectory, record.trim, longest_s, warnings, tips))
 
 
 def _warnings(
@@ -203,6 +215,15 @@ def _warnings(
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *overlap_warnings(aircraft, record.angles),
     )
+
+
+def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
+    """By side, z of the tip of its first hinged surface at the start, m below its root."""
+    tips: dict[str, float] = {}
+    for number, surface in enumerate(aircraft.surfaces):
+        if surface.hinges:
+            tips.setdefault(surface.side, float(record.tips_z[0, number]))
+    return tips
 
 
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
@@ -233,6 +254,7 @@ class _Fly(Protocol):
         grid: TimeGrid,
         at: NDArray[np.int64],
         *,
+        parts: frozenset[Part],
         start: StartMode,
         air_velocity_N: Callable[[Array], Array] | None,
         stop: Stop | None,
@@ -251,6 +273,10 @@ class _Flyer:
     step_s: float
     obstacle: Callable[[], Obstacle | None]
     chain: tuple[ChainModel, ParameterBatch] | None = None
+
+
+def _kind(model: ModelChoice) -> str:
+    return "equivalent" if isinstance(model, ParameterBatch) else model
 
 
 def _flyer(aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: Lattice, elements: int) -> _Flyer:

@@ -176,6 +176,18 @@ class FlightPlan(Shown):
             ),
         )
 
+    def instants(self, rows: NDArray[np.int64]) -> FlightPlan:
+        """What the plan has at some grid times alone, to evaluate there; it cannot be flown."""
+        return replace(
+            self,
+            angles=self.angles[rows],
+            rates=self.rates[rows],
+            accelerations=self.accelerations[rows],
+            hinges=np.ascontiguousarray(self.hinges[rows]),
+            wind_N=np.ascontiguousarray(self.wind_N[rows]),
+            table=replace(self.table, position=self.table.position[rows]),
+        )
+
     @cached_property
     def mean_accelerations(self) -> Array:
         """(steps, s, 6) of the surfaces against the fuselage over each step, in W, rad/s^2 and m/s^2.
@@ -433,8 +445,10 @@ def _nodes(length_rad: float, spacing_rad: float) -> int:
 
 def _operator_table(model: ChainModel, angles: Array, spacing: float) -> OperatorTable:
     mach = model.flight.mach or 0.0
-    moved = np.abs(np.diff(angles, axis=0)).max(axis=1, initial=0.0)
-    travelled = np.concatenate([[0.0], np.cumsum(moved)])
+    moved = np.abs(np.diff(angles, axis=0))
+    # a surface turns by no more than all its hinges together
+    turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
+    travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
 
     def operator(row: Array) -> LatticeOperator:
         return lattice_operator(model.lattice, tuple(row), mach=mach)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,26 @@ from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import Trim
-from morphdata.drives import SIDES
 
 Array = NDArray[np.float64]
 
 LARGEST_SPEED_RATIO = 10.0  # of the airspeed at the start: no glide gets there
+
+
+Part = Literal["twist", "loads"]  # of a record: what models leave out unless it is requested
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Accelerations and hinge torques at the output times (k times, s surfaces).
+
+    velocity_rate_B : (k, 3) time derivative of the components in B of the reference point's velocity, m/s^2.
+    hinge_torque : (k, s) of the motors along the hinges' positive coordinates, N m, 0 without a hinge; None
+    of the flexible model.
+    """
+
+    velocity_rate_B: Array
+    hinge_torque: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -23,17 +39,21 @@ class FlightRecord:
     """A flown flight at its output times (k times, s surfaces).
 
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
-    point; angles : (k, h) of all hinges, rad; tips_z : (k, s) tips below their roots along z of B, m.
-    trim : the start.
+    point; wind_N : (k, 3) m/s of the air there; angles : (k, h) of all hinges, rad; tips_z : (k, s) tips
+    below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the tips against their
+    roots, nose up, rad, and loads : both None unless requested (`Part`).
     """
 
     euler: Array
     omega_B: Array
     velocity_N: Array
     position_N: Array
+    wind_N: Array
     angles: Array
     tips_z: Array
     trim: Trim
+    tips_twist: Array | None = None
+    loads: Loads | None = None
 
 
 def require_sound(
@@ -56,19 +76,13 @@ def require_sound(
         raise FlightDiverged(time_s=float(times[max(int(np.argmin(sound)) - 1, 0)]))
 
 
-def recorded_trajectory(aircraft: Aircraft, times: Array, record: FlightRecord) -> Trajectory:
-    """The trajectory: the angles of all drives, and the tips of each side's first hinged surface."""
-    columns = np.concatenate([record.omega_B, record.velocity_N, record.position_N], axis=1)
-    names = ("p", "q", "r", "vx", "vy", "vz", "x", "y", "z")
-    extra = {name: column.copy() for name, column in zip(names, columns.T, strict=True)}
+def recorded_trajectory(
+    aircraft: Aircraft, times: Array, record: FlightRecord, extra: dict[str, Array]
+) -> Trajectory:
+    """The trajectory: the angles of all drives and some further columns."""
     drives: dict[str, Array] = {}
     for column, hinge in enumerate(aircraft.hinges):  # all hinges of a drive turn alike
         drives.setdefault(hinge.drive, record.angles[:, column].copy())
-    for side in SIDES:
-        for number, surface in enumerate(aircraft.surfaces):
-            if surface.side == side and surface.hinges:
-                extra[f"tip_{side}_z"] = record.tips_z[:, number].copy()
-                break
     phi, theta, psi = record.euler.T.copy()
     trajectory = Trajectory(
         name="simulated",

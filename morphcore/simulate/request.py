@@ -23,6 +23,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Stop
 from morphcore.threads import use_threads
 from morphcore.validity import documents
+from morphdata.channels import document_name
 from morphdata.drives import SIDES
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.simulate import DEFAULT_ELEMENTS, FlexibleModel, FlightModel, SimulateRequest
@@ -33,12 +34,6 @@ Clock = Callable[[], float]
 
 ANGLES = ("phi", "theta", "psi")
 VARIATION_STEP_S = 0.01  # the variation is a sum over samples so far apart
-# of the trajectory's further columns; the names are those of the example flights
-UNITS = {
-    **dict.fromkeys(("p", "q", "r"), "rad_s"),
-    **dict.fromkeys(("vx", "vy", "vz"), "m_s"),
-    **dict.fromkeys(("x", "y", "z", "tip_left_z", "tip_right_z"), "m"),
-}
 
 
 @dataclass(frozen=True)
@@ -65,14 +60,13 @@ class SimulationResult(Shown):
     def to_document(self) -> Document:
         """JSON form with the names of the API; the summary's angles are departures from the start."""
         flown, trim = self.trajectory, self.simulation.trim
-        tips = {side: flown.extra.get(f"tip_{side}_z") for side in SIDES}
         return {
             "model": model_document(self.model, self.simulation.step_s),
             "trim": {
                 "alpha_rad": float(trim.alpha[0]),
                 "force_b_n": trim.force_B[0].tolist(),
                 "moment_b_n_m": trim.moment_B[0].tolist(),
-                "tip_z_m": {side: None if z is None else float(z[0]) for side, z in tips.items()},
+                "tip_z_m": {side: self.simulation.start_tips_z.get(side) for side in SIDES},
             },
             "trajectory": trajectory_document(flown),
             "drives": list(flown.drive_order),
@@ -140,7 +134,8 @@ class SimulationRun:
             duration_s=request.duration_s, output_step_s=request.output_step_s, step_s=flown.step_s,
             start=flown.start, environment=None if air is None or air.still else air,
             rng=np.random.default_rng(1 if air is None else air.seed), lattice=flown.lattice,
-            elements=model.elements if isinstance(model, FlexibleModel) else DEFAULT_ELEMENTS, stop=stop,
+            elements=model.elements if isinstance(model, FlexibleModel) else DEFAULT_ELEMENTS,
+            channels=request.channels, stop=stop,
         ):  # fmt: skip
             wall_s += self.clock() - begin  # without what the caller does between two steps
             if step.simulation is not None:
@@ -214,6 +209,6 @@ def trajectory_document(trajectory: Trajectory) -> Document:
         "sweep_right_rad": trajectory.sweep_right,
         **{f"{name}_rad": trajectory.drives[name] for name in trajectory.drive_order},
         **{f"{angle}_rad": getattr(trajectory, angle) for angle in ANGLES},
-        **{f"{name}_{UNITS[name]}" if name in UNITS else name: v for name, v in trajectory.extra.items()},
+        **{document_name(name): values for name, values in trajectory.extra.items()},
     }
     return {name: values.tolist() for name, values in columns.items()}

@@ -1,4 +1,4 @@
-"""Torque of the hinge motors along a flown flight."""
+"""Torque of the hinge motors and acceleration of the fuselage along a flown flight."""
 
 from __future__ import annotations
 
@@ -33,8 +33,23 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
     constants : of the one parameter set that was flown, thrust included. states : (steps + 1, state_rows) all
         rows of its state at the grid times.
     """
+    torque, _ = torques_and_rates(model, plan, constants, states)
+    return torque
+
+
+def torques_and_rates(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array
+) -> tuple[Array, Array]:
+    """Torque as of `hinge_torques`, and the time derivative of v_B by the equations of motion, (t, 3) m/s^2.
+
+    Parameters
+    ----------
+    plan : of which `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
+    states : (t, state_rows).
+    """
     rows, columns = model.lattice.operator_shape
     surfaces, hinges_of = model.aircraft.surfaces, model.aircraft.hinge_columns
+    velocity_rates = np.empty((states.shape[0], 3))
     out = np.empty((states.shape[0], len(model.aircraft.hinges)))
     first_hinges = np.array([0, *(own.stop for own in hinges_of)], dtype=np.int64)
     accelerations = plan.surface_accelerations
@@ -58,9 +73,9 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
             lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], accelerations[part],
             first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
-            inputs, outputs, rates, out[part],
+            inputs, outputs, rates, out[part], velocity_rates[part],
         )  # fmt: skip
-    return out
+    return out, velocity_rates
 
 
 def closing_half_a_step(model: ChainModel, rows: Array) -> Array:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 from morphdata.operations.descriptor import Operation
+from morphdata.operations.export import EXPORT
 from morphdata.operations.identify import IDENTIFY
 from morphdata.operations.optimize import OPTIMIZE
 from morphdata.operations.simulate import SIMULATE
 from morphdata.operations.study import STUDY
 
-OPERATIONS: tuple[Operation[Any], ...] = (IDENTIFY, STUDY, SIMULATE, OPTIMIZE)
+OPERATIONS: tuple[Operation[Any], ...] = (IDENTIFY, STUDY, SIMULATE, OPTIMIZE, EXPORT)
 
 
 def operation_named(name: str) -> Operation[Any]:

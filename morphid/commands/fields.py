@@ -127,7 +127,7 @@ def _form(flag: str, field: FieldInfo) -> Form:
     if kind in (bool, int, float, str):
         return Form(kind, _limits(field) if kind is int else None, kind)
     if get_origin(kind) is list:
-        return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
+        return _list_form(flag, get_args(kind)[0])
     names = list(kind.model_fields)
     members = {member for inner in kind.model_fields.values() for member in _kinds(inner.annotation)}
     if members == {float}:
@@ -140,6 +140,13 @@ def _form(flag: str, field: FieldInfo) -> Form:
     if members and all(get_origin(member) is list for member in members):
         return Form(list[str], "NAME=LOW:HIGH", lambda texts: _ranges(flag, texts))
     return Form(Path, "FILE", read_json)
+
+
+def _list_form(flag: str, item: Any) -> Form:
+    if get_origin(item) is Literal:
+        remark = f"Any of {', '.join(get_args(item))}."
+        return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")], remark)
+    return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
 
 
 def _limits(field: FieldInfo) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from morphdata.operations import OPERATIONS
+from morphid.commands.export import EXPORT
 from morphid.commands.identify import IDENTIFY
 from morphid.commands.operation import Particulars, command_of
 from morphid.commands.optimize import OPTIMIZE
@@ -16,6 +17,7 @@ PARTICULARS: Mapping[str, Particulars] = {
     "study": STUDY,
     "simulate": SIMULATE,
     "optimize": OPTIMIZE,
+    "export": EXPORT,
 }
 
 

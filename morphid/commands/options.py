@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from morphdata.options import MODEL
+from morphdata.options import MODEL, OUTPUT
 from morphid.connections import KEY_VARIABLE, URL_VARIABLE
 from morphid.exits import CommandError, Exit
 from morphid.files import read_json
@@ -25,7 +25,7 @@ HOW_IDENTIFIED = ("lattice", "step_s", "start")  # next to the parameters of an 
 
 # groups of options, as a command's help shows them
 model_option = partial(typer.Option, rich_help_panel=MODEL)
-answer_option = partial(typer.Option, rich_help_panel="Execution and output")
+answer_option = partial(typer.Option, rich_help_panel=OUTPUT)
 
 
 class Core(StrEnum):

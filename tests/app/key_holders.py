@@ -12,6 +12,7 @@ from app.database import Database
 from app.keys.records import EVERY_SCOPE, NO_QUOTA, Quota, Scope
 from app.keys.service import NewKey, create_key
 from tests.app.running_service import RunningService
+from tests.plain_http import CERTIFICATES
 
 
 def make_key(
@@ -38,5 +39,7 @@ def bearer(text: str) -> dict[str, str]:
 @contextmanager
 def holder(service: RunningService, text: str) -> Iterator[httpx.Client]:
     """A client that sends this key with every request."""
-    with httpx.Client(base_url=service.url, timeout=30.0, headers=bearer(text)) as client:
+    with httpx.Client(
+        base_url=service.url, timeout=30.0, headers=bearer(text), verify=CERTIFICATES
+    ) as client:
         yield client

@@ -86,6 +86,11 @@ def optimize_document() -> Document:
     }
 
 
+def export_document() -> Document:
+    """Build a valid request for an export."""
+    return {**_vehicle(), "model": {"parameters": copy.deepcopy(RESULT["model"])}, "format": "npz"}
+
+
 RESULT: Document = {
     "model": {
         "links_per_wing": 2,
@@ -115,6 +120,14 @@ RESULT: Document = {
         "history": [{"generation": 1, "best_cost": 1.0}],
     },
     "cost": {"rigid_flight_s": 0.1, "equivalent_flight_s": 0.2, "flexible_flight_s": None},
+}
+
+EXPORT_RESULT: Document = {
+    "format": "npz",
+    "file": "model.npz",
+    "media_type": "application/x-npz",
+    "size_bytes": 8000,
+    "sha256": "0" * 64,
 }
 
 STUDY_RESULT: Document = {

@@ -13,19 +13,22 @@ import httpx
 import uvicorn
 
 from app.database import Database
-from app.http.server import GuardedConfig
+from app.http.server import KEEP_ALIVE_S, GuardedConfig
 from app.jobs import store
 from app.jobs.records import Claim
 from app.main import create_app
 from app.settings import Settings
 from app.webhooks.sender import SenderSettings
 from tests.app.webhooks.receiver import TO_LOOPBACK
+from tests.plain_http import CERTIFICATES
 
 DEAD_BROKER = "redis://127.0.0.1:1/0"  # nothing listens there: every test runs with the broker away
 NOTHING_IS_SENT = SenderSettings(
     TO_LOOPBACK, poll_s=3600.0
 )  # addresses are checked, as if loopback were public
-START_S = 20.0
+START_S = 60.0  # in vain, on a machine that has other things to do
+# a kept connection is used again well before the server may close it, or a request meets its end
+KEPT = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S / 5)
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def running_service(
     url = f"http://127.0.0.1:{port}"
     database = Database(settings.database_url)
     try:
-        with httpx.Client(base_url=url, timeout=30.0) as client:
+        with httpx.Client(base_url=url, timeout=30.0, limits=KEPT, verify=CERTIFICATES) as client:
             yield RunningService(url, client, database, settings)
     finally:
         server.should_exit = True

@@ -29,6 +29,7 @@ from tests.app.request_documents import (
 )
 from tests.app.running_service import RunningService
 from tests.app.webhooks.receiver import NOBODY
+from tests.plain_http import CERTIFICATES
 
 ROWS = 12  # of a sample: enough to be checked, few enough to be sent a thousand times
 LEASE_S = 3600.0  # nobody renews it
@@ -99,7 +100,7 @@ def new_tenant(service: RunningService, owner: str) -> Tenant:
         made = create_key(
             session, owner=owner, name="all", scopes=sorted(EVERY_SCOPE), quota=NO_QUOTA, expires_at=None
         )
-    client = httpx.Client(base_url=service.url, timeout=30.0)
+    client = httpx.Client(base_url=service.url, timeout=30.0, verify=CERTIFICATES)
     tenant = Tenant(owner, f"marker{secrets.token_hex(8)}", made.text, client)
     client.headers.update(tenant.headers)
     replenish(service, tenant)

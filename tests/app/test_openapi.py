@@ -14,10 +14,12 @@ import pytest
 from app.main import routed_app
 from app.openapi import DOCUMENT, document_text
 from tests.app.request_documents import (
+    EXPORT_RESULT,
     OPTIMIZE_RESULT,
     RESULT,
     SIMULATE_RESULT,
     STUDY_RESULT,
+    export_document,
     identify_document,
     optimize_document,
     simulate_document,
@@ -31,8 +33,9 @@ REQUESTS = [
     ("StudyRequest", study_document),
     ("SimulateRequest", simulate_document),
     ("OptimizeRequest", optimize_document),
+    ("ExportRequest", export_document),
 ]
-RESULTS = [RESULT, STUDY_RESULT, SIMULATE_RESULT, OPTIMIZE_RESULT]
+RESULTS = [RESULT, STUDY_RESULT, SIMULATE_RESULT, OPTIMIZE_RESULT, EXPORT_RESULT]
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +105,7 @@ def test_results_are_valid_by_the_document(document: Document, result: Document)
         .is_valid(result)
         for form in forms
     ]
-    assert (len(fits), sum(fits)) == (4, 1)
+    assert (len(fits), sum(fits)) == (len(RESULTS), 1)
 
 
 def test_client_generates_without_a_warning(tmp_path: Path) -> None:
@@ -124,5 +127,5 @@ def test_client_generates_without_a_warning(tmp_path: Path) -> None:
         env={"PATH": f"{binaries}:/usr/bin:/bin", "HOME": str(tmp_path)},
     )
     made = {path.stem for path in tmp_path.rglob("api/*/*.py")}
-    assert {"identify", "study", "simulate", "optimize"} <= made
+    assert {"identify", "study", "simulate", "optimize", "export", "export_model"} <= made
     assert {"get_job", "get_job_result", "upload_trajectory", "list_models"} <= made

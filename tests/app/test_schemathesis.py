@@ -34,6 +34,7 @@ from tests.app.request_documents import RESULT
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
 from tests.app.tenants import Tenant, client_json, new_tenant, replenish, short_requests
 from tests.app.webhooks.receiver import NOBODY
+from tests.servers.stores import migrated_sqlite
 
 SEED = int(os.environ.get("MORPHID_FUZZ_SEED", "20260401"))
 QUICK, LONG = 6, 50  # examples of each kind for each operation
@@ -56,9 +57,9 @@ def guarded(
 ) -> Iterator[RunningService]:
     """A running service that demands keys; Postgres refuses texts that SQLite takes."""
     if request.param == "sqlite":
-        url = f"sqlite:///{tmp_path_factory.mktemp('guarded') / 's.sqlite3'}"
+        url = migrated_sqlite(tmp_path_factory.mktemp("guarded") / "s.sqlite3")
     else:
-        url = request.getfixturevalue("postgres_server").new_database()
+        url = request.getfixturevalue("postgres_server").migrated_database()
     chosen = Settings(
         database_url=url,
         broker_url=DEAD_BROKER,

@@ -89,6 +89,7 @@ def test_steps_divide_the_output_times() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_thirty_times_mujoco_in_a_batch_and_never_slower_alone() -> None:
     """At 1e-4 rad of attitude, four links a wing, one core, against MuJoCo's best integrator."""
     bench = bench_of(replace(QUICK, rounds=5))

@@ -31,6 +31,7 @@ def time_per_step(name: str) -> tuple[float, float]:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_step_keeps_its_time(name: str) -> None:
     """A step of 1 ms of the reference aircraft, ten elements a wing, takes less than twice what it did."""

@@ -13,6 +13,7 @@ TRIES = 3  # a machine shared with others is slow at times; what it can do shows
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_a_swarm_flies_three_thousand_times_faster_than_real_time() -> None:
     """2,500 models of three links a wing through the three flights of constant rate, lattice included.
 

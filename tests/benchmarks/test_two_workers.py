@@ -65,6 +65,7 @@ def flown(workers: Workers, request: dict[str, Any], *names: str) -> Run:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 @pytest.mark.timeout(1800)
 @pytest.mark.skipif((psutil.cpu_count() or 1) < 2, reason="two workers need two cores")
 def test_two_workers_fly_almost_twice_as_fast(tmp_path: Path) -> None:

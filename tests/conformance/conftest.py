@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from morphid.supervisor import Supervisor
-from tests.app.conftest import database, database_url, postgres_server
+from tests.app.conftest import database_url, postgres_server
 from tests.servers import redis
 
-__all__ = ["broker_url", "database", "database_url", "own_broker", "postgres_server"]
+__all__ = ["broker_url", "database_url", "own_broker", "postgres_server"]
 
 GIVEN_BROKER = "MORPHID_TEST_BROKER_URL"
 SERVERS = {"embedded": redis.embedded, "redis-url": redis.plain}

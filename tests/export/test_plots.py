@@ -53,8 +53,8 @@ def test_same_input_same_bytes() -> None:
     curves = {"samples": [flown_sample("one")]}
     before = dict(mpl.rcParams)
     first = identification_plots(_document(), curves)
-    with ThreadPoolExecutor(3) as pool:
-        others = list(pool.map(lambda _: identification_plots(_document(), curves), range(3)))
+    with ThreadPoolExecutor(2) as pool:
+        others = list(pool.map(lambda _: identification_plots(_document(), curves), range(2)))
     assert all(other == first for other in others)
     assert dict(mpl.rcParams) == before
     assert b"<dc:date>" not in first["convergence.svg"]
@@ -107,12 +107,11 @@ def test_round_off_is_not_blown_up() -> None:
     assert residuals[3].get_ylim()[1] < 1.0, "the pitch error has an axis of its own"
 
 
-@pytest.mark.parametrize(
-    "name", ["$x^2", "a\nb\0c", "航迹 один", "x" * 500, "<svg onload='alert(1)'>", "--><script>", "\ud800"]
-)
-def test_any_name_can_be_drawn(name: str) -> None:
+def test_any_name_can_be_drawn() -> None:
     """Names with formulas, control characters, foreign letters or markup stay text, without a warning."""
-    files = identification_plots(_document(), {"samples": [flown_sample(name)]})
+    names = ["$x^2", "a\nb\0c", "航迹 один", "x" * 500, "<svg onload='alert(1)'>", "--><script>", "\ud800"]
+    files = identification_plots(_document(), {"samples": [flown_sample(name) for name in names]})
+    assert len(files) == 2 * (2 * len(names) + 1)
     for content in (value for key, value in files.items() if key.endswith(".svg")):
         assert b"<script" not in content.lower()
         tags = {element.tag.rpartition("}")[2] for element in ET.fromstring(content).iter()}  # noqa: S314

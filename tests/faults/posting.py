@@ -13,6 +13,7 @@ import httpx
 from tests.app.request_documents import simulate_document
 from tests.faults.rig import Rig
 from tests.faults.walk_length import flight_steps
+from tests.plain_http import CERTIFICATES
 
 ANSWER_S = 30.0  # a client's patience with one answer
 
@@ -60,7 +61,13 @@ class Client:
     def _once(self, document: Any, headers: dict[str, str]) -> tuple[Answer, dict[str, Any] | None]:
         began = time.monotonic()
         try:
-            answer = httpx.post(f"{self.rig.url}/simulate", json=document, headers=headers, timeout=ANSWER_S)
+            answer = httpx.post(
+                f"{self.rig.url}/simulate",
+                json=document,
+                headers=headers,
+                timeout=ANSWER_S,
+                verify=CERTIFICATES,
+            )
         except httpx.TransportError:
             return Answer(None, time.monotonic(), time.monotonic() - began), None
         took_s = time.monotonic() - began

@@ -28,6 +28,7 @@ from morphid import serve
 from morphid.broker import LOOPBACK, free_port
 from morphid.supervisor import Child, ChildSpec, Supervisor
 from tests.faults.ledger import SEED, SUCCEEDED, Ledger
+from tests.plain_http import CERTIFICATES
 from tests.servers.redis import BrokerServer
 
 OWNER = "local"
@@ -113,7 +114,7 @@ class Rig:
     def api_answers(self) -> bool:
         """Whether the API takes calls."""
         with contextlib.suppress(httpx.HTTPError):
-            return httpx.get(f"{self.url}/livez", timeout=1.0).status_code == 200
+            return httpx.get(f"{self.url}/livez", timeout=1.0, verify=CERTIFICATES).status_code == 200
         return False
 
     def take_away(self, name: str) -> None:

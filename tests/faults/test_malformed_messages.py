@@ -45,6 +45,7 @@ def feed(rig: Rig, jobs: int, messages: int, *, seed: int = 5) -> list[str]:
     return added
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     ("jobs", "messages"),
     [
@@ -69,6 +70,7 @@ def test_malformed_messages_amid_jobs(rig: Rig, jobs: int, messages: int) -> Non
     assert f"morphid_messages_dropped_total {messages:.1f}" in metrics
 
 
+@pytest.mark.faults
 def test_messages_that_harm_celery_are_wake_ups(rig: Rig) -> None:
     """Time limits, times of the year 9999 and callbacks in a message have no effect; the next job runs."""
     rig.start_api(SEEN)

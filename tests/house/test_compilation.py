@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,10 +14,21 @@ from tests.compilation import ROOT, compile_before
 
 
 class Memory:
-    """Pytest's cache for one test."""
+    """Pytest's cache for one test.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    folder : of its files.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.values: dict[str, Any] = {}
+
+    def mkdir(self, name: str) -> Path:
+        """Make a folder of that name."""
+        (self.folder / name).mkdir(exist_ok=True)
+        return self.folder / name
 
     def get(self, key: str, default: Any) -> Any:
         """Give what was kept."""
@@ -31,10 +45,12 @@ def session_of(memory: Memory, *files: str) -> Any:
     return SimpleNamespace(items=items, config=SimpleNamespace(cache=memory))
 
 
-def test_kernels_are_compiled_once_before_the_tests_that_need_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_are_compiled_once_before_the_tests_that_need_them(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """A cold clone compiles before its first test, the next run does not; an empty cache does again."""
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    memory, said, compiled = Memory(), [], []
+    memory, said, compiled = Memory(tmp_path), [], []
 
     def run(*files: str) -> int:
         compiled.clear()
@@ -49,9 +65,34 @@ def test_kernels_are_compiled_once_before_the_tests_that_need_them(monkeypatch: 
     assert run("simulate/test_flight.py") == 1
 
 
-def test_a_failed_compilation_is_not_remembered() -> None:
+def test_runs_that_begin_at_once_compile_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The second of two waits until the first has compiled, and then has nothing to do."""
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    memory, compiled = Memory(tmp_path), []
+    begun, finish = Event(), Event()
+
+    def compiling() -> None:
+        compiled.append(True)
+        begun.set()
+        assert finish.wait(20.0)
+
+    def run() -> None:
+        compile_before(session_of(memory, "simulate/test_flight.py"), str, compiling)
+
+    with ThreadPoolExecutor(2) as runs:
+        first = runs.submit(run)
+        assert begun.wait(20.0)
+        second = runs.submit(run)
+        assert not wait([second], 0.2).done
+        finish.set()
+        first.result()
+        second.result()
+    assert len(compiled) == 1
+
+
+def test_a_failed_compilation_is_not_remembered(tmp_path: Path) -> None:
     """What broke off is tried again by the next run."""
-    memory = Memory()
+    memory = Memory(tmp_path)
 
     def breaks() -> None:
         raise RuntimeError("no room")

@@ -100,7 +100,7 @@ def test_its_job_ends(house: dict[str, Any]) -> None:
 
 def test_the_page_knows_it(house: dict[str, Any]) -> None:
     """Its name stands in the page's list, with what it does in the help."""
-    assert 'data-operations="identify study simulate optimize count"' in house["page"]
+    assert 'data-operations="identify study simulate optimize export count"' in house["page"]
     assert "<dt>count</dt><dd>Counts to a number.</dd>" in house["page"]
 
 

@@ -20,7 +20,7 @@ from tests.load.conftest import Tell
 from tests.load.figures import Times
 from tests.load.filling import fill
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timed]
 
 STREAMS = 1000
 AT_ONCE = 50  # connections that are being opened

@@ -15,7 +15,7 @@ from tests.load.conftest import Tell
 from tests.load.figures import Times, timed
 from tests.load.filling import fill
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timed]
 
 QUEUED = 10_000
 STATUS_P95_MS, LIST_P95_MS = 50.0, 100.0

@@ -13,15 +13,17 @@ import pytest
 from sqlalchemy import select
 from typer.testing import CliRunner
 
-from app.database import Database, upgrade
+from app.database import Database
 from app.jobs.reaper import reap
 from app.jobs.records import JobStatus
 from app.jobs.store import claim_job, create_job, get_job, load_checkpoint, save_progress
+from app.private_files import make_private_folder
 from app.tables import jobs
 from morphid import backup as copies
 from morphid.backup import backup, restore
 from morphid.exits import CommandError, Exit
 from morphid.main import app
+from tests.servers.stores import migrated_sqlite
 
 READER = """
 import sqlite3, sys
@@ -35,9 +37,9 @@ input()
 @pytest.fixture
 def url(tmp_path: Path) -> str:
     """A migrated, empty job store."""
-    url = f"sqlite:///{tmp_path / 'var' / 'morphid.sqlite3'}"
-    upgrade(url)
-    return url
+    folder = tmp_path / "var"
+    make_private_folder(folder)
+    return migrated_sqlite(folder / "morphid.sqlite3")
 
 
 def add(database: Database, number: int) -> str:

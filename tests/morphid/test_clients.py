@@ -57,6 +57,7 @@ def test_httpx_client(live_service: LiveService, examples: Path, tmp_path: Path)
     assert_a_model_was_identified(tmp_path)
 
 
+@pytest.mark.slow
 def test_generated_client(live_service: LiveService, examples: Path, tmp_path: Path) -> None:
     """The client that openapi-python-client makes of the OpenAPI document identifies with typed calls."""
     shutil.rmtree(examples / "clients" / "generated", ignore_errors=True)

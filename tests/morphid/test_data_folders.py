@@ -15,7 +15,6 @@ from morphid.exits import Exit
 from morphid.main import app
 from morphid.supervisor import Supervisor
 from tests.folder_names import ALL_NESTED, FOLDER_NAMES
-from tests.live import LiveService
 
 RUNNER = CliRunner()
 
@@ -68,16 +67,3 @@ def test_the_broker_keeps_its_journal_there(tmp_path: Path) -> None:
         assert (home / "broker" / "appendonlydir").is_dir()
     finally:
         supervisor.stop()
-
-
-def test_a_service_lives_in_such_a_folder(tmp_path: Path) -> None:
-    """`serve` with all its children; its keys are made from beside it."""
-    home = tmp_path / ALL_NESTED
-    service = LiveService(home).start()
-    try:
-        run("keys", "create", "--owner", "lab", "--name", "x", "--data-dir", home)
-        run("ready", "--worker", "--wait", "30", "--data-dir", home)
-    finally:
-        assert service.stop() == 0
-    assert {each.name for each in tmp_path.iterdir()} == {FOLDER_NAMES[0]}
-    assert {"morphid.sqlite3", "broker", "logs", "serve.lock"} <= {each.name for each in home.iterdir()}

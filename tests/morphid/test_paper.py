@@ -71,8 +71,14 @@ def test_the_choices_reach_the_stages(asked_for: list[PaperSettings], examples: 
     assert {each["met"] for each in summary["asked"]} == {True}
 
 
-def test_the_table_shows_asked_and_measured(asked_for: list[PaperSettings], tmp_path: Path) -> None:
+def test_the_table_shows_asked_and_measured(
+    asked_for: list[PaperSettings], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without ``--json`` people see the figures and where the report is; the examples are found."""
+    # its plots take seconds, and the test above has it written
+    monkeypatch.setattr(
+        morphcore.paper, "write_report", lambda _settings, _finished, out: out / "report.html"
+    )
     ended = RUNNER.invoke(app, ["paper", "--out", str(tmp_path)])
     assert ended.exit_code == Exit.OK, ended.output
     assert "met" in ended.stdout
@@ -120,6 +126,7 @@ def _started(folder: Path) -> subprocess.Popen[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_the_quick_form_from_end_to_end(tmp_path: Path) -> None:
     """Interrupted once, it goes on and ends within five minutes of work; a third run has nothing to do.
 

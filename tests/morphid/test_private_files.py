@@ -19,7 +19,6 @@ from app.database import Database, upgrade
 from morphid.backup import backup, restore
 from morphid.exits import Exit
 from morphid.main import app
-from tests.live import LiveService
 
 OWNER_ONLY = {"file": 0o600, "folder": 0o700}
 
@@ -132,19 +131,6 @@ def test_keys_and_copies(tmp_path: Path) -> None:
     spoilt = ("data/morphid.sqlite3", "file", "0o644")  # by this test
     assert [found for found in watch.open_to_others(but=".") if found != spoilt] == []
     assert stat.S_IMODE((home / "morphid.sqlite3.before-restore").stat().st_mode) == 0o600
-
-
-def test_a_service_writes_nothing_that_others_can_read(tmp_path: Path) -> None:
-    """Database, reserve, logs, lock and the broker's journal, in an empty folder that was open."""
-    home = tmp_path / "data"
-    home.mkdir(mode=0o755)
-    service = LiveService(home)
-    with Watch(home) as watch:
-        service.start()
-        watch.seen = {found for found in watch.seen if found[0] != "."}  # it was open until then
-        service.stop()
-    assert {"morphid.sqlite3", "serve.lock", "api.log", "broker.log", "appendonlydir"} <= watch.names()
-    assert watch.open_to_others() == []
 
 
 def test_a_folder_of_somebody_else_is_left_and_said(tmp_path: Path) -> None:

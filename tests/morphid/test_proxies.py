@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -23,7 +22,6 @@ from morphid.connections import client_for
 from morphid.exits import CommandError, Exit
 from morphid.main import app
 from morphid.serve import _alive
-from tests.live import LiveService
 
 RUNNER = CliRunner()
 NAMES = ("http_proxy", "https_proxy", "all_proxy", "no_proxy")
@@ -146,22 +144,3 @@ def test_the_container_s_health_check_is_direct(here: str, root: Path) -> None:
     _, _, option, program = services["api"]["healthcheck"]["test"]
     program = program.replace("http://127.0.0.1:8000", here)
     assert subprocess.run([sys.executable, option, program], check=False).returncode == 0
-
-
-def test_the_whole_service_starts_behind_a_dead_proxy(tmp_path: Path, dead_port: int) -> None:
-    """`morphid serve` becomes ready, and `ready` and `doctor` agree."""
-    dead = f"http://127.0.0.1:{dead_port}"
-    proxies = {**dict.fromkeys(EVERY_NAME[:2], dead), "ALL_PROXY": f"socks5://127.0.0.1:{dead_port}"}
-    service = LiveService(tmp_path, proxies).start()
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", "morphid.main", "doctor", "--url", service.url, "--json"],
-            env={**os.environ, **proxies},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert "does not answer" not in done.stdout, done.stdout
-        assert json.loads(done.stdout)["findings"][0]["state"] == "ok"
-    finally:
-        service.stop()

@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
-from app.database import Database, upgrade
+from app.database import Database
 from app.jobs.records import Job
 from app.jobs.store import Terms, create_job, get_job
 from morphdata.faults import Interrupted
+from tests.servers.stores import migrated_sqlite
 from worker.numerics import Kernels
 from worker.operations import Begin, Document, Outcome, Step, Stop
 from worker.runner import Runner
@@ -80,9 +81,7 @@ def find_walk() -> Callable[[str], Begin]:
 @pytest.fixture
 def database(tmp_path: Path) -> Iterator[Database]:
     """An empty job store."""
-    url = f"sqlite:///{tmp_path / 'jobs.sqlite3'}"
-    upgrade(url)
-    database = Database(url)
+    database = Database(migrated_sqlite(tmp_path / "jobs.sqlite3"))
     yield database
     database.dispose()
 

@@ -85,7 +85,7 @@ async function jobView(id) {
     draw();
     const { code, detail, hint, pointer } = job.error ?? {};
     const failure = job.error ? problemCard({ problem: { title: `Failed: ${code}`, detail, hint, pointer } }) : null;
-    cards.replaceChildren(...[failure, ...(result ? resultCards(job.operation, result) : [])].filter(Boolean));
+    cards.replaceChildren(...[failure, ...(result ? resultCards(job.operation, result) : []), exportCard(job.model_id)].filter(Boolean));
     files.replaceChildren(...filesCards((await call(job.links.artifacts)).artifacts));
   }
 

@@ -102,3 +102,39 @@ function modelCard(result, title = "Identified model") {
 function namesLine(title, names) {
   return names?.length ? element("p", {}, element("b", {}, `${title}: `), names.map(parameterTitle).join("; ")) : null;
 }
+
+/* ---- export ---- */
+
+const FORMATS = document.body.dataset.formats.split(" ");
+
+/* Fetch an exported file, however long its job takes; `say(text)` shows how far it is. */
+async function fetchExport(path, say) {
+  for (;;) {
+    const answer = await request(path, { headers: { Accept: "*/*" } });
+    if (answer.status !== 202) return answer;
+    say("A job is writing the file …");
+    await new Promise((wake) => setTimeout(wake, 1000 * Number(answer.headers.get("Retry-After") ?? 2)));
+  }
+}
+
+/* The identified model as a file of each format. */
+function exportCard(model) {
+  if (!model) return null;
+  const said = element("p", { class: "soft", role: "status" });
+  const say = (text) => { said.textContent = text; };
+  const save = async (format) => {
+    say("");
+    try {
+      const answer = await fetchExport(`/models/${model}/export?format=${format}`, say);
+      const [, name] = /filename="([^"]+)"/.exec(answer.headers.get("Content-Disposition"));
+      const url = URL.createObjectURL(await answer.blob());
+      element("a", { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10000);
+      say("");
+    } catch (error) {
+      say([error.message, error.problem?.hint].filter(Boolean).join(" "));
+    }
+  };
+  const buttons = FORMATS.map((format) => element("button", { on: { click: () => save(format) } }, format));
+  return card("Export the model", { help: "export" }, element("div", { class: "row" }, ...buttons), said);
+}

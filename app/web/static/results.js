@@ -14,6 +14,7 @@ const DESCRIBED = {
   study: (asked) => [`${asked.compared_links.join(", ")} links`, asked.method],
   simulate: (asked) => [`${asked.model} model`, links(asked), `${asked.duration_s} s`],
   optimize: (asked) => [`to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
+  export: (asked) => [links(asked), asked.format],
 };
 const OPERATIONS = document.body.dataset.operations.split(" ");
 
@@ -62,6 +63,17 @@ function studyCards(result) {
   return cards;
 }
 
+const NOT_CHANNELS = ["time_s", "sweep_left_rad", "sweep_right_rad", "phi_rad", "theta_rad", "psi_rad"];
+
+/* The range of every channel of a flight. */
+function channelsCard(trajectory) {
+  const least = (values) => values.reduce((a, b) => Math.min(a, b)), most = (values) => values.reduce((a, b) => Math.max(a, b));
+  const columns = Object.entries(trajectory).filter(([name]) => !NOT_CHANNELS.includes(name));
+  if (!columns.length) return null;
+  const rows = columns.map(([name, values]) => [name, show.number(values[0]), show.number(least(values)), show.number(most(values)), show.number(values.at(-1))]);
+  return card("Channels", { help: "channels" }, table(["Channel, with its unit", ...["start", "least", "greatest", "end"].map(number)], rows, { stack: true }));
+}
+
 function simulateCards(result) {
   const tips = result.trim.tip_z_m ?? {};
   const up = (side) => (known(tips[side]) ? show.number(-tips[side]) : "–");
@@ -77,7 +89,7 @@ function simulateCards(result) {
       ["Computed in", show.duration(result.cost.wall_s)],
       ["Times faster than real time", show.number(result.cost.real_time_factor)],
     ]),
-  )];
+  ), channelsCard(result.trajectory)];
 }
 
 const SCHEDULES = [["constant", "constant rate"], ["rigid_optimum", "optimum of the rigid model"], ["optimum", "optimum"]];
@@ -125,11 +137,16 @@ function optimizeCards(result) {
   return cards;
 }
 
+function exportCards(result) {
+  return [card("Exported model", { help: "export" }, facts([["Format", result.format], ["File", result.file], ["Size", show.bytes(result.size_bytes)], ["SHA-256", result.sha256]]))];
+}
+
 const RESULT_CARDS = {
   identify: (result) => [fitCard(result.fit), modelCard(result)],
   study: studyCards,
   simulate: simulateCards,
   optimize: optimizeCards,
+  export: exportCards,
 };
 
 function resultCards(operation, result) {

@@ -52,7 +52,8 @@ REFINED = 1e-12  # what is left of the flow through the panels, of its largest b
 STILL = 1e-7  # of the largest circulation: smaller changes within a step leave the induced velocities
 MOST_PASSES = 8  # of refinement; beyond, the inverse is renewed
 FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
-RECORD = 18  # numbers of a record before the tips: R_NB row by row, twist, position of the fuselage
+# numbers of a record before those of the tips: R_NB row by row, twist, position, twist rate of the fuselage
+RECORD = 24
 
 
 @inlined
@@ -157,7 +158,7 @@ class Scratch(NamedTuple):
 def fly_steps(structure, parts, place, path, rule, state, trial, scratch, records, first, last, fresh):
     """Fly from row ``first`` to row ``last`` of the path; states move in place.
 
-    ``trial`` is a State of scratch. records (k, RECORD + tips) gets a row for every time. ``fresh`` : the
+    ``trial`` is a State of scratch. records (k, RECORD + 2 tips) gets a row for every time. ``fresh`` : the
     matrix was formed in the first step itself. Returns the row reached and what stopped the flight there.
     """
     row = first
@@ -173,19 +174,26 @@ def fly_steps(structure, parts, place, path, rule, state, trial, scratch, record
 
 @inlined
 def _record(structure, state, out):
-    """Attitude, twist and position of the fuselage and the tips' z in B from their roots."""
+    """Attitude, twist, position and twist rate of the fuselage; the tips' z in B from their roots and twist.
+
+    A tip's twist is recorded as its sine: element (x, z) of the rotation from its axes to the root's.
+    """
+    tips = structure.roots.size
     for i in range(3):
         for j in range(3):
             out[3 * i + j] = state.R[0, i, j]
         out[15 + i] = state.x[0, i]
     for i in range(6):
         out[9 + i] = state.V[0, i]
-    for s in range(structure.roots.size):
+        out[18 + i] = state.A[0, i]
+    for s in range(tips):
         root, tip = structure.roots[s], structure.tips[s]
-        total = 0.0
+        total, sine = 0.0, 0.0
         for i in range(3):
             total += (state.x[tip, i] - state.x[root, i]) * state.R[0, i, 2]
+            sine += state.R[root, i, 0] * state.R[tip, i, 2]
         out[RECORD + s] = total
+        out[RECORD + tips + s] = sine
 
 
 @inlined

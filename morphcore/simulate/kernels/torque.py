@@ -8,6 +8,7 @@ from morphcore.models.kernels.layout import (
     LINKS_C,
     S_CARRIED,
     S_INERTIA,
+    VELOCITY,
     joint_rows_of_scratch,
     link_rows_of_scratch,
 )
@@ -20,7 +21,7 @@ from morphcore.simulate.kernels.step import instant_rates
 def torques(
     lanes,
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, columns, screws, operators, wind,
-    constants, states, zero, block, scratch, inputs, outputs, rates, out,
+    constants, states, zero, block, scratch, inputs, outputs, rates, out, velocity_rates,
 ):  # fmt: skip
     """Inverse dynamics of every wing at each of some instants of one flight.
 
@@ -34,7 +35,7 @@ def torques(
     columns : (s + 1,) first hinge of each surface, and h. screws : (t, h, 6) `multibody.hinges.hinge_screws`.
     states : (t, rows) of one flight; the others as in ``rates_of_blocks``, with a leading axis t.
     block : (rows, width) and the rest of the scratch: the caller's own. out : (t, h) N m, along the positive
-    angles.
+    angles. velocity_rates : (t, 3) m/s^2, of the components of v_B.
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
@@ -51,6 +52,8 @@ def torques(
             surfaces, ranges, shared, strips[n], hinges[n], hinge_accelerations[n], operators[n], wind[n],
             constants, block, zero, scratch, inputs, outputs, rates,
         )  # fmt: skip
+        for i in range(3):
+            velocity_rates[n, i] = rates[VELOCITY + i, 0]
         last_joint = coordinates // 3
         for s in range(surfaces.shape[0] - 1, -1, -1):
             clear(lanes, force)

@@ -19,15 +19,20 @@ from app.tables import audit_log
 from tests.app.key_holders import bearer, holder, make_key
 from tests.app.request_documents import sample_document, simulate_document
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
+from tests.servers.stores import migrated_sqlite
 from tests.waiting import until
 
 PATIENCE_S = 10.0
 
 
-@pytest.fixture
-def keyed(database_url: str) -> Iterator[RunningService]:
-    """A service that demands keys."""
-    settings = Settings(database_url=database_url, broker_url=DEAD_BROKER, auth="keys")
+@pytest.fixture(params=["sqlite", pytest.param("postgres", marks=pytest.mark.slow)])
+def keyed(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RunningService]:
+    """A service that demands keys, once on each database; on Postgres among the long proofs."""
+    if request.param == "sqlite":
+        url = migrated_sqlite(tmp_path / "service.sqlite3")
+    else:
+        url = request.getfixturevalue("postgres_server").migrated_database()
+    settings = Settings(database_url=url, broker_url=DEAD_BROKER, auth="keys")
     with running_service(settings) as running:
         yield running
 
@@ -137,7 +142,7 @@ def test_old_deeds_are_forgotten(database: Database) -> None:
 
 def test_the_log_is_written_without_keys_too(tmp_path: Path) -> None:
     """On one machine everyone is `local`, and what was done is noted all the same."""
-    url = f"sqlite:///{tmp_path / 'service.sqlite3'}"
+    url = migrated_sqlite(tmp_path / "service.sqlite3")
     with running_service(Settings(database_url=url, broker_url=DEAD_BROKER)) as service:
         service.client.post("/simulate", json=simulate_document()).raise_for_status()
         (entry,) = entries(service.database)

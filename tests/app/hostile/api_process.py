@@ -18,6 +18,7 @@ from typing import Self
 import httpx
 
 from tests.app.running_service import DEAD_BROKER
+from tests.plain_http import CERTIFICATES
 
 ROOT = Path(__file__).resolve().parents[3]
 START_S = 40.0
@@ -144,7 +145,7 @@ class Onlooker:
         return self.highest_mib - self.before_mib
 
     def _look(self) -> None:
-        with httpx.Client(base_url=self.api.client.base_url, timeout=30.0) as client:
+        with httpx.Client(base_url=self.api.client.base_url, timeout=30.0, verify=CERTIFICATES) as client:
             while not self._stop.wait(0.02):
                 start = time.perf_counter()
                 try:

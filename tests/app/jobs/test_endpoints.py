@@ -14,6 +14,7 @@ import pytest
 from app.jobs import store
 from tests.app.request_documents import RESULT, Document, identify_document
 from tests.app.running_service import RunningService
+from tests.waiting import until
 
 
 def new_job(service: RunningService) -> str:
@@ -145,8 +146,10 @@ def test_stream_replays_and_follows(any_service: RunningService) -> None:
     claim = service.claim(job_id)
     service.progress(claim, fraction=0.1)
 
+    alive = threading.Event()
+
     def work() -> None:
-        time.sleep(1.0)  # several times the pause between signs of life, also on a busy machine
+        assert alive.wait(20.0), "no sign of life while nothing happened"
         service.progress(claim, fraction=0.6)
         service.finish(claim, "succeeded", result=RESULT)
 
@@ -154,7 +157,11 @@ def test_stream_replays_and_follows(any_service: RunningService) -> None:
     worker.start()
     with service.client.stream("GET", f"/jobs/{job_id}/events") as answer:
         assert answer.headers["content-type"].startswith("text/event-stream")
-        events = list(sse(answer))
+        events = []
+        for event in sse(answer):
+            events.append(event)
+            if event["type"] == "comment" and len(events) > 3:  # the past was told
+                alive.set()
     worker.join()
     told = [event for event in events if event["type"] != "comment"]
     assert [event["type"] for event in told] == ["queued", "started", "progress", "progress", "succeeded"]
@@ -197,9 +204,10 @@ def test_events_as_json_are_the_same_rows(any_service: RunningService) -> None:
 def test_stream_ends_when_the_job_is_deleted(service: RunningService) -> None:
     """Whoever follows a job that is deleted is not left waiting."""
     job_id = new_job(service)
+    following = threading.Event()
 
     def delete_soon() -> None:
-        time.sleep(0.2)
+        assert following.wait(20.0)
         with service.database.write() as session:
             store.request_cancel(session, "local", job_id)
         service.client.delete(f"/jobs/{job_id}")
@@ -207,6 +215,7 @@ def test_stream_ends_when_the_job_is_deleted(service: RunningService) -> None:
     helper = threading.Thread(target=delete_soon)
     helper.start()
     with service.client.stream("GET", f"/jobs/{job_id}/events") as answer:
+        following.set()
         types = kinds(sse(answer))
     helper.join()
     assert types in (["queued"], ["queued", "cancelled"])
@@ -231,16 +240,18 @@ def test_many_watchers_cost_one_query(service: RunningService) -> None:
     claim = service.claim(job_id)
     limits = httpx.Limits(max_connections=120)
     told: list[list[str]] = []
+    begun: list[str] = []
     with httpx.Client(base_url=service.url, timeout=30.0, limits=limits) as client:
 
         def follow() -> None:
             with client.stream("GET", f"/jobs/{job_id}/events", params={"after": 2}) as answer:
+                begun.append(job_id)
                 told.append(kinds(sse(answer)))
 
         followers = [threading.Thread(target=follow) for _ in range(100)]
         for follower in followers:
             follower.start()
-        time.sleep(0.5)
+        until(lambda: len(begun) == len(followers))
         start = time.perf_counter()
         assert service.client.get("/jobs").status_code == 200
         assert time.perf_counter() - start < 1.0

@@ -6,16 +6,18 @@ import itertools
 import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from functools import cache
 from typing import Any
 
 import pytest
 from sqlalchemy import event, insert, text
 
-from app.database import Database, upgrade
+from app.database import Database
 from app.identifiers import ALPHABET, base32
 from app.jobs.repository import JobFilter, list_jobs
 from app.tables import STATUSES, jobs
 from tests.app.jobs.test_store import OWNER
+from tests.servers.stores import migrated_sqlite
 
 COUNT = 10_000
 FIRST_S = 1_800_000_000.0  # when the oldest was made; the next ones a second apart
@@ -71,8 +73,10 @@ TIMES = [
 FILTERS = [JobFilter(**kind, **times) for kind, times in itertools.product(KINDS, TIMES)]
 
 
-def expected(wanted: JobFilter, before: str | None) -> list[str]:
-    """The same list by looking at every row."""
+@cache
+def matching(number: int) -> list[str]:
+    """All jobs that filter `number` lets through, by looking at every row, newest id first."""
+    wanted = FILTERS[number]
     after_s = wanted.created_after.timestamp() if wanted.created_after else 0.0
     before_s = wanted.created_before.timestamp() if wanted.created_before else float("inf")
     found = [
@@ -82,32 +86,42 @@ def expected(wanted: JobFilter, before: str | None) -> list[str]:
         and wanted.operation in (None, row["operation"])
         and wanted.label in (None, row["label"])
         and after_s <= row["created_at"] < before_s
-        and (before is None or row["id"] < before)
     ]
-    return sorted(found, reverse=True)[:PAGE]
+    return sorted(found, reverse=True)
 
 
-@pytest.fixture
-def full(database: Database) -> Database:
+def expected(number: int, before: str | None) -> list[str]:
+    """The page of filter `number` that begins below an id."""
+    found = matching(number)
+    return [identifier for identifier in found if before is None or identifier < before][:PAGE]
+
+
+@pytest.fixture(scope="module", params=["sqlite", "postgres"])
+def full(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     """A database with all these jobs, its statistics made as the server makes them by itself."""
+    if request.param == "sqlite":
+        database = Database(migrated_sqlite(tmp_path_factory.mktemp("lists") / "jobs.sqlite3"))
+    else:
+        database = Database(request.getfixturevalue("postgres_server").migrated_database())
     with database.write() as session:
         session.execute(insert(jobs), ROWS)
     if database.engine.dialect.name == "postgresql":
         with database.write() as session:
             session.execute(text("ANALYZE jobs"))
-    return database
+    yield database
+    database.dispose()
 
 
 def test_every_filter_finds_its_jobs(full: Database) -> None:
     """Whatever the combination, a page is what a look at every row gives, newest id first."""
     middle = f"job_{base32(int(1e3 * (FIRST_S + COUNT // 2)), 10)}{ALPHABET[0] * 16}"
     with full.read() as session:
-        for wanted, before in itertools.product(FILTERS, (None, middle)):
+        for (number, wanted), before in itertools.product(enumerate(FILTERS), (None, middle)):
             found, following = list_jobs(session, OWNER, wanted, cursor=before, limit=PAGE)
             ids = [job.id for job in found]
-            assert ids == expected(wanted, before), (wanted, before)
-            rest = [] if following is None else expected(wanted, following)
-            assert bool(rest) == bool(ids and expected(wanted, ids[-1])), "a cursor leads on"
+            assert ids == expected(number, before), (wanted, before)
+            rest = [] if following is None else expected(number, following)
+            assert bool(rest) == bool(ids and expected(number, ids[-1])), "a cursor leads on"
 
 
 def statements(database: Database, wanted: JobFilter) -> list[tuple[str, Any]]:
@@ -125,23 +139,12 @@ def statements(database: Database, wanted: JobFilter) -> list[tuple[str, Any]]:
     return sent
 
 
-@pytest.fixture(scope="module")
-def sqlite_full(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
-    """The jobs in one SQLite file for all plans."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('lists') / 'jobs.sqlite3'}"
-    upgrade(url)
-    database = Database(url)
-    with database.write() as session:
-        session.execute(insert(jobs), ROWS)
-    yield database
-    database.dispose()
-
-
-def test_sqlite_reads_ranges_in_order(sqlite_full: Database) -> None:
+@pytest.mark.parametrize("full", ["sqlite"], indirect=True)
+def test_sqlite_reads_ranges_in_order(full: Database) -> None:
     """Jobs are found by an index that begins with the owner, in order: nothing is scanned or sorted."""
     for wanted in FILTERS:
-        for statement, parameters in statements(sqlite_full, wanted):
-            with sqlite_full.read() as session:
+        for statement, parameters in statements(full, wanted):
+            with full.read() as session:
                 explained = session.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters)
                 plan = [row.detail for row in explained]
             steps = [step for step in plan if step.startswith(("SEARCH jobs", "SCAN jobs"))]
@@ -161,7 +164,7 @@ def visited(plan: dict[str, Any]) -> float:
     return inner + plan["Actual Loops"] * (plan["Actual Rows"] + plan.get("Rows Removed by Filter", 0))
 
 
-@pytest.mark.parametrize("database_url", ["postgres"], indirect=True)
+@pytest.mark.parametrize("full", ["postgres"], indirect=True)
 def test_postgres_touches_few_rows(full: Database) -> None:
     """A page of any list by kind touches a small part of the owner's jobs."""
     for kind in KINDS:

@@ -8,6 +8,7 @@ import pytest
 
 from app.settings import Settings
 from tests.app.running_service import DEAD_BROKER, RunningService, running_service
+from tests.servers.stores import migrated_sqlite
 
 
 def _keyed(url: str) -> Settings:
@@ -16,22 +17,20 @@ def _keyed(url: str) -> Settings:
     )
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgres"])
-def keyed_service(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[RunningService]:
-    """A running service that demands keys, once on each database."""
+@pytest.fixture(scope="module", params=["sqlite", pytest.param("postgres", marks=pytest.mark.slow)])
+def keyed_service(request: pytest.FixtureRequest) -> Iterator[RunningService]:
+    """A running service that demands keys, once on each database; on Postgres among the long proofs."""
     if request.param == "sqlite":
-        url = f"sqlite:///{tmp_path_factory.mktemp('keyed') / 'service.sqlite3'}"
-    else:
-        url = request.getfixturevalue("postgres_server").new_database()
+        yield request.getfixturevalue("keyed_on_sqlite")
+        return
+    url = request.getfixturevalue("postgres_server").migrated_database()
     with running_service(_keyed(url)) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def keyed_on_sqlite(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """The same on SQLite only, for laws in which the database has no part."""
-    folder = tmp_path_factory.mktemp("keyed")
-    with running_service(_keyed(f"sqlite:///{folder / 'service.sqlite3'}")) as running:
+    """A running service that demands keys on SQLite, for laws in which the database has no part."""
+    url = migrated_sqlite(tmp_path_factory.mktemp("keyed") / "service.sqlite3")
+    with running_service(_keyed(url)) as running:
         yield running

@@ -35,7 +35,7 @@ from tests.app.webhooks.hooks import (
 from tests.app.webhooks.receiver import Receiver, answer_json, content, receiver, status
 from tests.waiting import until
 
-on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+on_sqlite = pytest.mark.parametrize("migrated_url", ["sqlite"], indirect=True)
 STEP_S = 5.0  # of the clock, between two looks of the sender
 SOON_S = 1800.0  # within which a dead host must be left alone for good
 MOST_CONNECTIONS = 50

@@ -52,7 +52,7 @@ def test_the_example_verifies_what_is_sent(examples: dict[str, Any]) -> None:
     assert not verified(secret, signed_headers(secret, "msg_1", now - 1000.0, BODY), BODY)
 
 
-@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("migrated_url", ["sqlite"], indirect=True)
 def test_the_example_answers_the_challenge(database: Database, examples: dict[str, Any]) -> None:
     """A receiver that answers as the paper shows has its webhook enabled, and then gets the ends of jobs."""
     with receiver() as there:

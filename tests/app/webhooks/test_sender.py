@@ -30,7 +30,7 @@ from tests.app.webhooks.receiver import Receiver, receiver, status
 from tests.waiting import until
 
 # what the database has no part in is proved on one of them
-on_sqlite = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+on_sqlite = pytest.mark.parametrize("migrated_url", ["sqlite"], indirect=True)
 UNREACHABLE = "http://127.0.0.1:1024/"
 
 

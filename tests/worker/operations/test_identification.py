@@ -24,11 +24,13 @@ from worker.operations.library_work import BEGUN_AGAIN
     ],
     ids=lambda search: str(search["method"]),
 )
-def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any]) -> None:
+def test_a_job_goes_on_from_any_checkpoint(search: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a lost worker had done, the next one ends with the same document, but for wall times.
 
     Step and corrections are left to the search: the next worker chooses what the first one chose.
     """
+    # documents are compared; their pictures take seconds each
+    monkeypatch.setattr("worker.operations.identification.identification_plots", lambda *_: {})
     request = identification("train_rate_0.8", links=2, search=search)
     work = find_operation("identify")(request, 1)
     steps = list(work.steps(None, lambda: False))

@@ -61,8 +61,9 @@ def test_schedules_are_flown_in_the_flexible_model(worker: RealWorker) -> None:
     assert document["reduction_model"] == "flexible"
 
 
-def test_an_optimisation_goes_on_from_its_checkpoint() -> None:
+def test_an_optimisation_goes_on_from_its_checkpoint(monkeypatch: pytest.MonkeyPatch) -> None:
     """Begun again in mid-search it ends with the same schedule to the bit."""
+    monkeypatch.setattr("worker.operations.optimisation.schedule_plots", lambda *_: {})  # take seconds
     work = find_operation("optimize")(optimisation(), 1)
     steps = list(work.steps(None, lambda: False))
     resumed = find_operation("optimize")(optimisation(), 1)

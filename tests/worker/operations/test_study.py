@@ -38,8 +38,9 @@ def test_a_study_ends_with_rows_and_a_recommendation(worker: RealWorker) -> None
     assert worker.job(job_id).model_id is not None
 
 
-def test_a_study_goes_on_from_its_checkpoint() -> None:
+def test_a_study_goes_on_from_its_checkpoint(monkeypatch: pytest.MonkeyPatch) -> None:
     """Begun again in mid-search it ends with the same rows, but for the times that were measured."""
+    monkeypatch.setattr("worker.operations.study.study_plots", lambda *_: {})  # take seconds
     request = study(1, 2)
     work = find_operation("study")(request, 1)
     steps = list(work.steps(None, lambda: False))

@@ -17,13 +17,13 @@ from app.documents import unpacked
 from app.jobs.records import Job
 from app.jobs.store import Terms, create_job, get_job
 from app.tables import job_chunks, job_events, job_results
-from tests.app.conftest import database, database_url, postgres_server
+from tests.app.conftest import database, migrated_url, postgres_server
 from tests.worker.spread.flocks import find_flock
 from worker.attempt import Ending
 from worker.numerics import Kernels
 from worker.runner import Runner
 
-__all__ = ["database", "database_url", "postgres_server"]
+__all__ = ["database", "migrated_url", "postgres_server"]
 
 OWNER = "local"
 FLOCK = {"seed": 7, "birds": 12, "generations": 5}

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from app.database import Database, upgrade
+from app.database import Database
 from app.jobs.reaper import reap
 from app.tables import job_chunks
 from morphcore.lanes import TOGETHER
 from tests.identification_request import identification
+from tests.servers.stores import migrated_sqlite
 from tests.worker.spread.processes import Workers, spread
 from worker.attempt import Ending
 from worker.numerics import Kernels, warm_up_library
@@ -29,7 +30,9 @@ CHUNK_LEASE_S = 2.0
 @pytest.mark.parametrize(
     ("search", "links"), [(SMALL, 2), (EVOLUTION, 2), (HYBRID, 1)], ids=["pso", "cma", "hybrid"]
 )
-def test_a_spread_search_is_the_search(tmp_path: Path, search: dict[str, Any], links: int) -> None:
+def test_a_spread_search_is_the_search(
+    tmp_path: Path, search: dict[str, Any], links: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Two workers by turns (each with plans of its own) end with the document of the mode `single`.
 
     One link fits poorly: the hybrid screens candidates, which are spread, between two descents, which are
@@ -37,9 +40,9 @@ def test_a_spread_search_is_the_search(tmp_path: Path, search: dict[str, Any], l
     Wall times are left out: no two runs share them. What the kind of database could change is under test with
     flocks.
     """
-    url = f"sqlite:///{tmp_path / 'jobs.sqlite3'}"
-    upgrade(url)
-    database = Database(url)
+    # documents are compared; their pictures take seconds each
+    monkeypatch.setattr("worker.operations.identification.identification_plots", lambda *_: {})
+    database = Database(migrated_sqlite(tmp_path / "jobs.sqlite3"))
     kernels = Kernels(warm_up_library, threads=1)
     kernels.wait(lambda: False, poll_s=0.01)
     runners = [Runner(database, kernels, name, lease_s=60.0, heartbeat_s=10.0) for name in ("w1", "w2")]

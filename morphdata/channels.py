@@ -1,0 +1,155 @@
+"""The output channels of a flight as documents know them: names, units, what they mean.
+
+How a channel is computed stands under the same name in ``morphcore/simulate/channels.py``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+MODEL_KINDS = ("rigid", "equivalent", "flexible")
+CHAINS = ("rigid", "equivalent")  # models of rigid links
+
+
+@dataclass(frozen=True)
+class ChannelFacts:
+    """What documents hold of one channel.
+
+    Attributes
+    ----------
+    name : str
+        In requests, and of its column; where there are several columns, each is ``name_part``.
+    unit : str
+        Of its values, "1" if they have none. Names in JSON documents end in it: ``alpha_rad``, ``nz``.
+    description : str
+        What it is, with frame and sign, a line.
+    per : {"", "surface", "drive"}
+        It has one column, or one for each surface or drive. The column of the surface "right wing" is
+        ``tip_z_right_wing``: its name in small letters and digits, underscores between (see `column_parts`).
+    default : bool
+        Whether a flight has it where no channels are requested.
+    models : tuple of str
+        Kinds of models that give it.
+    needs_gravity : bool
+        It is a multiple of the weight and has no meaning without.
+    """
+
+    name: str
+    unit: str
+    description: str
+    per: Literal["", "surface", "drive"] = ""
+    default: bool = False
+    models: tuple[str, ...] = MODEL_KINDS
+    needs_gravity: bool = False
+
+
+CHANNELS: list[ChannelFacts] = [
+    ChannelFacts("p", "rad/s", "Roll rate, body axes.", default=True),
+    ChannelFacts("q", "rad/s", "Pitch rate, body axes.", default=True),
+    ChannelFacts("r", "rad/s", "Yaw rate, body axes.", default=True),
+    ChannelFacts("vx", "m/s", "Velocity of the reference point, north.", default=True),
+    ChannelFacts("vy", "m/s", "Velocity of the reference point, east.", default=True),
+    ChannelFacts("vz", "m/s", "Velocity of the reference point, down.", default=True),
+    ChannelFacts("x", "m", "Position of the reference point, north.", default=True),
+    ChannelFacts("y", "m", "Position of the reference point, east.", default=True),
+    ChannelFacts("z", "m", "Position of the reference point, down.", default=True),
+    ChannelFacts(
+        "tip_left_z",
+        "m",
+        "Tip of the first hinged left surface below its root, along z of the body axes.",
+        default=True,
+    ),
+    ChannelFacts(
+        "tip_right_z",
+        "m",
+        "Tip of the first hinged right surface below its root, along z of the body axes.",
+        default=True,
+    ),
+    ChannelFacts(
+        "alpha", "rad", "Angle of attack of the body relative to the air, wind subtracted: atan2(w, u)."
+    ),
+    ChannelFacts(
+        "beta", "rad", "Sideslip relative to the air, wind subtracted: asin(v / V), air from the right."
+    ),
+    ChannelFacts("airspeed", "m/s", "Speed of the reference point relative to the air, wind subtracted."),
+    ChannelFacts("fx", "m/s^2", "Specific force at the reference point, body x (forward)."),
+    ChannelFacts("fy", "m/s^2", "Specific force at the reference point, body y (right)."),
+    ChannelFacts("fz", "m/s^2", "Specific force at the reference point, body z (down): -g at rest."),
+    ChannelFacts("nx", "1", "Load factor forward: fx / g.", needs_gravity=True),
+    ChannelFacts("ny", "1", "Load factor to the right: fy / g.", needs_gravity=True),
+    ChannelFacts("nz", "1", "Load factor upward: -fz / g, +1 in level flight.", needs_gravity=True),
+    ChannelFacts("tip_z", "m", "Tip below its root along z of the body axes.", per="surface"),
+    ChannelFacts("tip_twist", "rad", "Elastic twist of the tip against the root, nose up.", per="surface"),
+    ChannelFacts(
+        "hinge_torque",
+        "N m",
+        "Torque of the drive's motors, along its positive coordinate.",
+        per="drive",
+        models=CHAINS,
+    ),
+]
+
+
+def channel_facts(name: str) -> ChannelFacts:
+    """Find a channel by its name.
+
+    Raises
+    ------
+    LookupError
+        There is none of this name.
+    """
+    for each in CHANNELS:
+        if each.name == name:
+            return each
+    raise LookupError(f"there is no channel {name!r}, only {', '.join(each.name for each in CHANNELS)}")
+
+
+def default_channels() -> list[str]:
+    """Names of the channels that a flight has where none are requested."""
+    return [each.name for each in CHANNELS if each.default]
+
+
+def column_parts(names: Iterable[str]) -> list[str]:
+    """Parts of column names for surfaces or drives: small letters, digits and underscores, all different.
+
+    Examples
+    --------
+    >>> column_parts(["right wing", "Right-Wing", "V-tail"])
+    ['right_wing', 'right_wing_2', 'v_tail']
+    """
+    found: list[str] = []
+    for name in names:
+        plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "part"
+        part, number = plain, 2
+        while part in found:
+            part, number = f"{plain}_{number}", number + 1
+        found.append(part)
+    return found
+
+
+def document_name(column: str) -> str:
+    """Name of a column in JSON documents, its unit at the end; other columns than channels keep their names.
+
+    Examples
+    --------
+    >>> document_name("tip_z_right_wing"), document_name("nz"), document_name("stamp")
+    ('tip_z_right_wing_m', 'nz', 'stamp')
+    """
+    for each in CHANNELS:
+        if column == each.name or (each.per and column.startswith(f"{each.name}_")):
+            return "_".join([column, *unit_words(each.unit)])
+    return column
+
+
+def unit_words(unit: str) -> list[str]:
+    """How names end in a unit.
+
+    Examples
+    --------
+    >>> unit_words("m/s^2"), unit_words("N m"), unit_words("1")
+    (['m', 's2'], ['nm'], [])
+    """
+    return [] if unit == "1" else unit.lower().replace(" ", "").replace("^", "").split("/")

@@ -1,0 +1,7 @@
+"""What clients of unencrypted services share: httpx reads all certificates anew for each client, in 30 ms."""
+
+from __future__ import annotations
+
+import ssl
+
+CERTIFICATES = ssl.create_default_context()  # as each client would read them
