@@ -61,8 +61,8 @@ class Particulars:
     ----------
     show : prints a result for people.
     options : its own options, by the names of their values.
-    fill : ``fill(request, values)`` puts the values of its own options into the request, before those of the
-        fields.
+    fill : ``fill(request, values)`` puts the values of its own options into the request, after aircraft and
+        flight and before the other fields.
     fills : flags of those fields that `fill` puts in itself.
     out : help of ``--out``, a file that `save` writes; "" where there is none.
     save : ``save(answer, path)`` writes it.
@@ -79,6 +79,8 @@ class Particulars:
 def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., None]:
     """Make the function of a command, as typer wants it."""
     fields = field_options(operation.request)
+    vehicle = [option for option in fields if option.pointer in ("/aircraft", "/flight")]
+    others = [option for option in fields if option not in vehicle]
     has_samples = "samples" in operation.request.model_fields
 
     def command(**values: Any) -> None:
@@ -91,8 +93,10 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
             request.add_samples(matching_files(values["sample"], "--sample"), "train", "--sample")
             held_out = matching_files(values["held_out"] or [], "--held-out")
             request.add_samples(held_out, "held_out", "--held-out")
+        for option in vehicle:  # first, for the aircraft says which drives there are
+            _fill_field(request, option, values[option.parameter.name])
         own.fill(request, values)
-        for option in (option for option in fields if option.flag not in own.fills):
+        for option in (option for option in others if option.flag not in own.fills):
             _fill_field(request, option, values[option.parameter.name])
         answer = run(request, values["url"], values["api_key"])
         if values.get("out") is not None and answer.result is not None:
@@ -100,16 +104,14 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
         hand_over(answer, own.show, json_out=values["json_out"], plots=values["plots"])
 
     made = reports_errors(command)
-    vehicle = [option.parameter for option in fields if option.pointer in ("/aircraft", "/flight")]
-    others = [option.parameter for option in fields if option.parameter not in vehicle]
     made.__name__ = operation.name
     made.__doc__ = f"{operation.title}."
     made.__signature__ = Signature(  # type: ignore[attr-defined]  # what typer goes by
         [
-            *vehicle,
+            *(option.parameter for option in vehicle),
             *_parameters(SAMPLES if has_samples else {}),
             *_parameters(own.options),
-            *others,
+            *(option.parameter for option in others),
             *_parameters({"out": _out_option(own.out)} if own.out else {}),
             *_parameters(RUNNING),
         ]

@@ -83,7 +83,7 @@ def test_what_does_not_move_the_aircraft_is_refused_at_the_sample(
 ) -> None:
     """Once the aircraft is known; the pointer is the id's, and the hint holds the way out."""
     name, _ = uploaded(service, flight(**angles))
-    (found,) = fault(service.client.post("/identify", json=request(name, *axes)))["errors"]
+    found, *_ = fault(service.client.post("/identify", json=request(name, *axes)))["errors"]
     assert (found["code"], found["pointer"]) == (code, "/samples/0/trajectory_id")
     assert words in found["hint"]
 
