@@ -139,9 +139,39 @@ def document_name(column: str) -> str:
     ('tip_z_right_wing_m', 'nz', 'stamp')
     """
     for each in CHANNELS:
-        if column == each.name or (each.per and column.startswith(f"{each.name}_")):
+        if _is_of(each, column):
             return "_".join([column, *unit_words(each.unit)])
     return column
+
+
+def is_channel(column: str) -> bool:
+    """Whether a column is one of a channel.
+
+    Examples
+    --------
+    >>> is_channel("nz"), is_channel("tip_z_right_wing"), is_channel("fold_left")
+    (True, True, False)
+    """
+    return any(_is_of(each, column) for each in CHANNELS)
+
+
+def is_channel_field(field: str) -> bool:
+    """Whether a field of a JSON document is the column of a channel, its unit at the end.
+
+    Examples
+    --------
+    >>> is_channel_field("nz"), is_channel_field("p_rad_s"), is_channel_field("p_rad")
+    (True, True, False)
+    """
+    ends = {each.name: "".join(f"_{word}" for word in unit_words(each.unit)) for each in CHANNELS}
+    return any(
+        field.endswith(ends[each.name]) and _is_of(each, field.removesuffix(ends[each.name]))
+        for each in CHANNELS
+    )
+
+
+def _is_of(channel: ChannelFacts, column: str) -> bool:
+    return column == channel.name or bool(channel.per and column.startswith(f"{channel.name}_"))
 
 
 def unit_words(unit: str) -> list[str]:

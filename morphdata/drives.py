@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal, Protocol
 from pydantic import Field
 
 from morphdata.base import Angle, Document, Position
+from morphdata.channels import is_channel
 from morphdata.faults import Fault
 from morphdata.refusals import MAX_POINTER, escaped
-from morphdata.samplefiles.titles import CHANNELS
+from morphdata.samplefiles.titles import ATTITUDE
 
 HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
 MAX_HINGES = 4  # of one surface
@@ -22,7 +23,7 @@ SIDES = ("left", "right")
 BOTH = "both"
 SWEEPS = tuple(f"{WORDS['z']}_{side}" for side in SIDES)
 # columns of samples and keys of schedules that mean something else
-RESERVED = frozenset({"time", *CHANNELS, BOTH, *SIDES})
+RESERVED = frozenset({"time", *ATTITUDE, BOTH, *SIDES})
 SAME_AXIS = 1e-9  # distance of two unit vectors
 ANGLE_TOLERANCE_RAD = 1e-6  # measured angles are not exactly zero
 MAX_LISTED = 20  # columns of a file in an error
@@ -207,12 +208,12 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                 continue  # its own fault says so
             pointer = f"/surfaces/{number}{surface.hinge_pointer(place)}/name"
             name = drive_name(hinge, surface.side)
-            if hinge.word in RESERVED:
+            if hinge.word in RESERVED or is_channel(hinge.word):
                 yield Fault(
                     "name_reserved",
                     f"A drive cannot be called {hinge.word!r}.",
                     pointer,
-                    f"These names mean something else: {', '.join(sorted(RESERVED))}.",
+                    f"These names mean something else: {', '.join(sorted(RESERVED))}, and those of channels.",
                 )
             elif not name.endswith(f"_{surface.side}"):
                 yield Fault(

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticKnownError
 
 from morphdata.base import AngleSeries, Document, Identifier, SampleName, TimeSeries
+from morphdata.channels import is_channel_field
 from morphdata.drives import (
     RESERVED,
     SWEEPS,
@@ -44,22 +45,13 @@ EXAMPLE_FOLD: dict[str, Any] = {
     name: values for name, values in EXAMPLE_SAMPLE.items() if not name.startswith("sweep")
 } | {"name": "fold_30", "sweep_rad": [0.0, 0.0, 0.001, 0.003], "fold_left_deg": [0.0, 0.0, 0.1, 0.3]}
 UNITS = {"_rad": 1.0, "_deg": DEGREE}  # of the columns of drives inline
-# columns of a simulated trajectory, which can be a sample as it is; they are not used
-CHANNEL_UNITS = {
-    **dict.fromkeys(("p", "q", "r"), "rad_s"),
-    **dict.fromkeys(("vx", "vy", "vz"), "m_s"),
-    **dict.fromkeys(("x", "y", "z", "tip_left_z", "tip_right_z"), "m"),
-}
-CHANNEL_FIELDS = frozenset(f"{name}_{unit}" for name, unit in CHANNEL_UNITS.items())
-
-
 ATTITUDE_FIELDS = ("phi_rad", "theta_rad", "psi_rad")
 MISSPELT = 0.9  # so near to one of them no column is that of a drive
 
 
 def _column(name: str) -> str:
-    """Take the name of a further column: of a drive with its unit, or of a channel."""
-    if name in CHANNEL_FIELDS:
+    """Take the name of a further column: of a drive with its unit, or of a channel, which is not used."""
+    if is_channel_field(name):
         return name
     key = drive_key(name)
     misspelt = difflib.get_close_matches(name, ATTITUDE_FIELDS, n=1, cutoff=MISSPELT)
@@ -71,7 +63,7 @@ def _column(name: str) -> str:
 def drive_key(field: str) -> str | None:
     """Return the drive, or the word of both sides, of a column inline; None of all other columns."""
     key, unit = field[:-4], field[-4:]
-    return key if unit in UNITS and field not in CHANNEL_FIELDS else None
+    return key if unit in UNITS and not is_channel_field(field) else None
 
 
 class TrajectoryColumns(Document):

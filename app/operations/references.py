@@ -26,7 +26,7 @@ from morphdata.execution import Request
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.identify import SamplesRequest, total_rows_faults
 from morphdata.parameters import Parameters
-from morphdata.samplefiles.titles import CHANNELS
+from morphdata.samplefiles.titles import ATTITUDE
 from morphdata.samples import columns_of_aircraft, drive_key
 
 AnyRequest = TypeVar("AnyRequest", bound=Request)
@@ -139,7 +139,7 @@ def _of_aircraft(flight: Document, aircraft: Aircraft, pointer: str) -> Document
     columns = dict(flight)
     unreadable = columns.pop("unreadable", {})
     fields = {
-        key: field for field in columns if (key := drive_key(field)) is not None and key not in CHANNELS
+        key: field for field in columns if (key := drive_key(field)) is not None and key not in ATTITUDE
     }
     drives = aircraft.drives
     try:

@@ -6,13 +6,12 @@ import math
 import re
 from collections.abc import Sequence
 
+from morphdata.channels import is_channel
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 SWEEPS = ("sweep_left", "sweep_right")
 ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
-# columns of flown flights that no drive can be called
-CHANNELS = frozenset({*ATTITUDE, "p", "q", "r", "vx", "vy", "vz", "x", "y", "z", "tip_left_z", "tip_right_z"})
 DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
 MOST_COLUMNS = 1000  # a file of more is something else, or an attack
 LONGEST_TITLE = 200
@@ -82,15 +81,19 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
         factor = ANGLE_UNITS.get(match["unit"])
         if factor is None:
             return None
-    could_be = DRIVE.fullmatch(whole) and whole not in CHANNELS and whole not in SYNONYMS
-    return (whole, factor) if could_be else None
+    return (whole, factor) if _could_be_a_drive(whole) else None
 
 
 def drive_in_brackets(title: str) -> str | None:
     """The drive that a title could mean whose unit in brackets is none that is read; None for all others."""
     match = BRACKETS.fullmatch(plain(title))
     name = None if match is None else match["name"].rstrip("_")
-    return name if name and DRIVE.fullmatch(name) and name not in CHANNELS else None
+    return name if name and _could_be_a_drive(name) else None
+
+
+def _could_be_a_drive(name: str) -> bool:
+    known = name in ATTITUDE or name in SYNONYMS or is_channel(name)
+    return DRIVE.fullmatch(name) is not None and not known
 
 
 def chosen(

@@ -43,7 +43,9 @@ def test_columns_are_drives_and_words_in_rad_and_degrees() -> None:
 
 def test_a_simulated_trajectory_is_a_sample() -> None:
     """Its channels are taken and not used."""
-    sample = InlineSample.parse({**EXAMPLE_SAMPLE, "p_rad_s": MOVED, "tip_left_z_m": MOVED})
+    sample = InlineSample.parse(
+        {**EXAMPLE_SAMPLE, "p_rad_s": MOVED, "alpha_rad": MOVED, "nz": MOVED, "tip_z_left_wing_m": MOVED}
+    )
     assert list(sample.drives) == ["sweep_left", "sweep_right"]
 
 

@@ -40,7 +40,7 @@ BAD_FIELDS = [
     ("/model", {"model_id": "model_none"}, "/model/model_id", "model_not_found", "GET /models"),
     ("/model/parameters/links_per_wing", 4, "/model/parameters/division", "wrong_shape", "result"),
     ("/model/step_s", 0.02, None, "less_than_equal", "at most 0.01"),
-    ("/model/kind", "equivalent", None, "unknown_field", "Leave it out"),
+    ("/model/kind", "equivalent", None, "unknown_field", "another object"),
 ]
 
 

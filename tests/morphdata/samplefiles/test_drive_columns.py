@@ -216,6 +216,8 @@ def test_a_wide_logger_file_gives_no_more_than_there_can_be_drives(tmp_path: Pat
         ("time_ms", None),
         ("2nd", None),
         ("tip_left_z", None),
+        ("alpha_deg", None),
+        ("hinge_torque_fold_left", None),
     ],
 )
 def test_titles_that_could_be_drives(title: str, meant: tuple[str, float | None] | None) -> None:
