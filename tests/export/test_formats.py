@@ -161,7 +161,7 @@ def test_the_reference_trim_is_where_a_held_flight_begins() -> None:
     chain, batch = model()
     saved = ModelFile.parse(json.loads(written("json")))
     flown = simulate(
-        saved.aircraft, saved.flight, [Hold()] * 3, model=batch, duration_s=0.1, lattice=Lattice(**COARSE),
+        saved.aircraft, saved.flight, {"sweep": Hold()}, model=batch, duration_s=0.1, lattice=Lattice(**COARSE),
         step_s=0.005,
     )  # fmt: skip
     trim = npz()["trim"]
