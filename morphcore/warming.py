@@ -23,6 +23,11 @@ def warm_up(threads: int | None = None) -> None:
 
     Call it in the process that computes (never in the parent of forked workers), once. The kernels of hinge
     torques and beams, which few jobs need, are left to `warm_up_further`.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Threads of the whole process; by default one for each core.
     """
     if threads is not None:
         use_threads(threads)

@@ -291,9 +291,25 @@ class Aircraft(Document):
 def load_aircraft(path: str | Path) -> Aircraft:
     """Read an aircraft from its JSON file.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Aircraft
+        The document.
+
     Raises
     ------
     InvalidInput
         Naming every fault, with pointers that begin with ``/aircraft``.
+
+    Examples
+    --------
+    >>> from morphcore import load_aircraft
+    >>> sorted(load_aircraft("examples/aircraft.json").drives)
+    ['sweep_left', 'sweep_right']
     """
     return Aircraft.load(path, "/aircraft")

@@ -86,9 +86,25 @@ class Flight(Document):
 def load_flight(path: str | Path) -> Flight:
     """Read a flight condition from its JSON file.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Flight
+        The document.
+
     Raises
     ------
     InvalidInput
         Naming every fault, with pointers that begin with ``/flight``.
+
+    Examples
+    --------
+    >>> from morphcore import load_flight
+    >>> load_flight("examples/flight.json").density_kg_m3
+    1.225
     """
     return Flight.load(path, "/flight")

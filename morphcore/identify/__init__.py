@@ -42,13 +42,46 @@ def identify(
 
     Parameters
     ----------
-    aircraft, flight : the aircraft and its flight condition.
-    samples : flights; those with role "held_out" are not fitted but reported.
-    links_per_wing, seed : the commonest choices; ``model`` and ``search`` replace them where given.
+    aircraft : Aircraft
+        The aircraft.
+    flight : Flight
+        Its flight condition.
+    samples : sequence of Trajectory
+        Sample flights, angles in rad; those with role "held_out" are reported, not fitted.
+    links_per_wing : int
+        Links per wing; without effect where ``model`` is given.
+    seed : int
+        Seed of the search; without effect where ``search`` is given.
+    model : EquivalentModel, optional
+        The model whose parameters are searched: links, bounds, lattice, time step.
+    search : IdentifySearch, optional
+        Method and effort of the search.
+
+    Returns
+    -------
+    IdentifyResult
+        Parameters in SI units, the fit to each sample, uncertainty and warnings.
 
     Raises
     ------
-    InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
+    InvalidInput
+        The samples or settings make no sense.
+    NotFlyable
+        No model was found that flies the samples.
+
+    Examples
+    --------
+    >>> from morphcore import identify, load_aircraft, load_flight, load_trajectory
+    >>> from morphdata.identify import EquivalentModel, IdentifySearch
+    >>> result = identify(
+    ...     load_aircraft("examples/aircraft.json"),
+    ...     load_flight("examples/flight.json"),
+    ...     [load_trajectory("examples/train_rate_0.8.csv")],
+    ...     model=EquivalentModel(links_per_wing=1, lattice={"chordwise": 1, "spanwise": 4}, step_s=0.01),
+    ...     search=IdentifySearch(method="least_squares", generations=1),
+    ... )
+    >>> result.parameters["ac_offset_m"].shape
+    (1,)
     """
     run = Identification(
         Aircraft.of(aircraft),
@@ -66,9 +99,30 @@ def identify(
 def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
     """The identification that a request (the body of ``POST /identify``) asks for.
 
+    Parameters
+    ----------
+    request : IdentifyRequest
+        The request; its samples are inline.
+    threads : int, optional
+        Threads of the whole process; by default one for each core.
+
+    Returns
+    -------
+    Identification
+        The problem, of which nothing is flown yet.
+
     Raises
     ------
-    InvalidInput : it refers to something by an id, which only a service knows.
+    InvalidInput
+        It refers to something by an id, which only a service knows.
+
+    Examples
+    --------
+    >>> from morphcore import identification_from_request
+    >>> from morphdata.identify import EXAMPLE_REQUEST, IdentifyRequest
+    >>> run = identification_from_request(IdentifyRequest.parse(EXAMPLE_REQUEST))
+    >>> run.model.links_per_wing
+    3
     """
     if threads is not None:
         use_threads(threads)

@@ -52,9 +52,25 @@ class Identification:
 
     It is the problem that the search methods of `morphcore.search` work on, and the iterator of their steps.
 
+    Parameters
+    ----------
+    aircraft : morphcore.geometry.aircraft.Aircraft
+        The aircraft as the numerics take it, `Aircraft.of` a document.
+    flight : morphcore.geometry.aircraft.Flight
+        The flight condition, `Flight.of` a document.
+    samples : sequence of Trajectory
+        Sample flights, angles in rad; one at least has the role "train".
+    model : EquivalentModel, optional
+        The model whose parameters are searched.
+    search : SearchSettings, optional
+        Method and effort of the search.
+    clock : callable
+        Wall time, s.
+
     Raises
     ------
-    InvalidInput : no sample to train on, two samples of one name, or a setting that makes no sense.
+    InvalidInput
+        No sample to train on, two samples of one name, or a setting that makes no sense.
     """
 
     def __init__(

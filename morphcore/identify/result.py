@@ -30,10 +30,28 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class IdentifyResult(Shown):
-    """An identified equivalent model (``parameters``, a batch of one) with its proof.
+    """An identified equivalent model with its proof.
 
-    ``settings`` : as asked for; step and corrections that were left to the search are filled in.
-    ``warnings`` : what the method does not answer for. ``at_bound`` : parameters that ended at a bound.
+    Attributes
+    ----------
+    model : ChainModel
+        Topology and lattice.
+    parameters : ParameterBatch
+        The identified parameters, SI units: a batch of one.
+    fits : tuple of SampleFit
+        How well each sample is met.
+    uncertainty : Uncertainty or None
+        How well the samples determine the parameters; None where nothing was searched, or nothing flies.
+    search : dict
+        Method, effort and history of the search.
+    cost : dict of str to float or None
+        Wall times of single flights, s.
+    settings : EquivalentModel
+        As requested; step and corrections that were left to the search are filled in.
+    warnings : tuple of ResultWarning
+        What the method does not answer for.
+    at_bound : tuple of str
+        Parameters that ended at a bound of the search.
     """
 
     model: ChainModel

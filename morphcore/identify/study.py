@@ -255,13 +255,37 @@ def study(
 
     Parameters
     ----------
-    aircraft, flight : the aircraft and its flight condition.
-    samples : flights; those with role "held_out" are not fitted, and decide what is recommended.
-    links, model, search : see `Study`.
+    aircraft : Aircraft
+        The aircraft.
+    flight : Flight
+        Its flight condition.
+    samples : sequence of Trajectory
+        Sample flights, angles in rad; those with role "held_out" are not fitted, and decide what is
+        recommended.
+    links : sequence of int
+        Numbers of links per wing.
+    model : SoughtModel, optional
+        What the models have in common: bounds, lattice, time step.
+    search : Search, optional
+        Method and effort of each search.
+
+    Returns
+    -------
+    StudyResult
+        One row for each number of links, and the one that is recommended.
 
     Raises
     ------
-    InvalidInput : the samples or settings make no sense. NotFlyable : no model flies the samples.
+    InvalidInput
+        The samples or settings make no sense.
+    NotFlyable
+        No model was found that flies the samples.
+
+    Examples
+    --------
+    >>> result = study(aircraft, flight, samples, links=(1, 2, 3))  # doctest: +SKIP
+    >>> result.recommended.links_per_wing  # doctest: +SKIP
+    2
     """
     run = Study(
         Aircraft.of(aircraft),

@@ -48,16 +48,44 @@ def optimise_schedule(
 
     Parameters
     ----------
-    aircraft, flight : the aircraft and its flight condition.
-    model : parameters of one equivalent model (an identification's result, ``parameters_from_document``,
-        ``physical_guess``).
-    morph, limits, weights, search : what is wanted, see there. verify : fly constant rate, rigid optimum and
-        optimum in the flexible model too ("flexible", minutes), or not ("none").
+    aircraft : Aircraft
+        The aircraft.
+    flight : Flight
+        Its flight condition.
+    model : ParameterBatch
+        Parameters of one equivalent model: those of an identification's result, ``parameters_from_document``
+        or ``physical_guess``.
+    morph : Morph
+        Drive, angles (rad) and duration (s) of the morph.
+    limits : Limits, optional
+        Limits of the drive's rate (rad/s), acceleration (rad/s^2) and torque (N m).
+    weights : Weights, optional
+        Weights of the goals.
+    search : ScheduleSearch, optional
+        Effort of the search.
+    verify : {"flexible", "none"}
+        Whether constant rate, rigid optimum and optimum are flown in the flexible model too, which takes
+        minutes.
+    lattice : Lattice
+        Panels of each surface and core of their vortices.
+
+    Returns
+    -------
+    ScheduleResult
+        The schedule, and how far it and those it is compared with disturb the attitude, rad^2.
 
     Raises
     ------
-    InvalidInput : no schedule keeps the limits, or a setting makes no sense. TrimNotFound : a model cannot be
-    trimmed.
+    InvalidInput
+        No schedule keeps the limits, or a setting makes no sense.
+    TrimNotFound
+        A model cannot be trimmed.
+
+    Examples
+    --------
+    >>> from morphdata.optimize import Morph
+    >>> morph = Morph(final_rad=0.5, duration_s=1.0, knots=3)
+    >>> best = optimise_schedule(aircraft, flight, result.parameters, morph=morph)  # doctest: +SKIP
     """
     run = ScheduleOptimisation(
         Aircraft.of(aircraft),

@@ -53,13 +53,21 @@ ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
 class Simulation(Shown):
     """A flown flight.
 
-    trajectory : attitude and drives (rad) over time; in ``extra`` the columns of the channels that were
-    requested, by default p, q, r (rad/s, in B), vx, vy, vz (m/s) and x, y, z (m) of the reference point in N,
-    tip_left_z and tip_right_z (m, below the wing's root along z of B).
-    trim : the start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none
-    of the flexible model).
-    step_s : the longest time step that was allowed, s. warnings : what the method does not answer for.
-    start_tips_z : by side, the tip of its first hinged surface at the start, m below its root.
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Attitude and drives (rad) over time; in ``extra`` the columns of the channels that were requested, by
+        default p, q, r (rad/s, in B), vx, vy, vz (m/s) and x, y, z (m) of the reference point in N,
+        tip_left_z and tip_right_z (m, below the wing's root along z of B).
+    trim : Trim
+        The start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none of
+        the flexible model).
+    step_s : float
+        The longest time step that was allowed, s.
+    warnings : tuple of ResultWarning
+        What the method does not answer for.
+    start_tips_z : mapping of str to float
+        By side, the tip of its first hinged surface at the start, m below its root.
     """
 
     trajectory: Trajectory
@@ -114,30 +122,68 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
 
     Parameters
     ----------
-    aircraft, flight : the aircraft and its flight condition.
-    schedules : what the drives do, by their names (``{"sweep_left": ..., "fold": ...}``), where a word moves
-        both sides and ``both``, ``left`` and ``right`` are understood if no other drive could be meant; a
-        document of such; or a sample flight whose measured angles are followed. Other drives hold their
-        hinges' ``angle_rad``.
-    model : "rigid", "flexible", or the parameters of one equivalent model (`parameters_from_document`,
-        `physical_guess`).
-    duration_s : s from time zero; of a sample flight, its own duration from its first time is the default.
-    output_step_s : s between the rows of the trajectory. step_s : longest time step, s; None: 1 ms of the
-        flexible model, of the others the longest of `step_choice.CANDIDATES_S` that holds the attitude to
-        `step_choice.TOLERANCE_RAD` in this flight's smooth air.
-    start : "trim" for straight level flight of this model, "given" for the flight's measured start.
-    environment : gust and turbulence on top of the flight's wind. rng : source of the turbulence.
-    lattice : panels of each surface and core of their vortices.
-    elements : of each flexible surface, in the flexible model.
-    channels : names of ``morphdata.channels.CHANNELS``: the columns of ``trajectory.extra``, conventions in
+    aircraft : Aircraft
+        The aircraft.
+    flight : Flight
+        Its flight condition.
+    schedules : mapping of str to schedule, Schedules or Trajectory
+        What the drives do, by their names (``{"sweep_left": ..., "fold": ...}``), where a word moves both
+        sides and ``both``, ``left`` and ``right`` are understood if no other drive could be meant; a document
+        of such; or a sample flight whose measured angles are followed. Other drives hold their hinges'
+        ``angle_rad``.
+    model : {"rigid", "flexible"} or ParameterBatch
+        The model that flies; a batch holds the parameters of one equivalent model
+        (`parameters_from_document`, `physical_guess`).
+    duration_s : float, optional
+        Time from zero, s; of a sample flight, its own duration from its first time is the default.
+    output_step_s : float
+        Time between the rows of the trajectory, s.
+    step_s : float, optional
+        Longest time step, s. None: 1 ms of the flexible model, of the others the longest of
+        `step_choice.CANDIDATES_S` that holds the attitude to `step_choice.TOLERANCE_RAD` in this flight's
+        smooth air.
+    start : {"trim", "given"}
+        Straight level flight of this model, or the flight's measured start.
+    environment : Environment, optional
+        Gust and turbulence on top of the flight's wind.
+    rng : numpy.random.Generator, optional
+        Source of the turbulence.
+    lattice : Lattice
+        Panels of each surface and core of their vortices.
+    elements : int
+        Beam elements of each flexible surface, in the flexible model.
+    channels : sequence of str, optional
+        Names of ``morphdata.channels.CHANNELS``: the columns of ``trajectory.extra``, conventions in
         `morphcore.simulate.channels`. None: those of the example flights.
-    stop : asked several times a second; True raises Interrupted.
+    stop : callable, optional
+        Called several times a second; True raises Interrupted.
+
+    Returns
+    -------
+    Simulation
+        The flight, its trim and warnings.
 
     Raises
     ------
-    InvalidInput : a schedule leaves its hinge's range or moves no drive, a channel is unknown or not of this
-        model, or an argument makes no sense.
-    TrimNotFound : there is no steady level flight. FlightDiverged : the flight left the model's domain.
+    InvalidInput
+        A schedule leaves its hinge's range or moves no drive, a channel is unknown or not of this model, or
+        an argument makes no sense.
+    TrimNotFound
+        There is no steady level flight.
+    FlightDiverged
+        The flight left the model's domain.
+
+    Examples
+    --------
+    >>> from morphcore import load_aircraft, load_flight, load_trajectory, simulate
+    >>> flown = simulate(
+    ...     load_aircraft("examples/aircraft.json"),
+    ...     load_flight("examples/flight.json"),
+    ...     load_trajectory("examples/train_rate_0.8.csv"),
+    ...     step_s=0.01,
+    ... )
+    >>> flown.trajectory.euler.shape
+    (175, 3)
     """
     steps = flight_steps(
         Aircraft.of(aircraft), Flight.of(flight), schedules, model=model, duration_s=duration_s,

@@ -26,12 +26,30 @@ ANGLES = ("phi", "theta", "psi")
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Shown):
-    """One flight: ``time_s`` (k,) rising, Euler angles (k,) in rad; other columns in ``extra``.
+    """One flight: angles of the drives and attitudes over time.
 
-    ``drives`` : angle (k,) in rad of each drive that moves, by its name (``sweep_left``), or by its word
-    where both sides move alike (``sweep``). ``of_file`` : they are all columns of a file that could be
-    drives, in which case those that the aircraft does not have are left alone; ``unreadable`` tells what is
-    wrong with further ones, by their names.
+    Attributes
+    ----------
+    name : str
+        Its name, unique among the samples of an identification.
+    time_s : ndarray, shape (k,)
+        Rising times, s.
+    drives : mapping of str to ndarray, shape (k,)
+        Angle of each drive that moves, rad, by its name (``sweep_left``), or by its word where both sides
+        move alike (``sweep``).
+    phi, theta, psi : ndarray, shape (k,)
+        Euler angles from N to B (z-y-x), rad.
+    role : {"train", "held_out"}
+        Whether an identification fits it, or only reports it.
+    weight : float
+        Weight of its errors in a fit.
+    extra : dict of str to ndarray, shape (k,)
+        Other columns.
+    of_file : bool
+        Whether ``drives`` are all columns of a file that could be drives, in which case those that the
+        aircraft does not have are left out.
+    unreadable : mapping of str to str
+        What is wrong with further columns, by their names.
     """
 
     name: str
@@ -103,10 +121,30 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
     object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    role : {"train", "held_out"}
+        Whether an identification fits the flight, or only reports it.
+
+    Returns
+    -------
+    Trajectory
+        The flight, named after the file.
+
     Raises
     ------
-    InvalidInput : the file cannot be read, a column is missing or holds something that is not a finite
-        number, time does not increase, the flight is longer than 600 s, or an angle is no angle in rad.
+    InvalidInput
+        The file cannot be read, a column is missing or holds something that is not a finite number, time does
+        not increase, the flight is longer than 600 s, or an angle is no angle in rad.
+
+    Examples
+    --------
+    >>> from morphcore import load_trajectory
+    >>> sample = load_trajectory("examples/train_rate_0.8.csv")
+    >>> sample.drive_order, round(sample.duration_s, 2)
+    (('sweep_left', 'sweep_right'), 1.74)
     """
     path = Path(path)
     columns = read_flight(path)

@@ -143,7 +143,7 @@ def test_the_command_knows_it(house: Document, tmp_path: Path) -> None:
         out = tmp_path / "flown.csv"
         ended = run(*words, "--out", out)
         assert ended.exit_code == 0, ended.output
-        rows = list(csv.DictReader(out.open()))
+        rows = list(csv.DictReader(io.StringIO(out.read_text())))
         assert float(rows[-1]["cant_left"]) == pytest.approx(0.4, abs=1e-6)
         assert float(rows[-1]["sweep_left"]) == 0.0
     ended = run("--schedule", tmp_path / "other.csv")

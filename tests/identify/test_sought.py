@@ -79,6 +79,6 @@ def test_the_result_names_what_was_sought() -> None:
         search=IdentifySearch(generations=2),
     )
     document = found.to_document()
-    assert document["search"]["aero_coefficients"] == list(WITHOUT_DRAG)
+    assert document["search"]["aero_coefficients"] == [*WITHOUT_DRAG, "centre_shift_m"]  # its former name
     assert document["uncertainty"]["coordinates"] == list(WITHOUT_DRAG)
     assert document["model"]["aero"]["profile_drag"] == 0.01

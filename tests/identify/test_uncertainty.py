@@ -36,7 +36,8 @@ def test_an_unseen_parameter_is_reported() -> None:
     blind = space.names.index("damping_nms_rad.joint_1.edgewise")
     matrix[:, blind] = 0.0
     (direction,) = uncertainty(space, space.guess, noise, matrix).to_document()["unidentifiable"]
-    assert set(direction["direction"]) == {"damping_nms_rad.joint_1.edgewise"}
+    former = "damping_nms_rad.joint_1.lag"  # written as well throughout version 0.2
+    assert set(direction["direction"]) == {"damping_nms_rad.joint_1.edgewise", former}
 
 
 def test_standard_errors_cover_the_truth() -> None:
@@ -133,7 +134,10 @@ def test_a_parameter_at_its_bound_is_open_there() -> None:
     )
     assert document["interval_95"]["division.1"][1] is None
     assert document["interval_95"]["stiffness_nm_rad.joint_1.edgewise"] == [None, None]
-    assert document["undetermined"] == ["stiffness_nm_rad.joint_1.edgewise"]
+    assert document["undetermined"] == [
+        "stiffness_nm_rad.joint_1.edgewise",
+        "stiffness_nm_rad.joint_1.lag",  # its former name
+    ]
 
 
 def test_what_is_not_searched_has_no_interval() -> None:

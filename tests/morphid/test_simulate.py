@@ -67,6 +67,28 @@ def test_a_sample_is_flown_to_its_end(tmp_path: Path) -> None:
     assert (tmp_path / "plots" / "flight.svg").is_file()
 
 
+def test_wings_sweep_and_fold_by_a_table_in_degrees(tmp_path: Path) -> None:
+    """The example with two hinges: one column sweeps both wings, two fold them differently."""
+    out, folder = tmp_path / "flight.csv", EXAMPLES / "two_hinges"
+    words = (
+        "--flight",
+        EXAMPLES / "flight.json",
+        "--schedule",
+        folder / "schedule.csv",
+        *COARSE,
+        "--out",
+        out,
+    )
+    ended = RUNNER.invoke(app, ["simulate", "--aircraft", *map(str, (folder / "aircraft.json", *words))])
+    assert ended.exit_code == Exit.OK, ended.output
+    flown = load_trajectory(out)
+    degrees = {"sweep_left": 20.0, "sweep_right": 20.0, "fold_left": 15.0, "fold_right": 12.0}
+    assert {name: float(np.rad2deg(flown.drives[name][-1])) for name in flown.drives} == pytest.approx(
+        degrees
+    )
+    assert np.abs(flown.phi).max() > 1e-4  # unlike folds roll
+
+
 def test_the_flexible_model_flies_too() -> None:
     """`--model flexible` bends: its tips are up before the morph, those of the rigid one are not."""
     tips = {}
