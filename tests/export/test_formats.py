@@ -161,8 +161,8 @@ def test_the_reference_trim_is_where_a_held_flight_begins() -> None:
     chain, batch = model()
     saved = ModelFile.parse(json.loads(written("json")))
     flown = simulate(
-        saved.aircraft, saved.flight, [Hold()] * 3, model=batch, duration_s=0.1, lattice=Lattice(**COARSE),
-        step_s=0.005,
+        saved.aircraft, saved.flight, {"sweep": Hold()}, model=batch, duration_s=0.1,
+        lattice=Lattice(**COARSE), step_s=0.005,
     )  # fmt: skip
     trim = npz()["trim"]
     assert trim["alpha_rad"] == pytest.approx(flown.trim.alpha[0], abs=1e-10)

@@ -241,9 +241,10 @@ BEYOND = ConstantRate(0.0, 1.4, 0.8)
 @pytest.mark.parametrize(
     ("schedules", "arguments", "pointer"),
     [
-        ([BEYOND, Hold()], {}, "/schedules/0"),
-        ([Hold()], {}, "/schedules"),
-        ({"left": Hold()}, {}, "/schedules"),
+        ([BEYOND, Hold()], {}, "/schedules/sweep_right"),
+        ((Hold(), Hold()), {}, "/schedules"),  # of what?
+        ({"fold": Hold()}, {}, "/schedules/fold"),
+        ({"sweep": Hold(), "left": Hold()}, {}, "/schedules/left"),
         ([Hold(), Hold()], {"duration_s": None}, "/duration_s"),
         ([Hold(), Hold()], {"duration_s": float("nan")}, "/duration_s"),
         ([Hold(), Hold()], {"duration_s": 0.015}, "/output_step_s"),

@@ -75,7 +75,7 @@ def test_the_document_has_the_names_of_the_api() -> None:
     result = run.result()
     document = result.to_document()
     assert json.loads(json.dumps(document, allow_nan=False)) == document
-    assert set(document) == {"model", "trim", "trajectory", "summary", "cost", "warnings"}
+    assert set(document) == {"model", "trim", "trajectory", "drives", "summary", "cost", "warnings"}
     columns = document["trajectory"]
     for name in ("p_rad_s", "q_rad_s", "r_rad_s", "vx_m_s", "z_m", "tip_left_z_m", "tip_right_z_m"):
         assert len(columns[name]) == len(columns["time_s"]) == 51
@@ -193,7 +193,7 @@ def test_what_cannot_fly_says_so() -> None:
         ({"model": {"kind": "rigid", "lattice": {"chordwise": 99}}}, "/model/lattice/chordwise"),
         ({"model": {"kind": "rigid", "step_s": 1.0}}, "/model/step_s"),
         ({"model": {"kind": "rigid", "start": "anywhere"}}, "/model/start"),
-        ({"schedules": {"left": {"kind": "hold"}}}, "/schedules/right"),
+        ({"schedules": {"fold": {"kind": "hold"}}}, "/schedules/fold"),
         ({"schedules": {"both": {"kind": "hold", "angle_rad": 1.5}}}, "/schedules/both/angle_rad"),
         (
             {"schedules": {"left": {"kind": "hold"}, "right": MORPH | {"final_rad": 1.4}}},
