@@ -137,7 +137,7 @@ def test_no_row_ends_before_its_ends_are_known(database: Database, table: Leased
     with database.write() as session:
         held = claim(session, table)
     assert held is not None
-    with pytest.raises(RuntimeError, match="subscribed"), database.write() as session:
+    with pytest.raises(RuntimeError, match="no subscribers"), database.write() as session:
         table.settle(session, held, note=Note("finished"), status=DONE)
     assert row(database) == (HELD, 1, 1)
 

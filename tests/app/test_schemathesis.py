@@ -354,7 +354,7 @@ def test_every_field_that_names_a_thing_is_tried(operations: list[Operation]) ->
         name
         for title, schema in document["components"]["schemas"].items()
         for name, of in schema.get("properties", {}).items()
-        if pattern in json.dumps(of)
+        if pattern in json.dumps(of) and title != "Origin"  # an exported file carries it, nobody looks it up
     }
     assert found == {"trajectory_id", "model_id", "job_id"}
 

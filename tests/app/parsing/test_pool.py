@@ -106,7 +106,7 @@ def test_frames_that_lie_are_refused() -> None:
 def test_a_flight_is_read(file_of: FileOf) -> None:
     """Columns by their standard names."""
     columns = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
-    assert columns["t"] == [0.0, 1.0]
+    assert columns.values["t"] == [0.0, 1.0]
 
 
 def test_faults_come_with_their_place(file_of: FileOf) -> None:
@@ -174,9 +174,10 @@ def test_no_secret_reaches_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: Fi
         monkeypatch,
         "import os, sys; from app.parsing.frame import pack\n"
         "seen = [*os.environ, *os.environ.values(), *os.listdir('/proc/self/fd')]\n"
-        "sys.stdout.buffer.write(pack({'columns': {'seen': seen}}))",
+        "sys.stdout.buffer.write(pack({'columns': {'seen': seen}, 'candidates': {}, 'unreadable': {}}))",
     )
-    seen: list[Any] = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))["seen"]
+    answer: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
+    seen = answer.values["seen"]
     assert not any("secret" in word or word.startswith("MORPHID") for word in seen)
     assert {word for word in seen if word.isdigit() and len(word) < 4} <= {"0", "1", "2", "3"}
 
@@ -192,9 +193,10 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
         " ('DATA', 'AS', 'CPU', 'FSIZE', 'NOFILE', 'NPROC', 'CORE')}\n"
         "try: bytearray(2**30); found['got'] = True\n"
         "except MemoryError: found['got'] = False\n"
-        "sys.stdout.buffer.write(pack({'columns': found}))",
+        "sys.stdout.buffer.write(pack({'columns': found, 'candidates': {}, 'unreadable': {}}))",
     )
-    found: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
+    answer: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
+    found = answer.values
     assert found["DATA"] == [Limits().memory_bytes] * 2
     assert found["CPU"] == [Limits().cpu_s] * 2
     assert found["FSIZE"] == found["NPROC"] == found["CORE"] == [0, 0]
