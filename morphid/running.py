@@ -181,7 +181,7 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None) -> Document:
+def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None = None) -> Document:
     """Read a sample file and give it as it stands inline in a request.
 
     Parameters

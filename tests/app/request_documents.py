@@ -97,13 +97,7 @@ RESULT: Document = {
         "division": [0.5, 0.5],
         "stiffness_nm_rad": [[1.0, 2.0, 3.0]],
         "damping_nms_rad": [[0.1, 0.2, 0.3]],
-        "aero": {
-            "lift_factor": 1.0,
-            "ac_offset_m": 0.0,
-            "profile_drag": 0.01,
-            "lag_s": 0.0,
-            "centre_shift_m": 0.0,
-        },
+        "aero": {"lift_factor": 1.0, "ac_offset_m": 0.0, "profile_drag": 0.01, "lag_s": 0.0},
     },
     "fit": [
         {
@@ -189,3 +183,8 @@ OPTIMIZE_RESULT: Document = {
     "reduction_percent": 25.0,
     "search": {"method": "hybrid", "seed": 1},
 }
+
+
+def in_both_spellings(model: Document) -> Document:
+    """A model as the service returns it: renamed corrections under their old names, too."""
+    return {**model, "aero": {**model["aero"], "centre_shift_m": model["aero"]["ac_offset_m"]}}

@@ -69,7 +69,8 @@ def cells(text: str) -> list[str]:
 def test_no_table_of_ours_holds_a_formula(tmp_path: Path, name: str) -> None:
     """Column titles of a measured flight, names of schedules and models: harmless in every file we write."""
     t = np.array([0.0, 0.1, 0.2, 0.3])
-    flown = Trajectory("x", t, {"sweep_left": -t, "sweep_right": t}, -t, t, -t, extra={name: -t})
+    drives = {"sweep_left": -t, "sweep_right": t}
+    flown = Trajectory("x", t, drives, phi=-t, theta=t, psi=-t, extra={name: -t})
     write_trajectory_csv(flown, tmp_path / "flight.csv")
     angles = {f"{angle}_rad": [-1.0, math.nan, None, 1.0] for angle in ("phi", "theta", "psi")}
     curves = {
