@@ -101,6 +101,12 @@ def _growth(figures: Figures) -> Iterator[Line]:
         yield Line(what, f"{1e3 * s:.3g} ms")
 
 
+def _hinges(figures: Figures) -> Iterator[Line]:
+    for number, ratio in figures["hinges"]["ratio_to_one_hinge"].items():
+        if number != "1":
+            yield Line(f"the swarm on {number} hinges a wing over the swarm on one", f"{ratio:.3g} times")
+
+
 def _operations(figures: Figures) -> Iterator[Line]:
     for sweep, by_links in figures["operations"].items():
         for links in sorted(by_links, key=int):
@@ -209,6 +215,7 @@ LINES: Mapping[str, Callable[[Figures], Iterator[Line]]] = {
     "single_flight": _single,
     "flexible": _flexible,
     "growth_with_links": _growth,
+    "hinges": _hinges,
     "operations": _operations,
     "search": _search,
     "mujoco": _mujoco,
