@@ -91,13 +91,10 @@ def _start_children(
         _expect(supervisor, supervisor.start(broker.spec), broker.answers, BROKER_WITHIN_S)
     if supervisor.stopping:
         return
-    command = _python("app.http.server", "--host", settings.host, "--port", str(port))
-    api = supervisor.start(ChildSpec("api", command, environment))
+    api = supervisor.start(api_process(environment, settings.host, port))
     # the worker loads while the API does; a wake-up that comes early waits in the queue
-    command = _python("worker.process", "worker", "--concurrency", str(settings.workers))
-    supervisor.start(ChildSpec("worker", command, environment, stop_within_s=WORKER_STOP_S))
-    # not inside the worker: nobody would notice its death, and no lost job would be found any more
-    supervisor.start(ChildSpec("beat", _python("worker.process", "beat"), environment))
+    supervisor.start(worker_process(environment, settings.workers))
+    supervisor.start(beat_process(environment))
     _expect(supervisor, api, lambda: _alive(settings.host, port), API_WITHIN_S)
 
 
@@ -110,6 +107,22 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
         code=Exit.ENVIRONMENT,
         hint="repair what the log says and start again",
     )
+
+
+def api_process(environment: dict[str, str], host: str, port: int) -> ChildSpec:
+    """The API on a port."""
+    return ChildSpec("api", _python("app.http.server", "--host", host, "--port", str(port)), environment)
+
+
+def worker_process(environment: dict[str, str], slots: int) -> ChildSpec:
+    """A worker for so many jobs at once."""
+    command = _python("worker.process", "worker", "--concurrency", str(slots))
+    return ChildSpec("worker", command, environment, stop_within_s=WORKER_STOP_S)
+
+
+def beat_process(environment: dict[str, str]) -> ChildSpec:
+    """The beat: not inside the worker, or nobody would notice its death and find lost jobs any more."""
+    return ChildSpec("beat", _python("worker.process", "beat"), environment)
 
 
 def _python(module: str, *arguments: str) -> list[str]:

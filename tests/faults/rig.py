@@ -88,7 +88,7 @@ class Rig:
     ) -> Child:
         """Start a worker as `morphid serve` does, its operations walks, and the beat beside the first one."""
         told = {**self._environment, "MORPHID_WORKERS": str(slots), **(environment or {})}
-        child = self._start(serve._worker(told, slots), name, "--hostname", f"{name}@%h")
+        child = self._start(serve.worker_process(told, slots), name, "--hostname", f"{name}@%h")
         if self.worker is None:
             self.worker = child
             self.start_beat()
@@ -96,7 +96,7 @@ class Rig:
 
     def start_beat(self, name: str = "beat") -> Child:
         """Start a beat as `morphid serve` does: it has the reaper come."""
-        return self._start(serve._beat(self._environment), name)
+        return self._start(serve.beat_process(self._environment), name)
 
     def _start(self, spec: ChildSpec, name: str, *more: str) -> Child:
         command = [*(OURS.get(word, word) for word in spec.command), *more]
@@ -106,7 +106,7 @@ class Rig:
         """Start the API as `morphid serve` does, and wait until it answers."""
         port = free_port(0)
         told = {**self._environment, "MORPHID_PORT": str(port), **(environment or {})}
-        child = self._start(serve._api(told, LOOPBACK, port), "api")
+        child = self._start(serve.api_process(told, LOOPBACK, port), "api")
         self.url = f"http://{LOOPBACK}:{port}"
         assert self.supervisor.wait_until(child, self.api_answers, 30.0), child.last_words(40)
         return child

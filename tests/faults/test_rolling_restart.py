@@ -87,7 +87,7 @@ class Load(threading.Thread):
 def start_api(rig: Rig, name: str) -> str:
     """Start one more API process beside the others; give its address once it answers."""
     port = free_port(0)
-    spec = serve._api({**rig._environment, "MORPHID_PORT": str(port)}, LOOPBACK, port)
+    spec = serve.api_process({**rig._environment, "MORPHID_PORT": str(port)}, LOOPBACK, port)
     child = rig.supervisor.start(replaced(spec, name=name))
     rig.url = f"http://{LOOPBACK}:{port}"
     assert rig.supervisor.wait_until(child, rig.api_answers, 30.0), child.last_words(40)
