@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field
 
 from morphdata.base import Document, Length, Position, Text
-from morphdata.drives import MAX_HINGES, Drive, Hinge, Side, drive_faults, drives_of
+from morphdata.drives import MAX_HINGES, Drive, Hinge, Side, drive_faults, drive_name, drives_of
 from morphdata.faults import Fault
 
 MAX_SURFACES = 16
@@ -271,7 +271,11 @@ class Aircraft(Document):
     @property
     def drives(self) -> dict[str, Drive]:
         """What can be moved, by name."""
-        return drives_of(self.surfaces)
+        return drives_of(
+            (drive_name(hinge, surface.side), surface, (number, place), hinge)
+            for number, surface in enumerate(self.surfaces)
+            for place, hinge in enumerate(surface.all_hinges)
+        )
 
     def faults(self) -> Iterator[Fault]:
         """No two surfaces have one name, and each drive turns like hinges."""

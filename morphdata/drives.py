@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import Field
@@ -105,8 +105,8 @@ class Hinge(Document):
             )
 
 
-class Hinged(Protocol):
-    """What a drive knows of a surface."""
+class OfSide(Protocol):
+    """A surface, as far as the names of drives need it."""
 
     @property
     def name(self) -> str:
@@ -115,6 +115,26 @@ class Hinged(Protocol):
     @property
     def side(self) -> Any:
         """Right or left."""
+
+
+class Turned(Protocol):
+    """A hinge, as far as its angle goes: a document, or what the numerics take."""
+
+    @property
+    def min_rad(self) -> float:
+        """Smallest angle."""
+
+    @property
+    def max_rad(self) -> float:
+        """Largest angle."""
+
+    @property
+    def angle_rad(self) -> float:
+        """Held where no history is given."""
+
+
+class Hinged(OfSide, Protocol):
+    """A surface with its hinges."""
 
     @property
     def all_hinges(self) -> Sequence[Hinge]:
@@ -178,24 +198,36 @@ def drive_name(hinge: Hinge, side: str) -> str:
     return word if word.endswith((f"_{SIDES[0]}", f"_{SIDES[1]}")) else f"{word}_{side}"
 
 
-def drives_of(surfaces: Sequence[Hinged]) -> dict[str, Drive]:
-    """Return the drives of an aircraft's surfaces by name, in the order of the hinges."""
+def without_side(name: str) -> str:
+    """Return the word of a drive's name; a name without a side is a word.
+
+    >>> without_side("fold_left"), without_side("fold")
+    ('fold', 'fold')
+    """
+    return next((name.removesuffix(f"_{side}") for side in SIDES if name.endswith(f"_{side}")), name)
+
+
+def drives_of(hinges: Iterable[tuple[str, OfSide, tuple[int, int], Turned]]) -> dict[str, Drive]:
+    """Return the drives that hinges make, by name, in the order of the hinges.
+
+    Parameters
+    ----------
+    hinges : iterable of tuple
+        Of each the name of its drive, its surface, the numbers of both, and what is known of its angle.
+    """
     found: dict[str, Drive] = {}
-    for number, surface in enumerate(surfaces):
-        for place, hinge in enumerate(surface.all_hinges):
-            name = drive_name(hinge, surface.side)
-            word = name.removesuffix(f"_{surface.side}")
-            former = found.get(name, Drive(name, word, surface.side, (), (), -math.inf, math.inf, 0.0))
-            found[name] = Drive(
-                name,
-                word,
-                surface.side,
-                (*former.surfaces, surface.name),
-                (*former.hinges, (number, place)),
-                max(former.low, hinge.min_rad),
-                min(former.high, hinge.max_rad),
-                hinge.angle_rad,
-            )
+    for name, surface, at, hinge in hinges:
+        word = name.removesuffix(f"_{surface.side}")
+        former = found.get(
+            name, Drive(name, word, surface.side, (), (), -math.inf, math.inf, hinge.angle_rad)
+        )
+        found[name] = replace(
+            former,
+            surfaces=(*former.surfaces, surface.name),
+            hinges=(*former.hinges, at),
+            low=max(former.low, hinge.min_rad),
+            high=min(former.high, hinge.max_rad),
+        )
     return found
 
 

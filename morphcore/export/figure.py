@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from morphcore.export.curves import SWEEPS
 from morphcore.stopping import heed
-from morphdata.drives import SIDES
+from morphdata.drives import without_side
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -110,8 +110,9 @@ def drive_panels(columns: Document, drives: Sequence[str] = SWEEPS) -> list[tupl
     pairs: dict[str, dict[str, Array]] = {}
     for name in drives:
         if f"{name}_rad" in columns:
-            side = next((side for side in SIDES if name.endswith(f"_{side}")), "")
-            pairs.setdefault(name.removesuffix(f"_{side}"), {})[side] = series(columns[f"{name}_rad"])
+            word = without_side(name)
+            side = name.removeprefix(word).removeprefix("_")
+            pairs.setdefault(word, {})[side] = series(columns[f"{name}_rad"])
     panels = []
     for word, of_sides in pairs.items():
         angles = list(of_sides.values())

@@ -13,7 +13,7 @@ from morphcore.geometry.hinge import Hinge
 from morphcore.geometry.surface import Surface
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
-from morphdata.drives import Drive
+from morphdata.drives import Drive, drives_of
 from morphdata.flight import Flight as FlightDocument
 
 Array = NDArray[np.float64]
@@ -71,23 +71,11 @@ class Aircraft(Shown):
     @cached_property
     def drives(self) -> dict[str, Drive]:
         """What can be moved, by name, in the order of the hinges."""
-        moved: dict[str, list[tuple[Surface, tuple[int, int], Hinge]]] = {}
-        for number, surface in enumerate(self.surfaces):
-            for place, hinge in enumerate(surface.hinges):
-                moved.setdefault(hinge.drive, []).append((surface, (number, place), hinge))
-        return {
-            name: Drive(
-                name,
-                name.removesuffix(f"_{turned[0][0].side}"),
-                turned[0][0].side,
-                tuple(surface.name for surface, _, _ in turned),
-                tuple(at for _, at, _ in turned),
-                max(hinge.min_rad for _, _, hinge in turned),
-                min(hinge.max_rad for _, _, hinge in turned),
-                turned[0][2].angle_rad,
-            )
-            for name, turned in moved.items()
-        }
+        return drives_of(
+            (hinge.drive, surface, (number, place), hinge)
+            for number, surface in enumerate(self.surfaces)
+            for place, hinge in enumerate(surface.hinges)
+        )
 
     @property
     def flexible_surfaces(self) -> tuple[Surface, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
-from morphdata.drives import SIDES
+from morphdata.drives import without_side
 from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import read_flight
@@ -101,15 +101,15 @@ class Trajectory(Shown):
     def _side(self, side: str) -> Array:
         # a drive's name ends with its side, a word stands for both
         own = [values for name, values in self.drives.items() if name.endswith(f"_{side}")]
-        words = [values for name, values in self.drives.items() if _word(name) == name]
+        words = [values for name, values in self.drives.items() if without_side(name) == name]
         return next(iter([*own, *words]), np.zeros_like(self.time_s))
 
     @property
     def drive_order(self) -> tuple[str, ...]:
         """Names of the drives as tables and pictures have them: left before right of each word."""
         names = list(self.drives)
-        words = list(dict.fromkeys(_word(name) for name in names))
-        return tuple(sorted(names, key=lambda name: (words.index(_word(name)), name)))
+        words = list(dict.fromkeys(without_side(name) for name in names))
+        return tuple(sorted(names, key=lambda name: (words.index(without_side(name)), name)))
 
 
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
@@ -170,13 +170,6 @@ def require_flight(trajectory: Trajectory, pointer: str) -> None:
         raise InvalidInput(
             fault.detail, pointer=f"{pointer}/{called[fault.title or 't']}{row}", hint=fault.hint
         )
-
-
-def _word(name: str) -> str:
-    """The name of a drive without its side."""
-    for side in SIDES:
-        name = name.removesuffix(f"_{side}")
-    return name
 
 
 def _column(values: Sequence[float]) -> Array:
