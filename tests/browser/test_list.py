@@ -100,7 +100,7 @@ def test_every_link_to_help_has_its_place(service: RunningService, page: Page) -
     """A card's link to help opens the part that explains it."""
     page.goto(f"{service.url}/#/jobs/{ended(service, 'simulate', simulate_document(), SIMULATE_RESULT)}")
     page.get_by_role("link", name="Help: Flight").click()
-    page.get_by_role("heading", name="Simulated flight").wait_for(timeout=10_000)
+    page.get_by_role("heading", name="Simulated flight", exact=True).wait_for(timeout=10_000)
     assert page.evaluate("scrollY") > 0
     scripts = "".join(
         service.client.get(f"/static/{name}.js").text for name in ("results", "parameters", "chart")

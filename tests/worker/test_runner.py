@@ -155,8 +155,8 @@ def test_a_stale_worker_writes_nothing(queue: Queue, database: Database, make_ru
 
 def test_heartbeats_keep_a_long_step_alive(queue: Queue, database: Database, make_runner: MakeRunner) -> None:
     """A lease is renewed while one step takes longer than the lease: no reaper takes the job away."""
-    job_id = queue.add(steps=1, pause_s=2.0)
-    runner = make_runner(lease_s=0.8, heartbeat_s=0.2)
+    job_id = queue.add(steps=1, pause_s=4.0)
+    runner = make_runner(lease_s=2.0, heartbeat_s=0.2)
     endings: list[Ending] = []
     thread = threading.Thread(target=lambda: endings.append(runner.run_next()[0]))
     thread.start()
