@@ -429,7 +429,9 @@ class Uncertainty(Result):
     """
 
     method: str | None = Field(
-        default=None, description="`white`: the residuals are taken for independent and of one variance."
+        default=None,
+        description="`coloured`: residuals are correlated in time, scaled by sample and angle, and three "
+        "flights or more are also left out in turn. `white`: independent and of one variance.",
     )
     standard_error: dict[str, float | None] = Field(description="SI units; null where it is not finite.")
     interval_95: dict[str, Interval] = Field(

@@ -238,6 +238,11 @@ class Identification:
         return Box(self.space.lower, self.space.upper)
 
     @property
+    def prior_weight(self) -> float:
+        """What one unit off the physical guess costs in a descent, rad^2."""
+        return PRIOR_RAD**2
+
+    @property
     def flights_each(self) -> int:
         """Flights of one parameter set: one for each sample to fit."""
         return sum(sample.role == "train" for sample in self.samples)

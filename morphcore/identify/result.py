@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.identify.coloured import ColouredNoise, records
 from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.sample_fit import ANGLES, SampleFit
@@ -142,7 +143,17 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             return residuals(run.model, space.decode(points), run.training, start)
 
         residual, jacobian = differences(state.best[None, :], space.upper, errors)
-        certainty = uncertainty(space, state.best, residual[0], jacobian[0])
+        trained = [fit for fit in fits if fit.case.sample.role == "train"]
+        noise = ColouredNoise(
+            records(
+                [fit.case.sample.time_s for fit in trained],
+                residual[0],
+                jacobian[0],
+                [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained],
+            ),
+            run.prior_weight,
+        )
+        certainty = uncertainty(space, state.best, residual[0], jacobian[0], noise)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
@@ -188,6 +199,12 @@ def _attitudes(
     return [
         fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
     ]
+
+
+def _rms(errors: Array) -> float:
+    """Root mean square of the finite ones; 0 where the flight diverged and there is none to compare with."""
+    known = errors[np.all(np.isfinite(errors), axis=1)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
 
 def _flight_time(model: ChainModel, batch: ParameterBatch, case: SampleCase, start: Any) -> float:

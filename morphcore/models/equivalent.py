@@ -23,6 +23,7 @@ from morphcore.models.kernels.layout import (
     joint_rows_of_scratch,
     state_rows,
 )
+from morphcore.models.links import beam_division
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
@@ -296,27 +297,27 @@ def _chain_model(
 def physical_guess(
     model: ChainModel, division: Array | None = None, *, separate_wings: bool = False
 ) -> ParameterBatch:
-    """Parameters from beam and thin-airfoil theory: k = EI / l, c = beta k, neutral corrections, Jones' lag.
+    """Parameters from beam and thin-airfoil theory, with neutral corrections and Jones' lag.
 
-    Every flexible surface has those of its own beam, mirror images share them unless wings are separate.
+    Every flexible surface has those of its own beam, mirror images share them unless wings are separate. For
+    division and stiffness, which stand for the whole beam, see `beam_division` and `joint_stiffness`; damping
+    is proportional, c = beta k.
 
     Parameters
     ----------
     model : ChainModel
     division : ndarray, shape (p, w, n) or (p, 1, n), optional
-        Shares of the span of each set of `ChainModel.sets`, or of all alike; None: one particle of equal
-        links.
+        Shares of the span of each set of `ChainModel.sets`, or of all alike; None: one particle with those
+        of `beam_division`.
     separate_wings : bool
         Whether both surfaces of a mirror pair have a set of their own.
     """
     sets = model.sets(separate_wings=separate_wings)
     n = model.links_per_wing
-    shares = np.full((1, 1, n), 1.0 / n) if division is None else division
+    bent = [model.aircraft.surfaces[group[0]] for group in sets]
+    shares = np.stack([beam_division(surface, n) for surface in bent])[None] if division is None else division
     shares = np.broadcast_to(shares, (shares.shape[0], len(sets), n))
-    cuts = [
-        CutSurface(model.aircraft.surfaces[group[0]], model.flight, shares[:, k])
-        for k, group in enumerate(sets)
-    ]
+    cuts = [CutSurface(surface, model.flight, shares[:, k]) for k, surface in enumerate(bent)]
     reference = CutSurface(model.reference_surface, model.flight, shares[:, 0])
     return ParameterBatch(
         {

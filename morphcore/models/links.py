@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 # exactly
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 MASS_ROWS = 7
+# eight integrate 1 / EI of a wing of taper 0.2 to 1e-6
+BEAM_POINTS, BEAM_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 def link_edges(division: Array, span_m: float) -> Array:
@@ -57,22 +59,73 @@ def link_masses(surface: Surface, edges: Array) -> Array:
     )
 
 
+def beam_division(surface: Surface, links: int) -> Array:
+    """Division (n,) of the chain of n links that stands for the whole beam; the shares sum to one.
+
+    The span is cut into n - 1 equal segments. The joint of each sits where a hinge bends the wing as the
+    segment does: at the centre of its curvature under a moment that falls linearly to the tip, as that of a
+    force at the tip does, or the torque of a uniform load. So Gauss's rule of one point replaces the integral
+    over the segment (see `joint_stiffness`).
+    """
+    if links == 1:
+        return np.ones(1)
+    ends = np.linspace(0.0, surface.span_m, links)
+    stations, curvature = _segment_compliance(surface, ends[None])
+    flap = curvature[0, 0]
+    joints = (flap * stations[0]).sum(-1) / flap.sum(-1)
+    return np.asarray(np.diff(joints, prepend=0.0, append=surface.span_m) / surface.span_m)
+
+
 def joint_stiffness(surface: Surface, edges: Array) -> Array:
     """Beam theory's guess (particles, n - 1, 3) for flap, torsion and edgewise, N m/rad.
 
-    A joint stands for the beam between the centres of its two links: 1/k is the integral of 1/EI (of 1/GJ)
-    over it, EI / l on a uniform beam.
+    Each joint stands for a segment of the beam, and all segments for all of it: the first begins at the root,
+    the last ends at the tip, and the links between two joints are cut as those of `beam_division` are. Under
+    a moment (or torque) that falls linearly to the tip a joint turns by the angle by which its segment bends
+    (or twists)
+
+        1 / k = integral of (L - y) / EI over the segment / (L - y_joint)
+
+    With the joints of `beam_division` the chain is exact in slope and deflection of its tip under a force at
+    the tip, in its slope under a distributed load (on a uniform beam), and in its twist under a distributed
+    torque. Its deflection under a distributed load is 11 per cent short with two links on a uniform beam, 4
+    with three, and 0.3 with eight.
     """
-    centres = 0.5 * (edges[:, 1:] + edges[:, :-1])
-    start, length = centres[:, :-1, None], np.diff(centres, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    weight = 0.5 * length * WEIGHTS
+    links = edges.shape[1] - 1
+    if links == 1:
+        return np.zeros((edges.shape[0], 0, 3))
+    span = surface.span_m
+    own = link_edges(beam_division(surface, links)[None], span)[0, 1:-1]
+    cut = (np.linspace(0.0, span, links)[1:-1] - own[:-1]) / np.diff(own)
+    joints = edges[:, 1:-1]
+    ends = np.zeros((edges.shape[0], links))
+    ends[:, 1:-1] = joints[:, :-1] + cut * np.diff(joints, axis=1)
+    ends[:, -1] = span
+    _, compliance = _segment_compliance(surface, ends)
+    return np.asarray((span - joints)[..., None] / np.moveaxis(compliance.sum(-1), 0, -1))
+
+
+def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
+    """Compliance of a surface's segments to a moment of L - y, with which it falls to the tip.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (p, n)
+        Ends of n - 1 segments, distances from the root in m.
+
+    Returns
+    -------
+    stations : ndarray, shape (p, n - 1, points)
+        Of the quadrature, m.
+    compliance : ndarray, shape (3, p, n - 1, points)
+        Flap, torsion, edgewise: weight times (L - y) over EI or GJ; the sum over points is the integral.
+    """
+    start, length = ends[:, :-1, None], np.diff(ends, axis=1)[..., None]
+    stations = start + length * 0.5 * (BEAM_POINTS + 1)
+    moment = 0.5 * length * BEAM_WEIGHTS * (surface.span_m - stations)
     section = surface.section_at(stations.ravel())
-    compliance = [
-        (weight / value.reshape(stations.shape)).sum(-1)
-        for value in (section.ei_flap, section.gj, section.ei_edge)
-    ]
-    return np.asarray(1.0 / np.stack(compliance, axis=-1))
+    stiffness = np.stack([section.ei_flap, section.gj, section.ei_edge]).reshape(3, *stations.shape)
+    return stations, moment / stiffness
 
 
 def strip_overlap(surface: Surface, lattice: SurfaceLattice, edges: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -29,13 +30,14 @@ from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.surface import Surface
 from morphcore.models.links import (
     MASS_ROWS,
+    beam_division,
     drag_areas,
     joint_stiffness,
     link_edges,
     link_masses,
     strip_overlap,
 )
-from morphcore.models.transforms import RATIO_RANGE, Linear, Log, Shares, Transform
+from morphcore.models.transforms import Linear, Log, Shares, Transform
 from morphcore.multibody.kernels.articulated import L_MASS, L_OFFSET
 
 Array = NDArray[np.float64]
@@ -231,11 +233,8 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
 DIVISION = Parameter(
     name="division",
     unit="1",
-    transform=lambda _: Shares(),
-    bounds=lambda cut: (
-        np.full(cut.division.shape[1] - 1, -RATIO_RANGE),
-        np.full(cut.division.shape[1] - 1, RATIO_RANGE),
-    ),
+    transform=lambda surface: Shares(partial(beam_division, surface)),
+    bounds=lambda cut: Shares(partial(beam_division, cut.surface)).box(0.0, 1.0, cut.division.shape[1]),
     guess=lambda cut: cut.division,
     apply=_cut,
     scope="surface",

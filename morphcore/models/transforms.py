@@ -6,6 +6,7 @@ says what an interval around a value looks like: of a shape that fits the parame
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,7 +17,8 @@ from morphcore.errors import InvalidInput
 
 Array = NDArray[np.float64]
 
-RATIO_RANGE = 1.5  # of the log-ratios: a link may be 4.5 times shorter or longer than the last
+RATIO_RANGE = 1.5  # of the log-ratios: a share over the last one may be 4.5 times smaller or larger
+HALVINGS = 50  # of an interval of RATIO_RANGE, down to rounding
 
 
 class Transform(Protocol):
@@ -117,13 +119,25 @@ class Linear:
         return values - width, values + width
 
 
+def equal_shares(count: int) -> Array:
+    """(count,) shares that are all the same."""
+    return np.full(count, 1.0 / count)
+
+
 @dataclass(frozen=True)
 class Shares:
     """Positive shares that sum to one, searched as log-ratios to the last one: d = m - 1.
 
     The additive log-ratio (Aitchison 1982): a box of the coordinates lies inside the simplex. Intervals are
     even in the odds of a share.
+
+    Attributes
+    ----------
+    nominal : callable, int -> ndarray, shape (m,)
+        The shares in the middle of a box, by their number.
     """
+
+    nominal: Callable[[int], Array] = equal_shares
 
     def forward(self, values: Array) -> Array:
         """Log-ratios to the last share."""
@@ -136,21 +150,32 @@ class Shares:
         return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
-        """Log-ratios of at most RATIO_RANGE either way for which every share stays inside the bounds."""
-        half = RATIO_RANGE
-        if count > 1:
-            if not low * count < 1.0 < high * count:
-                raise InvalidInput(
-                    f"division bounds {low:g}..{high:g} leave no room for {count} links",
-                    pointer="/model/bounds/division",
-                    hint=f"they must hold 1/{count}",
-                )
-            # the smallest share of a box of log-ratios +-r is 1 / (1 + e^r + (n - 2) e^r), the largest its
-            # mirror image
-            smallest = np.log((1.0 / low - 1.0) / (count - 1)) if low > 0 else RATIO_RANGE
-            largest = np.log((count - 1) / (1.0 / high - 1.0)) if high < 1 else RATIO_RANGE
-            half = float(min(RATIO_RANGE, smallest / 2, largest / 2))
-        return np.full(count - 1, -half), np.full(count - 1, half)
+        """Log-ratios of at most RATIO_RANGE off the nominal ones for which all shares are inside the bounds.
+
+        Bounds that the nominal shares break are centred on equal shares.
+        """
+        if count == 1:
+            return np.zeros(0), np.zeros(0)
+        if not low * count < 1.0 < high * count:
+            raise InvalidInput(
+                f"division bounds {low:g}..{high:g} leave no room for {count} links",
+                pointer="/model/bounds/division",
+                hint=f"they must hold 1/{count}",
+            )
+        shares = self.nominal(count)
+        if not low < shares.min() <= shares.max() < high:
+            shares = equal_shares(count)
+        centre = self.forward(shares)
+
+        def fits(half: float) -> bool:
+            smallest, largest = self.limits(centre - half, centre + half)
+            return bool(smallest.min() >= low and largest.max() <= high)
+
+        half, beyond = (RATIO_RANGE, RATIO_RANGE) if fits(RATIO_RANGE) else (0.0, RATIO_RANGE)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (half + beyond)
+            half, beyond = (middle, beyond) if fits(middle) else (half, middle)
+        return centre - half, centre + half
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Of each share with all others at their other ends; the last one's ratio to itself is one."""

@@ -20,8 +20,11 @@ def space(links: int = 3, **options: object) -> SearchSpace:
 
 @pytest.mark.parametrize("links", [1, 2, 3, 5, 8])
 def test_the_guess_decodes_to_beam_theory(links: int) -> None:
-    """The centre of the box is the physical guess itself."""
+    """The centre of the box is the physical guess itself, also in the division of the span."""
     sought = space(links)
+    shares = [name.startswith("log_ratio") for name in sought.names]
+    centre = 0.5 * (sought.lower + sought.upper)
+    np.testing.assert_allclose(centre[shares], sought.guess[shares], atol=1e-12)
     found, expected = sought.decode(sought.guess), physical_guess(sought.model)
     assert found.values.keys() == expected.values.keys()
     for name, value in expected.values.items():
@@ -58,6 +61,24 @@ def test_bounds_given_in_si_units_hold() -> None:
     division = sought.decode(x)["division"]
     assert division.min() >= 0.2
     assert division.max() <= 0.5
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (0.1, 0.6), (0.21, 0.46), (0.3, 0.4), (0.26, 0.9)])
+def test_bounds_of_the_division_leave_what_room_they_can(low: float, high: float) -> None:
+    """The box is centred on the nominal shares (2/9, 4/9, 1/3) where they obey, else on equal ones.
+
+    It is as wide as it can be: no share leaves the bounds anywhere, and one reaches them at a corner, or the
+    ratios reach their range of 1.5.
+    """
+    sought = space(3, bounds={"division": [low, high]})
+    ratios = slice(0, 2)
+    lower, upper = sought.lower[ratios], sought.upper[ratios]
+    nominal = np.array([2 / 9, 4 / 9, 1 / 3]) if low < 2 / 9 and high > 4 / 9 else np.full(3, 1 / 3)
+    np.testing.assert_allclose(0.5 * (lower + upper), np.log(nominal[:2] / nominal[2]), atol=1e-9)
+    limits = sought.parameter_limits[:3]
+    assert limits.min() >= low
+    assert limits.max() <= high
+    assert np.allclose(upper - lower, 3.0) or np.isclose(limits, [low, high], rtol=1e-9).any()
 
 
 def test_corrections_that_are_not_sought_stay_neutral() -> None:
