@@ -259,12 +259,12 @@ QUOTA_HINTS = {
 class QuotaExceeded(TooManyRequests, code="quota_exceeded", title="The API key's quota is used up"):
     """The key's quota has no room for this."""
 
-    def __init__(self, quota: str, *, limit: int, used: int, asked: int, retry_after_s: int) -> None:
-        self.quota = {"name": quota, "limit": limit, "used": used, "asked": asked}
+    def __init__(self, quota: str, *, limit: int, used: int, requested: int, retry_after_s: int) -> None:
+        self.quota = {"name": quota, "limit": limit, "used": used, "asked": requested}
         self.retry_after_s = max(1, retry_after_s)
         words = quota.replace("_", " ")
         super().__init__(
-            f"The key's quota is {limit} {words}; {used} are used and this request needs {asked} more.",
+            f"The key's quota is {limit} {words}; {used} are used and this request needs {requested} more.",
             hint=QUOTA_HINTS.get(quota, "Ask the operator for a larger quota."),
         )
 

@@ -29,7 +29,7 @@ CONVERGED, CONVERGED_MUJOCO = (
     100,
     2000,
 )  # steps in OUTPUT_S: errors below 1e-6 rad, and stable for Runge-Kutta
-MOST_STEPS = 4000  # in OUTPUT_S; a scheme that needs more is left out
+MAX_STEPS = 4000  # in OUTPUT_S; a scheme that needs more is left out
 
 
 def against_mujoco(bench: Bench) -> Figures:
@@ -51,7 +51,7 @@ def against_mujoco(bench: Bench) -> Figures:
         flights = {name: ForcedMujoco(model, guess, name) for name in INTEGRATORS}
         converged = flights["rk4"].attitudes(OUTPUT_S / CONVERGED_MUJOCO)
         steps = {
-            name: fewest_steps(
+            name: min_steps(
                 lambda n, flight=flight: attitude_error(flight.attitudes(OUTPUT_S / n), converged)  # type: ignore[misc]
             )
             for name, flight in flights.items()
@@ -59,8 +59,8 @@ def against_mujoco(bench: Bench) -> Figures:
     able = {name: OUTPUT_S / n for name, n in steps.items() if n is not None}
     judged = swarm.select(slice(0, JUDGED))
     judged_reference = _attitudes(model, judged, CONVERGED)
-    alone = fewest_steps(lambda n: attitude_error(_attitudes(model, guess, n), reference))
-    together = fewest_steps(lambda n: attitude_error(_attitudes(model, judged, n), judged_reference))
+    alone = min_steps(lambda n: attitude_error(_attitudes(model, guess, n), reference))
+    together = min_steps(lambda n: attitude_error(_attitudes(model, judged, n), judged_reference))
     if alone is None or together is None or not able:
         raise RuntimeError("a scheme does not hold the attitude in any step")
     ours = {"single": (guess, OUTPUT_S / alone), "batch": (swarm, OUTPUT_S / together)}
@@ -93,7 +93,7 @@ def against_mujoco(bench: Bench) -> Figures:
     }
 
 
-def fewest_steps(error: Callable[[int], float]) -> int | None:
+def min_steps(error: Callable[[int], float]) -> int | None:
     """Least number of steps in OUTPUT_S whose error is below ERROR_RAD; None: none is.
 
     Doubles until the error holds and halves the interval then; an error that is no number does not hold.
@@ -101,7 +101,7 @@ def fewest_steps(error: Callable[[int], float]) -> int | None:
     high = 1
     while not error(high) < ERROR_RAD:
         high *= 2
-        if high > MOST_STEPS:
+        if high > MAX_STEPS:
             return None
     low = high // 2  # does not hold, or is zero
     while high - low > 1:

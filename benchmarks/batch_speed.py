@@ -79,21 +79,21 @@ def _threads(rounds: dict[int, list[Round]]) -> Figures:
     then the pool's in equal parts; at most the number of threads. ``work_growth`` : computing on so many
     threads over that on one, what they take from each other. ``serial_share`` : the caller's own.
     """
-    most = max(rounds)
-    by_wall = [one.wall / many.wall for one, many in zip(rounds[1], rounds[most], strict=True)]
+    maximum = max(rounds)
+    by_wall = [one.wall / many.wall for one, many in zip(rounds[1], rounds[maximum], strict=True)]
     found: Figures = {
         "generation_s": {
             str(count): statistics.median(r.wall for r in times) for count, times in rounds.items()
         },
         "speed_up": statistics.median(by_wall),
     }
-    if most > 1:
-        shares = [min(1.0, many.caller / many.process) for many in rounds[most]]
+    if maximum > 1:
+        shares = [min(1.0, many.caller / many.process) for many in rounds[maximum]]
         found |= {
-            "speed_up_by_computing_time": statistics.median(1.0 / (s + (1.0 - s) / most) for s in shares),
+            "speed_up_by_computing_time": statistics.median(1.0 / (s + (1.0 - s) / maximum) for s in shares),
             "serial_share": statistics.median(shares),
             "work_growth": statistics.median(
-                many.process / one.process for one, many in zip(rounds[1], rounds[most], strict=True)
+                many.process / one.process for one, many in zip(rounds[1], rounds[maximum], strict=True)
             ),
         }
     return found

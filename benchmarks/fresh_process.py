@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from benchmarks.setting import Figures
-from morphcore.stopping import heed
+from morphcore.stopping import check_stop
 
 
 def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, str] | None = None) -> Figures:
@@ -38,7 +38,7 @@ def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, s
         check=False,
     )
     if done.returncode:
-        heed()  # Ctrl-C reaches that process too
+        check_stop()  # Ctrl-C reaches that process too
         raise RuntimeError(f"{function} ended with {done.returncode}: {done.stderr[-2000:]}")
     found: Figures = json.loads(done.stdout.splitlines()[-1])
     return found

@@ -23,7 +23,7 @@ from benchmarks.start_up import cold_compilation, first_generation, import_times
 from benchmarks.work_precision import quick_work_precision
 from morphcore.errors import InvalidInput
 from morphcore.simulate.plan import STEP_S
-from morphcore.stopping import heed
+from morphcore.stopping import check_stop
 from morphcore.threads import use_threads
 from morphcore.warming import warm_up
 
@@ -120,7 +120,7 @@ def run_benchmarks(
         }
         for name, section in SECTIONS.items():
             if name in chosen:
-                heed()
+                check_stop()
                 figures |= section(bench)
         return {**figures, "requirements": judged(figures)}
     finally:

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.setting import LINKS, RATE_SAMPLES, Bench, Clock, Figures
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.identification import SCREEN_SPREAD, Identification
+from morphcore.identify.identification import CANDIDATE_SPREAD, Identification
 from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
@@ -52,7 +52,7 @@ def search_figures(
     seeds: Iterable[int] = range(1, 11),
     methods: Sequence[str] = METHODS,
     links_per_wing: int = LINKS,
-    most_sets: int | None = None,
+    max_sets: int | None = None,
     best_known: float | None = None,
     clock: Clock = time.perf_counter,
 ) -> Figures:
@@ -62,7 +62,7 @@ def search_figures(
     ----------
     samples : all of them are fitted. A flight set is one parameter set flown through all of them.
     methods : some of ``METHODS``; "paper" is the preset of that name.
-    most_sets : a search is cut off after the step that exceeds it.
+    max_sets : a search is cut off after the step that exceeds it.
     best_known : J to compare with, rad^2; None takes the least that any of these searches reaches.
     clock : rising seconds.
 
@@ -79,7 +79,7 @@ def search_figures(
             seed: _searched(
                 Identification(aircraft, flight, samples, model, _settings(method, seed)),
                 method,
-                most_sets,
+                max_sets,
                 clock,
             )
             for seed in listed
@@ -133,9 +133,9 @@ def _settings(method: str, seed: int) -> SearchSettings:
     )
 
 
-def _searched(run: Identification, method: str, most_sets: int | None, clock: Clock) -> _Run:
+def _searched(run: Identification, method: str, max_sets: int | None, clock: Clock) -> _Run:
     if method == "scattered":
-        drawn = np.random.default_rng(run.search.seed).normal(0.0, SCREEN_SPREAD, run.space.dimension)
+        drawn = np.random.default_rng(run.search.seed).normal(0.0, CANDIDATE_SPREAD, run.space.dimension)
         run.known = np.clip(run.space.guess + drawn, run.space.lower, run.space.upper)[None]
     costs, sets, wall_s = [], [], []
     begin = clock()
@@ -143,7 +143,7 @@ def _searched(run: Identification, method: str, most_sets: int | None, clock: Cl
         costs.append(step.best_cost)
         sets.append(step.flights // len(run.training))
         wall_s.append(clock() - begin)
-        if most_sets is not None and sets[-1] >= most_sets:
+        if max_sets is not None and sets[-1] >= max_sets:
             break
     return _Run(tuple(costs), tuple(sets), tuple(wall_s))
 

@@ -16,7 +16,7 @@ from morphcore.identify.cost import SampleCase, sample_cases
 from morphcore.models.equivalent import ChainModel
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
-from morphcore.stopping import heed
+from morphcore.stopping import check_stop
 from morphcore.threads import thread_count
 from morphdata.aircraft import load_aircraft
 from morphdata.flight import load_flight
@@ -78,7 +78,7 @@ class Bench:
 
     def timed(self, work: Callable[[], object]) -> float:
         """Computing time of some work on this thread, s."""
-        heed()
+        check_stop()
         begin = self.computing()
         work()
         return self.computing() - begin

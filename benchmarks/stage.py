@@ -39,7 +39,7 @@ from morphcore.simulate.trim import Trim, trimmed_state
 Array = NDArray[np.float64]
 Air = Callable[[Array], Array]
 
-MOST_MOMENTS = 64  # kept; each holds a lattice operator
+MAX_MOMENTS = 64  # kept; each holds a lattice operator
 SAME_TIME_S = 1e-9  # times closer than that are one
 
 
@@ -77,7 +77,7 @@ class Course:
         """Everything at one time."""
         key = round(time_s / SAME_TIME_S)
         if key not in self._known:
-            if len(self._known) == MOST_MOMENTS:
+            if len(self._known) == MAX_MOMENTS:
                 del self._known[next(iter(self._known))]  # the oldest: steppers look back a step at most
             self._known[key] = self._moment(time_s)
         return self._known[key]

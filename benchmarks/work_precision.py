@@ -104,14 +104,14 @@ def quick_work_precision(aircraft: Aircraft, flight: Flight, samples: Sequence[T
 def work_precision_table(figures: Figures) -> list[tuple[str, str, str, str]]:
     """Stepper, longest step that holds the goal, stages a second then, and cost over the cheapest."""
     held = figures["holding"]
-    least = min((row["stages_per_s"] for row in held.values() if row), default=1.0)
+    minimum = min((row["stages_per_s"] for row in held.values() if row), default=1.0)
     lines = []
     for name, row in sorted(held.items(), key=lambda item: item[1]["stages_per_s"] if item[1] else np.inf):
         if row is None:
             lines.append((name, "none tried", "-", "-"))
             continue
         step, stages = f"{1e3 * row['step_s']:.3g} ms", f"{row['stages_per_s']:.0f}"
-        lines.append((name, step, stages, f"{row['stages_per_s'] / least:.1f}"))
+        lines.append((name, step, stages, f"{row['stages_per_s'] / minimum:.1f}"))
     return lines
 
 

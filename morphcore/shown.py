@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-MOST_ROWS = 20  # of a table, and of facts; more are counted
+MAX_ROWS = 20  # of a table, and of facts; more are counted
 WIDEST = 88  # characters of a fact
 FEW = 4  # numbers that are written out
 
@@ -32,7 +32,7 @@ class Summary:
 
     def to_text(self) -> str:
         """A few lines."""
-        facts = [(name, brief(value)) for name, value in self.facts.items()][:MOST_ROWS]
+        facts = [(name, brief(value)) for name, value in self.facts.items()][:MAX_ROWS]
         width = max((len(name) for name, _ in facts), default=0)
         lines = [self.title, *(f"  {name.ljust(width)}  {value}" for name, value in facts)]
         table = [list(self.titles), *_cells(self.rows)] if self.titles else []
@@ -49,7 +49,7 @@ class Summary:
             return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
         parts = [f"<p><b>{html.escape(self.title)}</b></p>"]
-        facts = [(name, brief(value)) for name, value in self.facts.items()][:MOST_ROWS]
+        facts = [(name, brief(value)) for name, value in self.facts.items()][:MAX_ROWS]
         parts += ["<table>", *(row(fact, "td") for fact in facts), "</table>"] if facts else []
         if self.titles:
             parts += [
@@ -61,8 +61,8 @@ class Summary:
         return "".join([*parts, *(f"<p>{html.escape(line.strip())}</p>" for line in self._rest())])
 
     def _rest(self) -> Iterator[str]:
-        if len(self.rows) > MOST_ROWS:
-            yield f"  ... and {len(self.rows) - MOST_ROWS} more rows"
+        if len(self.rows) > MAX_ROWS:
+            yield f"  ... and {len(self.rows) - MAX_ROWS} more rows"
         yield from (f"  {shortened(note)}" for note in self.notes[:FEW])
 
 
@@ -123,4 +123,4 @@ def _array(values: np.ndarray[Any, Any]) -> str:
 
 
 def _cells(rows: Rows) -> list[list[str]]:
-    return [[brief(cell) for cell in row] for row in rows[:MOST_ROWS]]
+    return [[brief(cell) for cell in row] for row in rows[:MAX_ROWS]]

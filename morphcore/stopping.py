@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from morphdata.faults import Interrupted
 
-__all__ = ["Deadline", "Interrupted", "Stop", "heed", "listening", "one_at_a_time", "say", "stoppable"]
+__all__ = ["Deadline", "Interrupted", "Stop", "check_stop", "listening", "one_at_a_time", "say", "stoppable"]
 
 Stop = Callable[[], bool]
 Value = TypeVar("Value")
@@ -96,7 +96,7 @@ def stoppable(stop: Stop) -> Iterator[None]:
         _surrounding.reset(token)
 
 
-def heed(stop: Stop | None = None) -> None:
+def check_stop(stop: Stop | None = None) -> None:
     """Ask whether to go on.
 
     Raises
@@ -109,7 +109,7 @@ def heed(stop: Stop | None = None) -> None:
 
 
 def one_at_a_time(stop: Stop | None = None) -> Stop:
-    """What `heed` asks here, as one question for several threads, which ask it in turn."""
+    """What `check_stop` asks here, as one question for several threads, which ask it in turn."""
     lock, surrounding = threading.Lock(), _surrounding.get()
 
     def ask() -> bool:

@@ -26,7 +26,7 @@ LARGEST_MACH = 0.3  # below it air is incompressible to 5 per cent of the lift
 # Five degrees from the vertical roll and yaw turn about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
 LARGEST_ERROR = 0.05  # of the motion, rms
-LEAST_ERROR_RAD = 1e-4  # rms; what the integration resolves (simulate/plan.py)
+MIN_ERROR_RAD = 1e-4  # rms; what the integration resolves (simulate/plan.py)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> l
 def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list[ResultWarning]:
     """An error (k, 3) above LARGEST_ERROR of a sample's motion (k, 3), both rms of the angles together."""
     error, size = (float(np.sqrt(np.mean(np.sum(values**2, axis=1)))) for values in (errors, motion))
-    if not np.isfinite(error) or error <= max(LARGEST_ERROR * size, LEAST_ERROR_RAD):
+    if not np.isfinite(error) or error <= max(LARGEST_ERROR * size, MIN_ERROR_RAD):
         return []
     share = (
         f"{100.0 * error / size:.0f} per cent of its motion"

@@ -27,11 +27,9 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, faults_of
 from morphdata.renamed import FORMER_NOTE, RENAMED
-from morphdata.samplefiles.flight import FEWEST_ROWS, MOST_ROWS, from_first_row
+from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
-MAX_ROWS = MOST_ROWS  # of one sample
-MIN_ROWS = FEWEST_ROWS
 SHOWN_ITEMS = 4  # of a list, at a prompt
 LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
 

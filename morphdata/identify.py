@@ -110,7 +110,7 @@ def _current_corrections(given: Any) -> Any:
     return [current_name(name) for name in given if name not in RENAMED or RENAMED[name] not in present]
 
 
-class SoughtModel(Document):
+class SearchedModel(Document):
     """A model whose parameters are searched: wings of rigid links with gimbal joints."""
 
     separate_wings: Annotated[bool, Option("--separate-wings", MODEL)] = Field(
@@ -173,7 +173,7 @@ def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterato
             return
 
 
-class EquivalentModel(SoughtModel):
+class EquivalentModel(SearchedModel):
     """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
     links_per_wing: Annotated[int, Option("--links", MODEL)] = Field(
@@ -237,7 +237,7 @@ class SamplesRequest(Request):
     aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
     flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(description="Flight condition.")
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
-    model: SoughtModel
+    model: SearchedModel
     search: Search = Search()
 
     def inline_samples(self) -> dict[int, InlineSample]:

@@ -318,13 +318,13 @@ class OptimizeRequest(Request):
 
     def _time_faults(self) -> Iterator[Fault]:
         morph, limits = self.morph, self.limits
-        least_s = limits.shortest_morph_s(abs(morph.change_rad))
-        if morph.duration_s <= least_s:
+        min_s = limits.shortest_morph_s(abs(morph.change_rad))
+        if morph.duration_s <= min_s:
             yield Fault(
                 "morph_too_short",
                 f"Within the limits the motion takes more than {morph.duration_s:g} s.",
                 "/morph/duration_s",
-                f"Give more than {least_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
+                f"Give more than {min_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
             )
         yield from goal_faults(morph, limits)
 

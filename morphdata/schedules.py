@@ -10,12 +10,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, FailFast, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from morphdata.base import MAX_ROWS, MIN_ROWS, Angle, Document
+from morphdata.base import Angle, Document
 from morphdata.drives import SWEEPS, Drive, resolved
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, escaped
 from morphdata.samplefiles.fault import said_of
-from morphdata.samplefiles.flight import LONGEST_FLIGHT_S
+from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
 from morphdata.samplefiles.reading import place_in, read_file
 from morphdata.samples import columns_of_aircraft
 

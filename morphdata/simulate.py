@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.base import MAX_ROWS, MIN_ROWS, Document, Result
+from morphdata.base import Document, Result
 from morphdata.channel_choice import CHANNELS_TEXT, RequestedChannels, channels_faults
 from morphdata.environment import Environment
 from morphdata.execution import Request
@@ -18,6 +18,7 @@ from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
+from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.warnings import Warnings

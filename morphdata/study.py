@@ -15,7 +15,7 @@ from morphdata.identify import (
     IdentifiedParameters,
     SampleFit,
     SamplesRequest,
-    SoughtModel,
+    SearchedModel,
     repeated_faults,
 )
 from morphdata.options import MODEL, Option
@@ -27,7 +27,7 @@ Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": [1, 2, 3, 4]}}
 
 
-class StudiedModels(SoughtModel):
+class StudiedModels(SearchedModel):
     """The models that are compared: the same wings with different numbers of links."""
 
     links_per_wing: Annotated[list[Links], Option("--links", MODEL)] = Field(

@@ -74,8 +74,8 @@ def _watch_libpq() -> None:
     inner = generators.connect
 
     def connect(conninfo: str) -> Any:
-        told = conninfo_to_dict(conninfo)
-        hosts = [part for name in ("host", "hostaddr") for part in str(told.get(name) or "").split(",")]
+        reported = conninfo_to_dict(conninfo)
+        hosts = [part for name in ("host", "hostaddr") for part in str(reported.get(name) or "").split(",")]
         for host in hosts:
             if not host.startswith(("/", "@")) and not is_here(host):  # those are sockets in the file system
                 _refuse(f"libpq {host}")

@@ -64,7 +64,7 @@ def test_figures_follow_from_the_times() -> None:
     assert not any(name.startswith("mujoco") for name in holds), "what was not measured is not judged"
 
 
-def test_every_section_has_lines_and_a_wrong_name_is_told() -> None:
+def test_every_section_has_lines_and_a_wrong_name_is_reported() -> None:
     """No section is measured that the table would swallow; a name that is none is refused with the list."""
     shown = {name for name, lines in LINES.items() if lines is not None}
     given = (set(SECTIONS) | {"threads"}) - shown

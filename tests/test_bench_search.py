@@ -33,7 +33,7 @@ def test_counts_the_flights_of_every_search() -> None:
         seeds=(1, 2),
         methods=("least_squares", "scattered", "cma"),
         links_per_wing=2,
-        most_sets=80,
+        max_sets=80,
         clock=lambda: float(next(clock)),
     )
     assert json.loads(json.dumps(figures, allow_nan=False)) == figures
@@ -58,7 +58,7 @@ def test_the_benchmark_judges_the_worst_run(monkeypatch: pytest.MonkeyPatch) -> 
 
     def shorter(aircraft: Aircraft, flight: Flight, samples: list[Trajectory], **options: Any) -> Figures:
         beginnings = [shortened(sample, 60) for sample in samples]
-        return search_figures(aircraft, flight, beginnings, **options, links_per_wing=1, most_sets=100)
+        return search_figures(aircraft, flight, beginnings, **options, links_per_wing=1, max_sets=100)
 
     monkeypatch.setattr(search, "search_figures", shorter)
     figures = run_benchmarks(

@@ -25,7 +25,7 @@ from tests.identify.flights import (
 from tests.optimise.morphs import last, optimisation
 from tests.simulate.flights import fly
 
-MOST_LINES = 40
+MAX_LINES = 40
 WIDEST = 160
 COARSE = EquivalentModel(links_per_wing=2, lattice=Lattice(chordwise=1, spanwise=4), step_s=0.01)
 FLIGHTS = [shortened(example("rate_0.8"), 60), shortened(example("asymmetric", "held_out"), 60)]
@@ -90,7 +90,7 @@ class Tags(HTMLParser):
 def require_short(value: Any) -> None:
     """A few lines of text, and HTML whose tags are closed."""
     text = repr(value)
-    assert 0 < len(text.splitlines()) < MOST_LINES
+    assert 0 < len(text.splitlines()) < MAX_LINES
     assert max(map(len, text.splitlines())) < WIDEST
     tags = Tags()
     tags.feed(value._repr_html_())
@@ -107,7 +107,7 @@ def test_a_result_fits_a_screen(name: str) -> None:
         assert word in repr(result)
         assert word in result._repr_html_()
     for part in vars(result).values():
-        assert len(repr(part).splitlines()) < MOST_LINES, type(part)
+        assert len(repr(part).splitlines()) < MAX_LINES, type(part)
 
 
 def test_what_goes_in_fits_a_screen() -> None:
@@ -127,7 +127,7 @@ def test_long_tables_are_cut_and_text_is_escaped() -> None:
     """A hundred rows are counted, a name cannot become a tag."""
     rows = [[f"<b>{i}</b>", 1e-9 * i, None] for i in range(100)]
     summary = Summary("<script>", {"a": np.arange(10**6)}, ("name", "value", "none"), rows, ["note"])
-    assert len(summary.to_text().splitlines()) < MOST_LINES
+    assert len(summary.to_text().splitlines()) < MAX_LINES
     assert "80 more rows" in summary.to_text()
     assert "<script>" not in summary.to_html()
     assert "<b>1" not in summary.to_html()

@@ -39,17 +39,17 @@ def test_work_inside_of_work_is_done_by_its_own_thread() -> None:
 @pytest.mark.usefixtures("two_threads")
 def test_threads_ask_what_surrounds_their_caller() -> None:
     """A stop that surrounds the caller reaches the pool's threads as one question, and is asked in turn."""
-    asking, asked = threading.Lock(), []
+    asking, requested = threading.Lock(), []
 
     def surrounding() -> bool:
         assert asking.acquire(blocking=False)
-        asked.append(threading.current_thread().name)
+        requested.append(threading.current_thread().name)
         asking.release()
-        return len(asked) >= 50
+        return len(requested) >= 50
 
     with stoppable(surrounding):
         stop = one_at_a_time()
     in_threads(lambda _: [stop() for _ in range(30)] and None, 2)
-    assert len(asked) == 60
+    assert len(requested) == 60
     assert stop()
     assert not one_at_a_time(lambda: False)()

@@ -188,7 +188,7 @@ class LeaseKeeper:
 
     def _watch(self) -> None:
         renewed_at = time.monotonic()  # the claim itself began the lease
-        asked_at: float | None = None
+        requested_at: float | None = None
         while not self._over.wait(self._look_every_s):
             now = time.monotonic()
             try:
@@ -209,8 +209,8 @@ class LeaseKeeper:
             if self._reason is StopReason.LOST:
                 break
             if self._reason is not None and not self._work_ended:
-                asked_at = now if asked_at is None else asked_at
-                if now - asked_at > self._stuck_after_s:
+                requested_at = now if requested_at is None else requested_at
+                if now - requested_at > self._stuck_after_s:
                     break
         patience_s = self._stuck_after_s if self._reason is StopReason.LOST else 0.0
         if not self._over.wait(patience_s):

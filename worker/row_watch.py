@@ -44,7 +44,7 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         worker.row_watch = self
         self._clock = clock
         self._timer: Any = None
-        self._asked_at: float | None = None
+        self._requested_at: float | None = None
         self._unanswered_since: float | None = None
 
     def include_if(self, worker: Any) -> bool:
@@ -72,19 +72,19 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
             self._unanswered_since = None  # all are at work
             return
         now = self._clock()
-        if self._asked_at is not None and now - self._asked_at < ANSWER_WITHIN_S:
+        if self._requested_at is not None and now - self._requested_at < ANSWER_WITHIN_S:
             return
-        self._asked_at = now
+        self._requested_at = now
         if self._unanswered_since is None:
             self._unanswered_since = now
 
         def answered(waits: object) -> None:
-            self._asked_at = self._unanswered_since = None
+            self._requested_at = self._unanswered_since = None
             if waits:
                 wake(worker.consumer)
 
         def failed(error: object) -> None:
-            self._asked_at = None
+            self._requested_at = None
             log.warning("a look at the rows failed: %s", error)
 
         # the pool gives the slot back with the answer

@@ -89,7 +89,7 @@ def usage(session: Session, key_id: str) -> Usage:
 
 def _compare(name: str, limit: int, used: int, needed: int, retry_after_s: int) -> None:
     if used + needed > limit:
-        raise QuotaExceeded(name, limit=limit, used=used, asked=needed, retry_after_s=retry_after_s)
+        raise QuotaExceeded(name, limit=limit, used=used, requested=needed, retry_after_s=retry_after_s)
 
 
 def _jobs_in_flight(session: Session, key_id: str) -> int:

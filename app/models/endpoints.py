@@ -121,8 +121,8 @@ async def export_model(
 ) -> Response:
     """Answer with the file, or with the job that writes it."""
     file_format = format_named(name)
-    most_s = app.settings.max_wait_s
-    wait_s = min(EXPORT_WAIT_S, most_s) if prefer is None else wait_seconds(prefer, most_s)
+    max_s = app.settings.max_wait_s
+    wait_s = min(EXPORT_WAIT_S, max_s) if prefer is None else wait_seconds(prefer, max_s)
     job = await service.export_job(app, caller, model_id, file_format, wait_s)
     if job.finished_at is None:
         headers = {"Location": f"/jobs/{job.id}", "Retry-After": str(ASK_AGAIN_S)}

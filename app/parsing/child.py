@@ -14,7 +14,7 @@ from app.errors import MalformedBody
 from app.parsing.confinement import Limits, confine, confine_time
 from app.parsing.frame import BadFrame, pack
 from app.parsing.json_text import parse_json
-from morphdata.samplefiles.columns import MOST_DRIVES, Wanted
+from morphdata.samplefiles.columns import MAX_DRIVES, Wanted
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.reading import read_columns
 
@@ -28,7 +28,7 @@ def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
         read = read_columns(stream, kind, wanted)
-        unreadable = {name: _words(fault) for name, fault in list(read.unreadable.items())[:MOST_DRIVES]}
+        unreadable = {name: _words(fault) for name, fault in list(read.unreadable.items())[:MAX_DRIVES]}
         return {"columns": read.values, "candidates": read.candidates, "unreadable": unreadable}
     except MalformedBody as error:
         return {"malformed": [error.detail, error.pointer, error.hint]}
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> None:
             break  # the reader says what to install
     confine(limits)
     try:
-        frame = pack(answer(kind, sys.stdin.buffer, Wanted(most_rows=int(rows))))
+        frame = pack(answer(kind, sys.stdin.buffer, Wanted(max_rows=int(rows))))
     except BadFrame:
         frame = pack({"failed": "TooMuchText"})
     except (MemoryError, RecursionError) as error:

@@ -23,10 +23,10 @@ from app.parsing.child import BODY
 from app.parsing.confinement import Limits
 from app.parsing.frame import BadFrame, unpack
 from app.parsing.json_text import token
-from morphdata.base import MAX_ROWS
 from morphdata.faults import Fault
 from morphdata.samplefiles.columns import FlightColumns
 from morphdata.samplefiles.fault import TITLES, FileFault, as_sentence
+from morphdata.samplefiles.flight import MAX_ROWS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them

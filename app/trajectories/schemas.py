@@ -11,13 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from morphdata.base import SampleName
 from morphdata.drives import SWEEPS
 from morphdata.faults import Fault
-from morphdata.samplefiles.columns import MOST_DRIVES
+from morphdata.samplefiles.columns import MAX_DRIVES
 from morphdata.samplefiles.flight import INLINE
 from morphdata.samples import EXAMPLE_SAMPLE, TrajectoryColumns
 
 UNREADABLE: Any = Field(
     default={},
-    max_length=MOST_DRIVES,
+    max_length=MAX_DRIVES,
     description="Columns of the file that could be drives and could not be read, and why: a request whose "
     "aircraft has such a drive is refused.",
 )

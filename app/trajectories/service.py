@@ -16,7 +16,7 @@ from app.parsing.pool import refusal
 from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.faults import Fault, InvalidInput
-from morphdata.samplefiles.columns import MOST_DRIVES, FlightColumns
+from morphdata.samplefiles.columns import MAX_DRIVES, FlightColumns
 from morphdata.samplefiles.fault import FileFault, as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import kind_of
@@ -41,7 +41,7 @@ def upload_of(flight: FlightColumns, filename: str, name: str | None) -> Traject
     if faults:
         raise InvalidRequest.of(faults)
     named: dict[str, Any] = {_field(key): values for key, values in columns.items()}
-    unreadable = list(flight.unreadable.items())[:MOST_DRIVES]
+    unreadable = list(flight.unreadable.items())[:MAX_DRIVES]
     try:
         return TrajectoryUpload(
             name=sample_name(PurePosixPath(filename.replace("\\", "/")).stem) if name is None else name,

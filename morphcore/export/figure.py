@@ -21,7 +21,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from morphcore.export.curves import SWEEPS
-from morphcore.stopping import heed
+from morphcore.stopping import check_stop
 from morphdata.drives import without_side
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ SILENT_SPAN_DEG = 0.1  # half the height of the axis on which it is drawn, as a 
 LEGEND_HEAD_IN, TITLE_HEAD_IN = 0.62, 0.36  # above the panels: for title and legend, for a title alone
 PNG_DPI = 110
 LONGEST_TITLE = 70  # characters
-MOST_POINTS = 4000  # of a curve: more than the pixels of a page
+MAX_POINTS = 4000  # of a curve: more than the pixels of a page
 HASH_SALT = "morphid"  # element ids in SVG depend on nothing else
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -97,7 +97,7 @@ def time_axis(figure: Figure, rows: Sequence[Axes], time_s: Array) -> None:
 
 def draw(axes: Axes, time_s: Array, values: Array, **style: Any) -> None:
     """Draw a curve with no more points than a page has pixels."""
-    every = -(-time_s.size // MOST_POINTS)
+    every = -(-time_s.size // MAX_POINTS)
     axes.plot(time_s[::every], values[::every], **style)
 
 
@@ -220,7 +220,7 @@ def rendered(
     ------
     Interrupted : the surrounding `stoppable` block is asked to stop; a picture takes a good second to draw.
     """
-    heed()
+    check_stop()
     files: dict[str, bytes] = {}
     with _drawing:
         if "svg" in kinds:

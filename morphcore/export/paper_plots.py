@@ -42,7 +42,7 @@ DASHED = (0, (5, 2))
 TRUTH, RIGID, EQUIVALENT = (STYLES[name] for name in ("measured", "rigid", "identified"))
 OTHERS: tuple[dict[str, Any], ...] = (EQUIVALENT, {"color": ORANGE, "linewidth": 1.5, "linestyle": DASHED})
 MRAD = 1e3  # of a radian
-LEAST_ERROR_MRAD = 1e-3  # half the height of the axis of an error that is round-off
+MIN_ERROR_MRAD = 1e-3  # half the height of the axis of an error that is round-off
 
 
 def truth_figure(flights: Sequence[Document]) -> Figure:
@@ -102,7 +102,7 @@ def verification_figure(curves: Document) -> Figure:
                 draw(errors, time_s, MRAD * error, **EQUIVALENT)
     label_axis(errors, "error, mrad")
     errors.axhline(0.0, color="0.5", linewidth=0.6)
-    _widened(errors, LEAST_ERROR_MRAD)
+    _widened(errors, MIN_ERROR_MRAD)
     (panel,) = drive_panels(curves)
     draw_drive(rows[-1], time_s, panel)
     time_axis(figure, rows, time_s)
@@ -210,7 +210,7 @@ def independent_figure(samples: Sequence[Document], laws: Sequence[Document]) ->
     return figure
 
 
-def _widened(axes: Axes, least: float) -> None:
+def _widened(axes: Axes, minimum: float) -> None:
     """No narrower than ``least`` to both sides: round-off is a line, not a picture."""
     low, high = axes.get_ylim()
-    axes.set_ylim(min(low, -least), max(high, least))
+    axes.set_ylim(min(low, -minimum), max(high, minimum))

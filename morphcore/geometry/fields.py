@@ -12,15 +12,15 @@ import numpy as np
 from morphcore.errors import InvalidInput
 
 
-def _bound_broken(value: float, least: float, most: float) -> str:
+def _bound_broken(value: float, minimum: float, maximum: float) -> str:
     """The bound that a number does not keep; empty when it keeps both."""
-    if value < least:
-        return f"it must be at least {least:g}"
-    return f"it must be at most {most:g}" if value > most else ""
+    if value < minimum:
+        return f"it must be at least {minimum:g}"
+    return f"it must be at most {maximum:g}" if value > maximum else ""
 
 
 def whole_number(
-    value: Any, name: str, *, pointer: str = "", least: float = -math.inf, most: float = math.inf
+    value: Any, name: str, *, pointer: str = "", minimum: float = -math.inf, maximum: float = math.inf
 ) -> int:
     """A whole number as Python's own: out of numpy's, and out of a float without a fraction.
 
@@ -32,7 +32,7 @@ def whole_number(
         isinstance(value, int | np.integer)
         or (isinstance(value, float | np.floating) and float(value).is_integer())
     )
-    broken = _bound_broken(value, least, most) if whole else "give a whole number"
+    broken = _bound_broken(value, minimum, maximum) if whole else "give a whole number"
     if broken:
         raise InvalidInput(f"{name} is {reprlib.repr(value)}", pointer=pointer or f"/{name}", hint=broken)
     return int(value)

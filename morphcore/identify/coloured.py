@@ -28,7 +28,7 @@ CHANNELS = 3  # phi, theta, psi of each row
 HEADING = 2  # the channel whose first row is taken for the heading to begin with, noise and all
 CORRELATION_TIMES = 8  # that are tried, from a bin to the whole record
 WHITE_SHARES = (0.0, 0.03, 0.3)  # of the variance that is independent from row to row
-FEWEST_FLIGHTS = 3  # of a jackknife
+MIN_FLIGHTS = 3  # of a jackknife
 BINS = 30  # of a record, whose averages show the noise that matters; the rest averages out in a fit
 LONG_SHARE = 0.6  # of a record: a longer correlation is less likely beforehand
 ROUNDS = 6  # of the scales of the noise: each gains a digit
@@ -206,13 +206,13 @@ class ColouredNoise:
     @property
     def freedom(self) -> int:
         """Degrees of freedom of the intervals: averages that depend on the parameters, less their number."""
-        told = [
+        reported = [
             block.time_s.size
             for own in self.blocks
             for block in own
             if np.abs(block.jacobian).max() > SMALLEST_RAD
         ]
-        return max(int(sum(told)) - int(self.information.shape[0]), 1)
+        return max(int(sum(reported)) - int(self.information.shape[0]), 1)
 
     @cached_property
     def between_flights(self) -> Array | None:
@@ -221,7 +221,7 @@ class ColouredNoise:
         At the optimum of all flights, those without flight s have theirs at H_(-s)^-1 D_s' r_s from it.
         """
         count = len(self.records)
-        if count < FEWEST_FLIGHTS:
+        if count < MIN_FLIGHTS:
             return None
         moves = []
         for record in self.records:
@@ -299,11 +299,11 @@ class ColouredNoise:
     def _spread(self, shape: _Shape, scales: Array) -> Array:
         """(d, d) sum_ij D_i' R(i - j) D_j of one shape of the noise."""
         total, left = np.zeros_like(self.information), iter(scales)
-        few = len(self.records) < FEWEST_FLIGHTS  # too few to differ
+        few = len(self.records) < MIN_FLIGHTS  # too few to differ
         for record, own in zip(self.records, self.blocks, strict=True):
             correlation = shape.correlation(own[0].time_s) if own else np.eye(1)
-            least = record.discrepancy_rad if few else 0.0
+            minimum = record.discrepancy_rad if few else 0.0
             for block in own:
-                variance = max(next(left), least) ** 2
+                variance = max(next(left), minimum) ** 2
                 total += variance * block.gain.T @ correlation @ block.gain + block.fast
         return total

@@ -220,8 +220,8 @@ def _in_slabs(particles: int, fly: Callable[[slice, Stop], None], stop: Stop | N
     """Fly all parameter sets in slabs of whole blocks, in threads: trims, flights and errors of each."""
     each = -(-particles // thread_count())
     size = min(-(-each // TOGETHER) * TOGETHER, LARGEST_SLAB)
-    asked = one_at_a_time(stop)
-    in_threads(lambda k: fly(slice(k * size, (k + 1) * size), asked), -(-particles // size))
+    requested = one_at_a_time(stop)
+    in_threads(lambda k: fly(slice(k * size, (k + 1) * size), requested), -(-particles // size))
 
 
 def _interpolated(rows: Array, grid_s: Array, times_s: Array) -> Array:

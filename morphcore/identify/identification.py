@@ -13,10 +13,10 @@ from morphcore.errors import InvalidInput
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import SearchSettings
-from morphcore.identify.sought import corrections_told
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.search.checkpoint import pack, unpack
 from morphcore.search.hybrid import Hybrid
@@ -37,7 +37,9 @@ from morphdata.identify import EquivalentModel, samples_faults
 Array = NDArray[np.float64]
 
 VERSION = "identification 4"  # of the checkpoint; another one is not read
-SCREEN_SPREAD = 0.5  # standard deviation of the candidates around the physical guess, in search coordinates
+CANDIDATE_SPREAD = (
+    0.5  # standard deviation of the candidates around the physical guess, in search coordinates
+)
 # A weak prior on the descent: being off the physical guess by one unit costs as much as one error of this
 # size. It settles the directions that the samples cannot see and is far below what they can.
 PRIOR_RAD = 3e-5
@@ -100,7 +102,7 @@ class Identification:
         free: Sequence[str] | None = self.settings.aero_coefficients
         if free is None:
             training = [sample for sample in samples if sample.role == "train"]
-            free = corrections_told(self.model.parameters, training)
+            free = determined_corrections(self.model.parameters, training)
         self.space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
@@ -308,7 +310,7 @@ def _hybrid(run: Identification, settings: SearchSettings) -> Hybrid:
         _descent(run, settings),
         candidates=settings.screen,
         starts=settings.starts,
-        spread=SCREEN_SPREAD,
+        spread=CANDIDATE_SPREAD,
         good_cost=run.good_cost(),
         seed=settings.seed,
     )

@@ -233,9 +233,9 @@ class SearchSpace:
             if not unknown.searched:
                 continue
             ends = np.stack(unknown.transform.interval(values[named], half[named]), axis=1)
-            for name, (low, high), (least, most) in zip(unknown.names, ends, limits[named], strict=True):
-                inside = low >= least and at_bound.get(name) != "lower"
-                below = high <= most and at_bound.get(name) != "upper"
+            for name, (low, high), (minimum, maximum) in zip(unknown.names, ends, limits[named], strict=True):
+                inside = low >= minimum and at_bound.get(name) != "lower"
+                below = high <= maximum and at_bound.get(name) != "upper"
                 found[name] = (float(low) if inside else None, float(high) if below else None)
         return found
 

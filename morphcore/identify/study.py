@@ -28,7 +28,7 @@ from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread, use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
-from morphdata.identify import EquivalentModel, Search, SoughtModel
+from morphdata.identify import EquivalentModel, Search, SearchedModel
 from morphdata.renamed import both_spellings
 from morphdata.study import StudiedModels, StudyRequest
 
@@ -57,7 +57,7 @@ class Study:
         samples: Sequence[Trajectory],
         *,
         links: Sequence[int] = LINKS,
-        model: SoughtModel | None = None,
+        model: SearchedModel | None = None,
         search: SearchSettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
@@ -248,7 +248,7 @@ def study(
     samples: Sequence[Trajectory],
     *,
     links: Sequence[int] = LINKS,
-    model: SoughtModel | None = None,
+    model: SearchedModel | None = None,
     search: Search | None = None,
 ) -> StudyResult:
     """Study several numbers of links per wing, from start to end.
@@ -264,7 +264,7 @@ def study(
         recommended.
     links : sequence of int
         Numbers of links per wing.
-    model : SoughtModel, optional
+    model : SearchedModel, optional
         What the models have in common: bounds, lattice, time step.
     search : Search, optional
         Method and effort of each search.
@@ -318,7 +318,7 @@ def study_from_request(request: StudyRequest, threads: int | None = None) -> Stu
     )
 
 
-def _of_links(model: SoughtModel, links: int) -> EquivalentModel:
+def _of_links(model: SearchedModel, links: int) -> EquivalentModel:
     return EquivalentModel(**{**dict(model), "links_per_wing": links})
 
 

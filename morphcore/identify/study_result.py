@@ -19,7 +19,7 @@ class StudyResult(Shown):
     """Accuracy and cost of the numbers of links studied, in rising order (the paper's Table 1).
 
     recommended : one of them, with the reason. rigid : J over the flights of each role (rad^2) and wall time
-    of one flight (s) of the rigid model without corrections. search : how it was sought. cost : what was
+    of one flight (s) of the rigid model without corrections. search : how it was searched. cost : what was
     timed.
     """
 

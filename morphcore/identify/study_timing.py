@@ -19,7 +19,7 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.simulate.hinge_schedules import followed_flight
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode
-from morphcore.stopping import Stop, heed
+from morphcore.stopping import Stop, check_stop
 
 Clock = Callable[[], float]
 Flyable = tuple[ChainModel, ParameterBatch]
@@ -75,7 +75,7 @@ class FlightTiming:
         )
 
     def _fly(self, case: SampleCase, model: ChainModel, batch: ParameterBatch, stop: Stop | None) -> float:
-        heed(stop)
+        check_stop(stop)
         begin = self.clock()
         ((_, found),) = shared_trims(model, batch, (case,), self.start)
         fly_attitudes(model, batch, case, found)

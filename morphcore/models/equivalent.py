@@ -272,7 +272,7 @@ def chain_model(
     InvalidInput : the number of links is out of range.
     """
     links = whole_number(
-        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", least=1, most=MAX_LINKS
+        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", minimum=1, maximum=MAX_LINKS
     )
     return _chain_model(aircraft, flight, links, lattice)
 

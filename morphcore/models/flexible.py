@@ -67,7 +67,7 @@ def flexible_model(
     ------
     InvalidInput : the number of elements is out of range.
     """
-    elements = whole_number(elements, "elements", pointer="/model/elements", least=1, most=MAX_ELEMENTS)
+    elements = whole_number(elements, "elements", pointer="/model/elements", minimum=1, maximum=MAX_ELEMENTS)
     parts = aircraft_lattice(aircraft, lattice)
     ends: list[list[int]] = []
     rest, sections, damping = [], [], []

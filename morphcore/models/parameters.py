@@ -47,7 +47,7 @@ Scope = Literal["surface", "pair", "aircraft"]
 AXIS_NAMES = ("flap", "torsion", "edgewise")
 STIFFNESS_FACTOR = 10.0  # either way from beam theory: a chain of few links is off by less than three
 DAMPING_FACTOR = 30.0
-LEAST_DAMPING_S = 1e-6  # of the stiffness: where the search for the damping of undamped wings begins
+MIN_DAMPING_S = 1e-6  # of the stiffness: where the search for the damping of undamped wings begins
 LAG_FACTOR = 10.0
 LIFT_RANGE = (0.6, 1.5)
 LIFT_UNIT = 0.2
@@ -282,7 +282,7 @@ DAMPING = Parameter(
     unit="N m s/rad",
     transform=lambda _: Log(),
     bounds=lambda cut: _factor(
-        np.maximum(_beam_damping(cut), LEAST_DAMPING_S * _beam_stiffness(cut)), DAMPING_FACTOR
+        np.maximum(_beam_damping(cut), MIN_DAMPING_S * _beam_stiffness(cut)), DAMPING_FACTOR
     ),
     guess=_beam_damping,
     apply=_damp,

@@ -31,7 +31,7 @@ FIRST_DAMPING = 3e-2
 MIN_DAMPING, MAX_DAMPING = 1e-8, 1e6
 STALLED = 1e-4  # relative decrease of the cost that counts as none
 PATIENCE = 2  # iterations without decrease before a start has converged
-LEAST_COST = 1e-12  # rad^2: below, nothing is left to be gained
+MIN_COST = 1e-12  # rad^2: below, nothing is left to be gained
 STILL = 1e-9  # a step shorter than this is none; unknowns are shares of duration and change
 # the field of starts narrows as the descent goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((5, 1.0), (10, 0.5))
@@ -264,7 +264,7 @@ def _step(
     space: MorphSpace, limit: TorqueLimit, point: Array, cost: float, model: _Linear, damping: float
 ) -> Array:
     """The minimum (d,) of the damped quadratic model under the limits, made to keep them exactly."""
-    J, cost = model.errors_gradient, max(cost, LEAST_COST)
+    J, cost = model.errors_gradient, max(cost, MIN_COST)
     normal = J.T @ J / cost
     toward = J.T @ model.errors / cost
     # a floor under Marquardt's scale: an unknown that the attitude does not see must not run to its bound

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from morphcore.optimise.descent import MARGIN, linear_model, probes_of
 from morphcore.optimise.limits import MorphSpace
-from morphcore.optimise.torque_limit import MOST_WATCHED, WATCHED, Trials
+from morphcore.optimise.torque_limit import MAX_WATCHED, WATCHED, Trials
 from morphcore.search.checkpoint import stored
 from morphcore.search.solver import Batch, Solver
 
@@ -108,7 +108,7 @@ class TorqueEasing(Solver[EasingState, Trials]):
         space = self._space
         model = linear_model(outcome, slice(None), state.steps)
         watched = np.flatnonzero(np.abs(model.torque) > WATCHED * np.abs(model.torque).max())
-        watched = watched[:: -(-watched.size // MOST_WATCHED)]
+        watched = watched[:: -(-watched.size // MAX_WATCHED)]
         side = np.sign(model.torque[watched])
         torque = side * model.torque[watched] / state.peak
         gradient = side[:, None] * model.torque_gradient[watched] / state.peak

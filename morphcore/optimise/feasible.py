@@ -26,16 +26,16 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
     """
     drives = morph_drives(aircraft, morph)
     hinges = [hinge for hinge in aircraft.hinges if hinge.drive in drives]
-    least, most = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
+    minimum, maximum = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
     for name in ("initial_rad", "final_rad"):
         angle = getattr(morph, name)
         if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
             raise InvalidInput(
-                f"{name} {angle:g} is beyond the hinges' range {least:g}..{most:g} rad",
+                f"{name} {angle:g} is beyond the hinges' range {minimum:g}..{maximum:g} rad",
                 pointer=f"/morph/{name}",
                 hint="choose an angle inside, or widen the hinges' min_rad and max_rad",
             )
-    stops = sorted((stop - morph.initial_rad) / morph.change_rad for stop in (least, most))
+    stops = sorted((stop - morph.initial_rad) / morph.change_rad for stop in (minimum, maximum))
     return MorphSpace(
         morph,
         limits,
@@ -108,16 +108,16 @@ def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRa
     one, since no schedule needs less time than the trapezoid.
     """
     change = abs(morph.change_rad)
-    least, most = 0.0, 0.5 * duration_s
+    minimum, maximum = 0.0, 0.5 * duration_s
     if limits.max_accel_rad_s2 is not None:
         # the product of ramp and rest of the time must not be less than change / acceleration
         root = 0.25 * duration_s**2 - change / limits.max_accel_rad_s2
-        least = 0.5 * duration_s - np.sqrt(max(root, 0.0))
+        minimum = 0.5 * duration_s - np.sqrt(max(root, 0.0))
     if limits.max_rate_rad_s is not None:
-        most = min(most, duration_s - change / limits.max_rate_rad_s)
+        maximum = min(maximum, duration_s - change / limits.max_rate_rad_s)
     # what keeps a limit by round-off keeps it by a little more
-    least, most = least * (1.0 + HELD), max(most * (1.0 - HELD), 0.0)
-    ramp = float(np.clip(min(USUAL_RAMP_S, 0.25 * duration_s), least, max(least, most)))
+    minimum, maximum = minimum * (1.0 + HELD), max(maximum * (1.0 - HELD), 0.0)
+    ramp = float(np.clip(min(USUAL_RAMP_S, 0.25 * duration_s), minimum, max(minimum, maximum)))
     return ConstantRate(morph.initial_rad, morph.final_rad, duration_s, ramp_s=min(ramp, 0.5 * duration_s))
 
 

@@ -123,13 +123,13 @@ def _bisected(morph: Morph, choice: Array, done: dict[float, Found]) -> float | 
             return None
     calm = [i for i, item in enumerate(known) if item is not None and _is_calm(morph, item)]
     if not calm:
-        least = min((item for item in known if item is not None), key=lambda item: item.variation)
+        minimum = min((item for item in known if item is not None), key=lambda item: item.variation)
         raise InvalidInput(
             f"no morph of {choice[0]:.4g} to {choice[-1]:.4g} s stays below "
-            f"{morph.max_variation_rad2:g} rad^2: the least found is {least.variation:.4g} rad^2 "
-            f"in {least.duration_s:.4g} s",
+            f"{morph.max_variation_rad2:g} rad^2: the least found is {minimum.variation:.4g} rad^2 "
+            f"in {minimum.duration_s:.4g} s",
             pointer="/morph/max_variation_rad2",
-            hint=f"raise it to {1.01 * least.variation:.3g} or more, or loosen the limits",
+            hint=f"raise it to {1.01 * minimum.variation:.3g} or more, or loosen the limits",
         )
     high = min(calm)
     low = max(i for i, item in enumerate(known) if item is not None and i < high)

@@ -36,7 +36,7 @@ RAY_POINTS = 32  # looked at on a ray before the last interval is halved
 HALVINGS = 40
 RAMPS = (0.02, 0.1, 0.3, 0.5)  # of the duration: of the constant rates that are tried first
 WAITS = (0.0, 0.2, 0.4, 0.6)  # of the duration: before them
-MOST_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
+MAX_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
 TOLERANCE = 1e-11  # of their cost
 NARROW = 0.02  # room below which the search for the centre begins at the quickest morph too
 
@@ -131,13 +131,13 @@ class MorphSpace:
         peak = np.abs(np.concatenate([shapes.first, shapes.last[:, -1:]], axis=1)).max(axis=1)
         return np.asarray(peak * abs(self.morph.change_rad) / self.duration_s**2)
 
-    def least_slack(self, points: Array) -> Array:
+    def min_slack(self, points: Array) -> Array:
         """(p,) of the limit that is nearest."""
         return np.asarray(self.slack(points).min(axis=1))
 
     def keeps(self, points: Array) -> NDArray[np.bool_]:
         """(p,) whether points (p, d) keep all limits."""
-        return self.least_slack(points) >= HELD
+        return self.min_slack(points) >= HELD
 
     # a place to draw back to
 
@@ -149,19 +149,19 @@ class MorphSpace:
         that leaves little room, from the quickest morph too.
         """
         tried = np.concatenate([self.waiting((0.0,)), self._even])
-        best = tried[int(np.argmax(self.least_slack(tried)))]
+        best = tried[int(np.argmax(self.min_slack(tried)))]
         centre = self._with_more_room(best)
-        if self.least_slack(centre[None, :])[0] < NARROW:
+        if self.min_slack(centre[None, :])[0] < NARROW:
             quick = self.quickest[1]
             pair = np.stack([centre, quick, self._with_more_room(quick)])
-            centre = pair[int(np.argmax(self.least_slack(pair)))]
+            centre = pair[int(np.argmax(self.min_slack(pair)))]
         centre.setflags(write=False)
         return centre
 
     @property
     def room(self) -> float:
         """Least slack of the centre: how much the limits leave; negative if there is no schedule at all."""
-        return float(self.least_slack(self.centre[None, :])[0])
+        return float(self.min_slack(self.centre[None, :])[0])
 
     @cached_property
     def quickest(self) -> tuple[float, Array]:
@@ -226,10 +226,10 @@ class MorphSpace:
             return np.asarray(self.slack(x[None, :-1])[0] - x[-1])
 
         raising = np.append(np.zeros(self.dimension), -1.0)
-        first = np.append(start, self.least_slack(start[None, :])[0])
+        first = np.append(start, self.min_slack(start[None, :])[0])
         found = _minimised(lambda x: -float(x[-1]), lambda _: raising, first, [(slack, rows)])[:-1]
         pair = np.stack([start, np.clip(found, self.lower, self.upper)])
-        return np.asarray(pair[int(np.argmax(self.least_slack(pair)))])
+        return np.asarray(pair[int(np.argmax(self.min_slack(pair)))])
 
     def waiting(self, waits: Sequence[float] = WAITS) -> Array:
         """(p, d) points of schedules that wait, then go at constant rate between ramps to the end.
@@ -282,18 +282,18 @@ class MorphSpace:
 
     def nearest(self, point: Array, margin: float) -> Array | None:
         """The point (d,) nearest to one that leaves a margin of all limits; None if none was found."""
-        slack = self.least_slack(point[None, :])[0]
+        slack = self.min_slack(point[None, :])[0]
         if slack >= margin:
             return point
         found = self.constrained(
             lambda x: float((x - point) @ (x - point)), lambda x: 2.0 * (x - point), point, 1.2 * margin
         )
-        if self.least_slack(found[None, :])[0] >= margin:
+        if self.min_slack(found[None, :])[0] >= margin:
             return found
         # along the ray to the centre, the first that does
         share = np.linspace(0.0, 1.0, 4 * RAY_POINTS)[:, None]
         along = point + share * (self.centre - point)
-        good = np.flatnonzero(self.least_slack(along) >= margin)
+        good = np.flatnonzero(self.min_slack(along) >= margin)
         return along[good[0]] if good.size else None
 
     def put_back(self, point: Array, other: Array) -> Array:
@@ -342,7 +342,7 @@ def _minimised(
         jac=gradient,
         constraints=constraints,
         method="SLSQP",
-        options={"maxiter": MOST_ITERATIONS, "ftol": TOLERANCE},
+        options={"maxiter": MAX_ITERATIONS, "ftol": TOLERANCE},
     ).x
     return found if np.all(np.isfinite(found)) else start
 

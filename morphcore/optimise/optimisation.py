@@ -259,8 +259,8 @@ class ScheduleOptimisation(MorphCase):
 
     def _too_much_torque(self, found: Found, stop: Stop | None) -> InvalidInput:
         """The error that says how long a morph takes that the hinges' motors can drive."""
-        most = self.limits.max_hinge_torque_nm
-        least = found.torque
+        maximum = self.limits.max_hinge_torque_nm
+        minimum = found.torque
         for factor in LONGER:
             duration = factor * found.duration_s
             search = self._search(Task("equivalent", duration), ())
@@ -269,13 +269,17 @@ class ScheduleOptimisation(MorphCase):
                 state = search.advance(state, stop)
             if state.feasible:
                 time_s = rounded_up(duration)
-                hint = f"raise duration_s to about {time_s:g}, or the limit to {rounded_up(least):g} or more"
+                hint = (
+                    f"raise duration_s to about {time_s:g}, or the limit to {rounded_up(minimum):g} or more"
+                )
                 break
         else:
-            hint = f"raise the limit to {rounded_up(least):g} or more; the air loads alone require much of it"
+            hint = (
+                f"raise the limit to {rounded_up(minimum):g} or more; the air loads alone require much of it"
+            )
         return InvalidInput(
-            f"the hinges bear {least:.4g} N m at least in a morph of {found.duration_s:g} s, more than "
-            f"max_hinge_torque_nm = {most:g}",
+            f"the hinges bear {minimum:.4g} N m at least in a morph of {found.duration_s:g} s, more than "
+            f"max_hinge_torque_nm = {maximum:g}",
             pointer="/limits/max_hinge_torque_nm",
             hint=hint,
         )

@@ -68,7 +68,7 @@ class MorphProblem:
             nothing = np.zeros((0, 0))
             return Trials(points, np.zeros(0), nothing, 0, nothing)
         schedules = [self.space.schedule(point) for point in points]
-        limited = self.limit.most_nm is not None
+        limited = self.limit.max_nm is not None
         flown = self.flights.fly(schedules, torque=limited, stop=stop)
         peak = np.where(flown.diverged & limited, np.nan, flown.peak_torque)
         errors = flown.errors(self.weights)

@@ -247,7 +247,7 @@ def schedule_result(
 def _front(case: MorphCase, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
     """All durations with a schedule; those that none beats are those that vary less than all shorter ones."""
     front: list[FrontPoint] = []
-    least = np.inf
+    minimum = np.inf
     for item in searched:
         if not item.feasible:
             continue
@@ -256,9 +256,9 @@ def _front(case: MorphCase, searched: tuple[Found, ...], *, judged: bool) -> tup
             flown = case.flights("equivalent").fly([case.constant(item.duration_s)], torque=False)
             constant = None if flown.diverged[0] else float(flown.variation[0])
         schedule = case.space(item.duration_s).schedule(item.point)
-        beaten = item.variation >= least
+        beaten = item.variation >= minimum
         front.append(FrontPoint(item.duration_s, schedule, item.variation, constant, beaten))
-        least = min(least, item.variation)
+        minimum = min(minimum, item.variation)
     return tuple(front)
 
 

@@ -91,8 +91,8 @@ class ScreenedDescent(Solver[ScreenedState, Trials]):
         if limits.max_hinge_torque_nm is None:
             return space
         share = limits.max_hinge_torque_nm / known.peak[0]
-        most = share * float(space.peak_acceleration(known.points[:1])[0])
+        maximum = share * float(space.peak_acceleration(known.points[:1])[0])
         if limits.max_accel_rad_s2 is not None:
-            most = min(most, limits.max_accel_rad_s2)
-        gentle = replace(space, limits=limits.model_copy(update={"max_accel_rad_s2": most}))
+            maximum = min(maximum, limits.max_accel_rad_s2)
+        gentle = replace(space, limits=limits.model_copy(update={"max_accel_rad_s2": maximum}))
         return gentle if gentle.room >= HELD else space

@@ -24,7 +24,7 @@ AIM = 0.99  # of the limit, when a schedule is drawn back: the torque is not lin
 NEAR = 0.9  # of the limit: drawn back this far is far enough
 LINEAR_MARGIN = 1e-3  # of the limit, in linear models
 WATCHED = 0.5  # of the limit: torques above are watched in linear models
-MOST_WATCHED = 200
+MAX_WATCHED = 200
 
 
 @stored
@@ -65,13 +65,13 @@ class Anchored(Batch):
 class TorqueLimit:
     """The largest torque of any hinge, N m; None is no limit."""
 
-    most_nm: float | None
+    max_nm: float | None
 
     def keeps(self, peak: Array) -> NDArray[np.bool_]:
         """Whether peak torques keep the limit."""
-        if self.most_nm is None:
+        if self.max_nm is None:
             return np.ones(peak.shape, dtype=np.bool_)
-        return peak <= self.most_nm  # false for the NaN of a diverged flight
+        return peak <= self.max_nm  # false for the NaN of a diverged flight
 
     def kept(self, space: MorphSpace, batch: Anchored, fly: Callable[[Array], Trials]) -> Trials:
         """Fly points (p, d), each drawn back to its anchor until it keeps the limit.
@@ -83,7 +83,7 @@ class TorqueLimit:
         count = flown.evaluations
         points, cost, peak = batch.points.copy(), flown.cost.copy(), flown.peak.copy()
         open_ = np.flatnonzero(~self.keeps(peak))
-        if self.most_nm is None or open_.size == 0:
+        if self.max_nm is None or open_.size == 0:
             return Trials.known(points, cost, peak, count)
         targets = points.copy()
         points[open_], cost[open_] = anchors.points[open_], anchors.cost[open_]
@@ -92,7 +92,7 @@ class TorqueLimit:
         high, high_peak = np.ones(points.shape[0]), np.where(np.isfinite(flown.peak), flown.peak, np.inf)
         for _ in range(ROUNDS):
             rise = np.maximum(high_peak[open_] - low_peak[open_], 1e-12)
-            share = np.clip((AIM * self.most_nm - low_peak[open_]) / rise, 0.1, 0.9)
+            share = np.clip((AIM * self.max_nm - low_peak[open_]) / rise, 0.1, 0.9)
             middle = low[open_] + share * (high[open_] - low[open_])
             held = anchors.points[open_]
             between = held + middle[:, None] * (targets[open_] - held)
@@ -104,20 +104,20 @@ class TorqueLimit:
             points[inside], cost[inside], peak[inside] = tried[good], again.cost[good], again.peak[good]
             low[inside], low_peak[inside] = middle[good], again.peak[good]
             high[outside], high_peak[outside] = middle[~good], np.nan_to_num(again.peak[~good], nan=np.inf)
-            open_ = open_[~(good & (again.peak > NEAR * self.most_nm))]
+            open_ = open_[~(good & (again.peak > NEAR * self.max_nm))]
             if open_.size == 0:
                 break
         return Trials.known(points, cost, peak, count)
 
     def linear(self, base: Array, torque: Array, gradient: Array) -> tuple[Map, Map] | None:
         """Slacks of the limit and their gradients, from torques (n,) and gradients (n, d) at a base (d,)."""
-        if self.most_nm is None:
+        if self.max_nm is None:
             return None
-        watched = np.flatnonzero(np.abs(torque) > WATCHED * self.most_nm)
+        watched = np.flatnonzero(np.abs(torque) > WATCHED * self.max_nm)
         if watched.size == 0:
             return None
-        watched = watched[:: -(-watched.size // MOST_WATCHED)]
+        watched = watched[:: -(-watched.size // MAX_WATCHED)]
         side = np.sign(torque[watched])
-        rows = -side[:, None] * gradient[watched] / self.most_nm
-        room = 1.0 - LINEAR_MARGIN - np.abs(torque[watched]) / self.most_nm
+        rows = -side[:, None] * gradient[watched] / self.max_nm
+        room = 1.0 - LINEAR_MARGIN - np.abs(torque[watched]) / self.max_nm
         return (lambda z: room + rows @ (z - base)), (lambda _: rows)

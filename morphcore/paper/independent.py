@@ -101,8 +101,8 @@ def _compared(sample: Trajectory, ours: Simulation) -> Document:
         "range_rad": per_angle(span),
         # of the sample's range; None for an angle that does not move
         "worst_share": {
-            angle: float(most / wide) if wide > SILENT_RAD else None
-            for angle, most, wide in zip(ANGLES, largest, span, strict=True)
+            angle: float(maximum / wide) if wide > SILENT_RAD else None
+            for angle, maximum, wide in zip(ANGLES, largest, span, strict=True)
         },
         "ours": _angles(ours.trajectory),
     }

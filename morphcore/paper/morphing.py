@@ -91,8 +91,8 @@ def search_morph(
 
 def search_fastest(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
     """The shortest morph whose variation is at most that of the constant rate in two seconds."""
-    most = results["morph"]["variation"]["constant"]["equivalent"]
-    morph = FASTEST_MORPH.model_copy(update={"max_variation_rad2": most})
+    maximum = results["morph"]["variation"]["constant"]["equivalent"]
+    morph = FASTEST_MORPH.model_copy(update={"max_variation_rad2": maximum})
     return (yield from search_morph(morph, our_search, settings, results, checkpoint))
 
 

@@ -75,8 +75,8 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
         self._settings, self._seed = settings, seed
         # the package's strategy as it was last used: what it received, and the generation that it asks for
         self._strategy: Any = None
-        self._told = EvolutionState(np.empty(0), np.empty((0, 0)))
-        self._asked: Array | None = None
+        self._seen = EvolutionState(np.empty(0), np.empty((0, 0)))
+        self._candidates: Array | None = None
 
     def init(self, known: Outcome) -> EvolutionState:
         """Begin around the first point."""
@@ -85,10 +85,10 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
     def ask(self, state: EvolutionState) -> Batch:
         """Return the generation that follows a state."""
         self._go_to(state)
-        if self._asked is None:
+        if self._candidates is None:
             with _own_numbers():
-                self._asked = np.array(self._strategy.ask())
-        return Batch(self._box.from_unit(self._asked))
+                self._candidates = np.array(self._strategy.ask())
+        return Batch(self._box.from_unit(self._candidates))
 
     def tell(self, state: EvolutionState, outcome: Outcome) -> EvolutionState:
         """Add the costs of a generation."""
@@ -112,21 +112,21 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
 
     def _go_to(self, state: EvolutionState) -> None:
         """Give the strategy the costs that it has not received yet; begin again where it received others."""
-        known = self._told.generation
+        known = self._seen.generation
         if (
             self._strategy is None
             or known > state.generation
-            or not np.array_equal(self._told.mean, state.mean)
-            or not np.array_equal(self._told.costs, state.costs[:known])
+            or not np.array_equal(self._seen.mean, state.mean)
+            or not np.array_equal(self._seen.costs, state.costs[:known])
         ):
-            self._told, self._asked = replace(state, costs=state.costs[:0]), None
+            self._seen, self._candidates = replace(state, costs=state.costs[:0]), None
             self._strategy = self._begun(state.mean)
-        for cost in state.costs[self._told.generation :]:
+        for cost in state.costs[self._seen.generation :]:
             with _own_numbers():
-                asked = self._strategy.ask() if self._asked is None else list(self._asked)
-                self._strategy.tell(asked, cost.tolist())
-            self._asked = None
-        self._told = state
+                requested = self._strategy.ask() if self._candidates is None else list(self._candidates)
+                self._strategy.tell(requested, cost.tolist())
+            self._candidates = None
+        self._seen = state
 
     def _begun(self, mean: Array) -> Any:
         numbers = np.random.default_rng(self._seed)

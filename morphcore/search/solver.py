@@ -121,8 +121,8 @@ class Solver(ABC, Generic[State, Result]):
         ``state`` : after that outcome.
         """
         del state
-        least = int(np.argmin(outcome.cost))
-        return outcome.points[least], float(outcome.cost[least])
+        minimum = int(np.argmin(outcome.cost))
+        return outcome.points[minimum], float(outcome.cost[minimum])
 
     def between_steps(self, state: State) -> bool:
         """Return whether a step ends here; a step may take several batches."""

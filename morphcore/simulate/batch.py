@@ -16,7 +16,7 @@ from morphcore.models.kernels.layout import JOINTS, state_rows
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.kernels.step import SLOPES
 from morphcore.simulate.plan import FlightPlan
-from morphcore.stopping import Stop, heed
+from morphcore.stopping import Stop, check_stop
 from morphcore.threads import in_threads, thread_count
 
 Array = NDArray[np.float64]
@@ -113,7 +113,7 @@ def fly_batch(
     yield Chunk(0, state[None, :, :record_rows].transpose(0, 2, 1))
     length = int(np.clip(CHUNK_BLOCK_STEPS * threads // count, 1, LONGEST_CHUNK))
     for first in range(0, plan.grid.steps, length):
-        heed(stop)
+        check_stop(stop)
         last = min(first + length, plan.grid.steps)
         operators, strips = plan.middle.table.between(first, last)
         hinges, wind_N = plan.middle.hinges[first:last], plan.middle.wind_N[first:last]

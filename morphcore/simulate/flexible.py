@@ -36,7 +36,7 @@ from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
     INVERSE_WANTED,
     MATRIX_WANTED,
-    MOST_ITERATIONS,
+    MAX_ITERATIONS,
     RECORD,
     STILL,
     Path,
@@ -393,7 +393,7 @@ def set_in_motion(
         wing = slice(root, tip + 1)
         V[wing] = carried(poses, root, V[root], wing)
     circulation = state.circulation
-    for iteration in range(MOST_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         flight.follow(poses, V, A, path, 0)
         demands = flight.structure(poses, V, A)
         if iteration == 0:

@@ -16,7 +16,7 @@ from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim
-from morphcore.stopping import Stop, heed
+from morphcore.stopping import Stop, check_stop
 from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def flexible_flight(
     run = FlexibleRun(flight, path, grid, wind_N, begin)
     for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None
-        heed(stop)
+        check_stop(stop)
         with one_blas_thread():
             run.fly_to(min(first + CHUNK_STEPS, grid.steps))
     history = _history(run.records)

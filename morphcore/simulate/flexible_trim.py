@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10  # rad and m, of the displacement that the remaining imbalance would cause
 ACCEPTED = 1e3 * TOLERANCE  # Krylov steps may stall in the last digits; this is far below what a flight shows
-MOST_ITERATIONS = 40
+MAX_ITERATIONS = 40
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an angle
 
 
@@ -164,9 +164,9 @@ def trim_flexible(
             x = _newton(balance)
         residual = float(np.abs(balance.imbalance(x)).max())
     except (BeamTurnedTooFar, ValueError):
-        raise TrimNotFound(residual=float("inf"), iterations=MOST_ITERATIONS) from None
+        raise TrimNotFound(residual=float("inf"), iterations=MAX_ITERATIONS) from None
     if not residual < ACCEPTED:
-        raise TrimNotFound(residual=residual, iterations=MOST_ITERATIONS)
+        raise TrimNotFound(residual=residual, iterations=MAX_ITERATIONS)
     state, demands = balance.state(x)
     given = balance.given
     if given is not None:
@@ -183,7 +183,7 @@ def _newton(balance: _Balance) -> Array:
                 balance.imbalance,  # type: ignore[arg-type]
                 np.zeros(balance.unknowns),
                 f_tol=TOLERANCE,
-                maxiter=MOST_ITERATIONS,
+                maxiter=MAX_ITERATIONS,
                 method="lgmres",
             )
         )

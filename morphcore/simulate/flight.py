@@ -42,7 +42,7 @@ from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.samplefiles.csv_table import write_table
-from morphdata.samplefiles.flight import FEWEST_ROWS, LONGEST_FLIGHT_S, MOST_ROWS
+from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
 from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
 
 Array = NDArray[np.float64]
@@ -383,10 +383,10 @@ def _output_times(
             hint=f"it must be at most {LONGEST_FLIGHT_S:g}",
         )
     rows = int(np.floor(min(duration_s / output_step_s, 1e9) + 1e-9)) + 1
-    if not FEWEST_ROWS <= rows <= MOST_ROWS:
+    if not MIN_ROWS <= rows <= MAX_ROWS:
         raise InvalidInput(
             f"{duration_s:g} s in steps of {output_step_s:g} s make {rows} rows",
             pointer="/output_step_s",
-            hint=f"choose duration_s and output_step_s for {FEWEST_ROWS} to {MOST_ROWS} rows",
+            hint=f"choose duration_s and output_step_s for {MIN_ROWS} to {MAX_ROWS} rows",
         )
     return begin + output_step_s * np.arange(rows, dtype=np.float64)

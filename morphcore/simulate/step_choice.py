@@ -15,7 +15,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
-from morphcore.stopping import Stop, heed, say
+from morphcore.stopping import Stop, check_stop, say
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def choose_step(
     batch = physical_guess(model) if batch is None else batch
 
     def plan(schedules: Sequence[Schedule], grid: TimeGrid) -> FlightPlan:
-        heed(stop)
+        check_stop(stop)
         return flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=may_halve)
 
     tried = [

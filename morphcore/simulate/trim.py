@@ -27,7 +27,7 @@ from morphcore.simulate.plan import FlightPlan
 Array = NDArray[np.float64]
 StartMode = Literal["trim", "given"]
 
-MOST_ITERATIONS = 25
+MAX_ITERATIONS = 25
 FULL_STEPS = 2  # Newton steps with a Jacobian of their own; later ones reuse it
 ANGLE_TOLERANCE = 1e-11  # rad, of the last Newton step in angle of attack and joint angles
 ANGLE_PROBE = 1e-6  # rad; balances truncation and round-off of a forward difference in double precision
@@ -56,7 +56,7 @@ class Trim(Shown):
     def require(self) -> Trim:
         """Itself, if every parameter set is trimmed; else TrimNotFound."""
         if not np.all(self.converged):
-            raise TrimNotFound(residual=float(np.nanmax(self.residual)), iterations=MOST_ITERATIONS)
+            raise TrimNotFound(residual=float(np.nanmax(self.residual)), iterations=MAX_ITERATIONS)
         return self
 
 
@@ -158,7 +158,7 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
     residual = np.full(particles, np.inf if free else 0.0)
     moving = np.ones(particles, dtype=np.bool_)
     jacobian = np.empty((particles, free, free))
-    for iteration in range(MOST_ITERATIONS if free else 0):
+    for iteration in range(MAX_ITERATIONS if free else 0):
         if iteration < FULL_STEPS or iteration % 5 == 0:
             probed = unbalance(x[:, None, :] + moved)
             jacobian = ((probed[:, 1:] - probed[:, :1]) / probes[:, None]).transpose(0, 2, 1)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from morphdata.samplefiles.fault import FileFault, shown
-from morphdata.samplefiles.flight import MOST_ROWS, angle_fault, from_first_row
+from morphdata.samplefiles.flight import MAX_ROWS, angle_fault, from_first_row
 from morphdata.samplefiles.titles import (
     FLIGHT,
     SWEEPS,
@@ -18,8 +18,8 @@ from morphdata.samplefiles.titles import (
     missing_columns,
 )
 
-MOST_DRIVES = 64  # 16 surfaces of 4 hinges each
-MOST_DRIVE_NUMBERS = 2_000_000  # in all columns that could be drives: 20 of the longest flight
+MAX_DRIVES = 64  # 16 surfaces of 4 hinges each
+MAX_DRIVE_NUMBERS = 2_000_000  # in all columns that could be drives: 20 of the longest flight
 
 Numbers = Iterable[float]
 
@@ -34,25 +34,25 @@ class Wanted:
     optional : those of them that may be missing.
     others : whether further columns of numbers are given too, as they are; those that could be drives are
         given in any case, in rad.
-    most_rows : a longer file is refused.
+    max_rows : a longer file is refused.
     """
 
     names: tuple[str, ...] = FLIGHT
     optional: tuple[str, ...] = SWEEPS
     others: bool = False
-    most_rows: int = MOST_ROWS
+    max_rows: int = MAX_ROWS
 
     def further(self, titles: Iterable[str]) -> list[str]:
         """Which of the further columns are read."""
         if self.others:
             return [title for title in titles if title]
-        return _preferred([title for title in titles if drive_meant(title) is not None], MOST_DRIVES)
+        return _preferred([title for title in titles if drive_meant(title) is not None], MAX_DRIVES)
 
     def too_many_rows(self) -> FileFault:
         """The fault of a file that is too long."""
         return FileFault(
             "too_many_rows",
-            f"the file has more than {self.most_rows} rows",
+            f"the file has more than {self.max_rows} rows",
             "10 ms between rows are enough: leave out rows, or split the flight",
         )
 
@@ -82,10 +82,10 @@ class FlightColumns:
         return {**{name: self.values[name] for name in SWEEPS if name in self.values}, **self.candidates}
 
 
-def _preferred(names: Sequence[str], most: int) -> list[str]:
+def _preferred(names: Sequence[str], maximum: int) -> list[str]:
     """So many of the names that drives may have, those with a side first; in their order."""
     kept = set(
-        sorted(names, key=lambda name: not any(f"_{side}" in name for side in ("left", "right")))[:most]
+        sorted(names, key=lambda name: not any(f"_{side}" in name for side in ("left", "right")))[:maximum]
     )
     return [name for name in names if name in kept]
 
@@ -163,9 +163,9 @@ def gathered(
     """
     meant, unreadable = _meant(titles, units or {})
     rows = len(next(iter(columns.values.values())))
-    most = min(MOST_DRIVES, MOST_DRIVE_NUMBERS // max(rows, 1))
+    maximum = min(MAX_DRIVES, MAX_DRIVE_NUMBERS // max(rows, 1))
     candidates: dict[str, array[float]] = {}
-    kept = _preferred([name for name, (title, _) in meant.items() if title in columns.others], most)
+    kept = _preferred([name for name, (title, _) in meant.items() if title in columns.others], maximum)
     read = wanted.further(titles)
     for name, (title, factor) in meant.items():
         if title not in columns.others and title in read:
@@ -173,7 +173,7 @@ def gathered(
         elif name not in kept:
             unreadable[name] = FileFault(
                 "too_many_columns",
-                f"{shown(title)} is not read: more than {most} further columns could be drives",
+                f"{shown(title)} is not read: more than {maximum} further columns could be drives",
                 "leave out the columns that are none",
             )
         else:

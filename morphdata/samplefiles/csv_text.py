@@ -206,7 +206,7 @@ class _Table:
 
     def add(self, row: Sequence[str], line: int) -> None:
         """Take a row that stands on a line."""
-        if len(self._lines) == self._wanted.most_rows:
+        if len(self._lines) == self._wanted.max_rows:
             raise self._wanted.too_many_rows()
         if len(row) != len(self._titles):
             raise self._uneven(row, line)

@@ -9,8 +9,8 @@ from itertools import pairwise
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.titles import FLIGHT
 
-FEWEST_ROWS = 3
-MOST_ROWS = 100_000  # of one flight: 1000 s at 10 ms
+MIN_ROWS = 3
+MAX_ROWS = 100_000  # of one flight: 1000 s at 10 ms
 LONGEST_FLIGHT_S = 600.0
 SHORTEST_STEP_S = 1e-6
 # no flight recorder counts from a start so long ago (11 days, s): beyond, the clock counts from an epoch
@@ -60,11 +60,11 @@ def flight_faults(
     called = called or {name: name for name in columns}
     angles = [name for name in (*FLIGHT, *columns) if name in columns and name != "t"]
     times = columns["t"]
-    if not FEWEST_ROWS <= len(times) <= MOST_ROWS:
+    if not MIN_ROWS <= len(times) <= MAX_ROWS:
         yield FileFault(
-            "too_short" if len(times) < FEWEST_ROWS else "too_many_rows",
+            "too_short" if len(times) < MIN_ROWS else "too_many_rows",
             f"the flight has {len(times)} rows",
-            f"give {FEWEST_ROWS} to {MOST_ROWS} rows; 10 ms between them are enough",
+            f"give {MIN_ROWS} to {MAX_ROWS} rows; 10 ms between them are enough",
         )
         return
     for name in dict.fromkeys(angles):

@@ -43,7 +43,7 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         items = document[title]
         if not isinstance(items, list):
             raise FileFault("list_type", f"{shown(title)} is not a list", HINT, title=title)
-        if len(items) > wanted.most_rows:
+        if len(items) > wanted.max_rows:
             raise wanted.too_many_rows()
         if name == "t" and items and isinstance(items[0], str):
             items = _dates(items, title)

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, gathered, in_si
 from morphdata.samplefiles.comments import is_octave
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
-from morphdata.samplefiles.titles import MOST_COLUMNS, chosen, meaning
+from morphdata.samplefiles.titles import MAX_COLUMNS, chosen, meaning
 
 NUMBERS = frozenset(
     {"double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
@@ -86,7 +86,7 @@ def _contents(stream: BinaryIO) -> Contents:
 
 
 def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns:
-    if len(contents) > MOST_COLUMNS:
+    if len(contents) > MAX_COLUMNS:
         raise FileFault(
             "too_many_columns", f"the file has {len(contents)} variables", "keep only the six columns needed"
         )
@@ -139,7 +139,7 @@ def _require_vector(name: str, shape: tuple[int, ...], kind: str, wanted: Wanted
     if not _is_vector(shape):
         size = " x ".join(map(str, shape))
         raise FileFault("not_a_vector", f"{shown(name)} is {size}", "give one row or column", title=name)
-    if max(shape) > wanted.most_rows:
+    if max(shape) > wanted.max_rows:
         raise wanted.too_many_rows()
 
 

@@ -7,11 +7,11 @@ from typing import Any, BinaryIO
 
 from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, gathered, in_si, not_finite
 from morphdata.samplefiles.fault import FileFault, shown
-from morphdata.samplefiles.titles import MOST_COLUMNS, chosen
+from morphdata.samplefiles.titles import MAX_COLUMNS, chosen
 
 BATCH_ROWS = 16_384
 CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of Arrow's moments and durations, s
-MOST_THRIFT = 10_000_000  # bytes and items of the footer; what it claims is allocated before it is read
+MAX_THRIFT = 10_000_000  # bytes and items of the footer; what it claims is allocated before it is read
 
 
 def read_parquet(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
@@ -34,8 +34,8 @@ def read_parquet(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         file = pq.ParquetFile(
             stream,
             pre_buffer=False,
-            thrift_string_size_limit=MOST_THRIFT,
-            thrift_container_size_limit=MOST_THRIFT,
+            thrift_string_size_limit=MAX_THRIFT,
+            thrift_container_size_limit=MAX_THRIFT,
         )
         return _read(file, wanted)
     except (pa.ArrowException, OSError, ValueError, TypeError, OverflowError) as error:
@@ -48,26 +48,26 @@ def read_parquet(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
 
 
 def _read(file: Any, wanted: Wanted) -> FlightColumns:
-    if file.metadata.num_rows > wanted.most_rows:
+    if file.metadata.num_rows > wanted.max_rows:
         raise wanted.too_many_rows()
-    if file.metadata.num_columns > MOST_COLUMNS:
+    if file.metadata.num_columns > MAX_COLUMNS:
         raise FileFault(
             "too_many_columns", f"the file has {file.metadata.num_columns} columns", "keep the six that count"
         )
     schema = file.schema_arrow
     titles = list(schema.names)
     found = chosen(titles, wanted.names, wanted.optional)
-    asked = {titles[position]: name for name, (position, _) in found.items()}
-    for title, name in asked.items():
+    requested = {titles[position]: name for name, (position, _) in found.items()}
+    for title, name in requested.items():
         _require_numbers(schema.field(title).type, title, dates=name == "t")
     numeric = [
         title
         for title in dict.fromkeys(titles)
-        if title not in asked and titles.count(title) == 1 and _numeric(schema, title)
+        if title not in requested and titles.count(title) == 1 and _numeric(schema, title)
     ]
     others = wanted.further(numeric)
-    read, further = _decoded(file, list(asked), others, wanted)
-    if not len(read[next(iter(asked))]):
+    read, further = _decoded(file, list(requested), others, wanted)
+    if not len(read[next(iter(requested))]):
         raise FileFault("no_rows", "the file holds no rows", "give rows of numbers")
     values = {}
     for name, (position, factor) in found.items():
@@ -80,22 +80,22 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
             columns.others[title] = in_si(raw, 1.0, title)
         except FileFault as fault:
             faults[title] = fault
-    return gathered(wanted, [title for title in titles if title not in asked], columns, faults=faults)
+    return gathered(wanted, [title for title in titles if title not in requested], columns, faults=faults)
 
 
 def _decoded(
-    file: Any, asked: list[str], others: list[str], wanted: Wanted
+    file: Any, requested: list[str], others: list[str], wanted: Wanted
 ) -> tuple[dict[str, Any], dict[str, array[float]]]:
     """Read columns batch by batch, counting rows: the footer may lie."""
     import pyarrow as pa
 
-    read: dict[str, Any] = {title: [] for title in asked}
+    read: dict[str, Any] = {title: [] for title in requested}
     further = {title: array("d") for title in others}
     rows = 0
-    for batch in file.iter_batches(batch_size=BATCH_ROWS, columns=[*asked, *others], use_threads=False):
-        if rows + batch.num_rows > wanted.most_rows:
+    for batch in file.iter_batches(batch_size=BATCH_ROWS, columns=[*requested, *others], use_threads=False):
+        if rows + batch.num_rows > wanted.max_rows:
             raise wanted.too_many_rows()
-        for title in asked:
+        for title in requested:
             column = batch.column(title)
             if column.null_count:
                 raise not_finite(title, None, rows + column.is_valid().to_pylist().index(False))

@@ -13,7 +13,7 @@ FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 SWEEPS = ("sweep_left", "sweep_right")
 ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
 DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
-MOST_COLUMNS = 1000  # a file of more is something else, or an attack
+MAX_COLUMNS = 1000  # a file of more is something else, or an attack
 LONGEST_TITLE = 200
 SYNONYMS = {"time": "t"}
 DEGREE = math.pi / 180.0
@@ -115,7 +115,7 @@ def chosen(
     ------
     FileFault : two titles mean the same, or one is missing.
     """
-    if len(titles) > MOST_COLUMNS:
+    if len(titles) > MAX_COLUMNS:
         raise FileFault(
             "too_many_columns",
             f"the file has {len(titles)} columns",

@@ -138,7 +138,7 @@ def test_a_good_spelling_stays(url: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("url", "told"),
+    ("url", "reported"),
     [
         ("rediss://h?ssl_cert_reqs=maybe", "required, optional or none"),
         ("redis://h?ssl_cert_reqs=none", "rediss://"),
@@ -148,14 +148,14 @@ def test_a_good_spelling_stays(url: str) -> None:
         ("unix://", "full path"),
     ],
 )
-def test_an_address_that_means_nothing_is_refused(url: str, told: str) -> None:
+def test_an_address_that_means_nothing_is_refused(url: str, reported: str) -> None:
     """Nonsense is refused at the start, in a sentence that names the setting."""
     with pytest.raises(UnsafeSettings, match="MORPHID_BROKER_URL") as caught:
         load_settings(broker_url=url)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)
 
 
-def test_no_word_of_the_password_is_told() -> None:
+def test_no_word_of_the_password_is_reported() -> None:
     """A slash in a password makes nonsense of the address; the refusal does not repeat it."""
     with pytest.raises(UnsafeSettings) as caught:
         load_settings(broker_url="redis://:hun/ter2@queue.example/0")

@@ -17,7 +17,7 @@ from app.settings import UnsafeSettings, load_settings
 from tests.folder_names import ALL_NESTED, FOLDER_NAMES
 
 
-def test_the_database_lies_where_it_was_asked(tmp_path: Path) -> None:
+def test_the_database_lies_where_it_was_requested(tmp_path: Path) -> None:
     """Migrated up and down and read, in a folder of any name; nothing is made anywhere else."""
     folder = tmp_path / ALL_NESTED
     url = load_settings(data_dir=folder).database_url

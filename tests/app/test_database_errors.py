@@ -84,7 +84,7 @@ def test_an_exhausted_pool_passes() -> None:
         ("42P01", 500, "internal_error", None),
     ],
 )
-def test_what_a_client_is_told(sqlstate: str, status: int, code: str, retry: str | None) -> None:
+def test_what_a_client_is_reported(sqlstate: str, status: int, code: str, retry: str | None) -> None:
     """A database that is away or full is 503 with `Retry-After`; a fault of ours stays a 500."""
     app = FastAPI()
     install_problem_handlers(app)

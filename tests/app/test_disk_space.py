@@ -162,7 +162,7 @@ def test_a_reserve_is_really_there_and_lends_slice_by_slice(tmp_path: Path) -> N
     assert [reserve.lend() for _ in range(4)] == [True, True, True, False]
 
 
-def test_without_a_reserve_the_first_error_is_told(url: str) -> None:
+def test_without_a_reserve_the_first_error_is_reported(url: str) -> None:
     """A write that does not fit where nothing is lent leaves no trace."""
     upgrade(url)
     database = Database(url)

@@ -126,13 +126,13 @@ def test_sigterm_ends_open_streams(environment: dict[str, str]) -> None:
     process = _serve(environment, port)
     _wait_until_alive(url)
     job = httpx.post(f"{url}/identify", json=identify_document()).json()
-    told: list[str] = []
+    reported: list[str] = []
     listening = threading.Semaphore(0)
 
     def follow() -> None:
         with httpx.stream("GET", f"{url}/jobs/{job['id']}/events", timeout=30.0) as stream:
             listening.release()
-            told.append("".join(stream.iter_text()))
+            reported.append("".join(stream.iter_text()))
 
     followers = [threading.Thread(target=follow) for _ in range(3)]
     for follower in followers:
@@ -144,7 +144,7 @@ def test_sigterm_ends_open_streams(environment: dict[str, str]) -> None:
     process.wait(10.0)
     for follower in followers:
         follower.join(5.0)
-    assert len(told) == 3
+    assert len(reported) == 3
     assert time.perf_counter() - stop < 4.0
 
 

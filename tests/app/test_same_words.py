@@ -54,8 +54,8 @@ def test_a_flight_is_refused_in_the_librarys_words(service: RunningService, bad:
     with pytest.raises(InvalidInput) as inline:
         InlineSample.parse(document, "/samples/2")
     said = inline.value.message, inline.value.hint
-    asked = changed(identify_document(), "/samples/2", document)
-    found = fault(post(service, "/identify", asked))
+    requested = changed(identify_document(), "/samples/2", document)
+    found = fault(post(service, "/identify", requested))
     assert (found["detail"], found["hint"], found["pointer"]) == (*said, inline.value.pointer)
     plain = {name: value for name, value in document.items() if name != "role"}
     uploaded = fault(post(service, "/trajectories", plain))

@@ -17,7 +17,7 @@ from benchmarks.operations import operations
 from benchmarks.setting import QUICK, bench_of
 
 BASELINE = Path(__file__).with_name("operations.json")
-MOST_GROWTH = 1.10
+MAX_GROWTH = 1.10
 RENEW = "python -m tests.benchmarks.operations_baseline"
 
 
@@ -32,7 +32,7 @@ def grown(baseline: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
     return [
         f"{name}: {count:,} operations a simulated second, {before.get(name, 0):,} before"
         for name, count in _leaves(found)
-        if count > MOST_GROWTH * before.get(name, 0)
+        if count > MAX_GROWTH * before.get(name, 0)
     ]
 
 

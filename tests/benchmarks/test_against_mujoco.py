@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.against_mujoco import ERROR_RAD, MOST_STEPS, against_mujoco, fewest_steps
+from benchmarks.against_mujoco import ERROR_RAD, MAX_STEPS, against_mujoco, min_steps
 from benchmarks.forced_tree import (
     OUTPUT_S,
     SWEEPS_RAD,
@@ -63,8 +63,8 @@ def test_fewest_steps_finds_the_longest_step(needed: int) -> None:
     def error(steps: int) -> float:
         return float("nan") if steps < needed / 3 else ERROR_RAD * (needed - 0.5) / steps
 
-    assert fewest_steps(error) == needed
-    assert fewest_steps(lambda steps: error(steps) * MOST_STEPS * 2) is None
+    assert min_steps(error) == needed
+    assert min_steps(lambda steps: error(steps) * MAX_STEPS * 2) is None
 
 
 def test_attitude_error_is_the_angle_between() -> None:

@@ -16,7 +16,7 @@ from app.tables import job_events
 from tests.identification_request import identification
 from tests.worker.spread.processes import Workers, spread
 
-LEAST_KEPT = (
+MIN_KEPT = (
     0.85  # of a flight's computing time is left when it comes in chunks; 1.7 = 2 x 0.85 on two free cores
 )
 GENERATIONS = 2
@@ -80,12 +80,12 @@ def test_two_workers_fly_almost_twice_as_fast(tmp_path: Path) -> None:
     runs: dict[str, list[Run]] = {"single": [], "two": [], "one": []}
     with Workers(Database(url)) as workers:
         for _ in range(ROUNDS):
-            for kind, asked, names in (
+            for kind, requested, names in (
                 ("single", request, ("a",)),
                 ("two", spread(request), ("a", "b")),
                 ("one", spread(request), ("a",)),
             ):
-                runs[kind].append(flown(workers, asked, *names))
+                runs[kind].append(flown(workers, requested, *names))
                 print(f"{kind:7s} {runs[kind][-1].rate:7.1f} flights/s", flush=True)
     every = [run for of_kind in runs.values() for run in of_kind]
     assert all(run.content == every[0].content for run in every)
@@ -101,4 +101,4 @@ def test_two_workers_fly_almost_twice_as_fast(tmp_path: Path) -> None:
     best = max(run.rate for run in runs["two"]) / max(run.rate for run in runs["single"])
     print(f"best against best: {best:.2f} x mode single")
     # seconds on the clock are told, not judged: they are also those of whoever else uses this machine
-    assert one_cpu / single_cpu >= LEAST_KEPT
+    assert one_cpu / single_cpu >= MIN_KEPT

@@ -58,7 +58,7 @@ def remark(row: Locator) -> str:
     return row.locator("xpath=following-sibling::tr[1]").inner_text()
 
 
-def test_intervals_stand_beside_the_parameters(service: RunningService, page: Page) -> None:
+def test_intervals_stand_next_to_the_parameters(service: RunningService, page: Page) -> None:
     """An interval is a ± where it is symmetric, else two ends; both are rounded to the interval's width."""
     shown(page, service, ended(service, "identify", identify_document(), result(uncertainty=UNCERTAINTY)))
 

@@ -39,7 +39,7 @@ def test_bodies_stand_where_the_tree_says(seed: int) -> None:
         np.testing.assert_allclose(data.body(f"body_{body}").xmat.reshape(3, 3), R_NX[body], atol=1e-12)
 
 
-def test_model_says_what_was_asked() -> None:
+def test_model_says_what_was_requested() -> None:
     """Start (any length of quaternion), gravity, step, springs and dampers arrive in the model."""
     tree = reference_tree(3)
     text = mjcf(

@@ -66,7 +66,7 @@ def test_searches_share_logarithmic_axes() -> None:
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
 
 
-def test_predictions_stand_beside_their_errors() -> None:
+def test_predictions_stand_next_to_their_errors() -> None:
     """One row for each angle that moves; errors are ours minus theirs, in mrad, of both laws."""
     found = made_up.results()["independent"]
     figure = independent_figure(found["samples"], found["laws"])

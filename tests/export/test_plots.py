@@ -134,7 +134,7 @@ def test_any_history_can_be_drawn(history: list[dict[str, Any]]) -> None:
     assert identification_plots(_document(history), {"samples": []})["convergence.svg"]
 
 
-def test_convergence_counts_flights_where_they_are_told() -> None:
+def test_convergence_counts_flights_where_they_are_reported() -> None:
     """Least cost over flights on a logarithmic axis; over generations without counts."""
     axes = convergence_figure(_document()).axes[0]
     assert axes.get_xlabel() == "flights flown"

@@ -87,8 +87,8 @@ class Rig:
         environment: Mapping[str, str] | None = None,
     ) -> Child:
         """Start a worker as `morphid serve` does, its operations walks, and the beat beside the first one."""
-        told = {**self._environment, "MORPHID_WORKERS": str(slots), **(environment or {})}
-        child = self._start(serve.worker_process(told, slots), name, "--hostname", f"{name}@%h")
+        reported = {**self._environment, "MORPHID_WORKERS": str(slots), **(environment or {})}
+        child = self._start(serve.worker_process(reported, slots), name, "--hostname", f"{name}@%h")
         if self.worker is None:
             self.worker = child
             self.start_beat()
@@ -105,8 +105,8 @@ class Rig:
     def start_api(self, environment: Mapping[str, str] | None = None) -> Child:
         """Start the API as `morphid serve` does, and wait until it answers."""
         port = free_port(0)
-        told = {**self._environment, "MORPHID_PORT": str(port), **(environment or {})}
-        child = self._start(serve.api_process(told, LOOPBACK, port), "api")
+        reported = {**self._environment, "MORPHID_PORT": str(port), **(environment or {})}
+        child = self._start(serve.api_process(reported, LOOPBACK, port), "api")
         self.url = f"http://{LOOPBACK}:{port}"
         assert self.supervisor.wait_until(child, self.api_answers, 30.0), child.last_words(40)
         return child

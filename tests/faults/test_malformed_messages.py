@@ -28,8 +28,8 @@ def dropped(rig: Rig) -> int:
 
 def readiness(rig: Rig) -> dict[str, Any]:
     """What the API says of the service."""
-    told: dict[str, Any] = httpx.get(f"{rig.url}/readyz", timeout=20.0).json()
-    return told
+    reported: dict[str, Any] = httpx.get(f"{rig.url}/readyz", timeout=20.0).json()
+    return reported
 
 
 def feed(rig: Rig, jobs: int, messages: int, *, seed: int = 5) -> list[str]:

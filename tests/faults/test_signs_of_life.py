@@ -24,12 +24,12 @@ def test_a_worker_that_no_longer_consumes_is_not_ready(rig: Rig) -> None:
     rig.start_api(seen)
     worker = rig.start_worker(environment=seen)
 
-    def told() -> tuple[str, str]:
+    def reported() -> tuple[str, str]:
         state = httpx.get(f"{rig.url}/readyz", timeout=30.0).json()
         return state["status"], state["workers"]["status"]
 
     def until(*state: str, within_s: float = WITHIN_S) -> None:
-        rig.until(lambda: told() == state, within_s)
+        rig.until(lambda: reported() == state, within_s)
 
     def strict() -> int:
         return httpx.get(f"{rig.url}/readyz", params={"strict": True}, timeout=30.0).status_code
@@ -66,19 +66,19 @@ def test_a_hung_broker_is_not_ok(rig: Rig) -> None:
     rig.start_api(seen)
     rig.start_worker(environment=seen)
 
-    def told() -> tuple[str, str]:
+    def reported() -> tuple[str, str]:
         state = httpx.get(f"{rig.url}/readyz", timeout=30.0).json()
         return state["broker"], state["workers"]["status"]
 
     def until(condition: Callable[[], bool], within_s: float = WITHIN_S) -> None:
         rig.until(condition, within_s)
 
-    until(lambda: told() == ("ok", "ok"), START_S)
+    until(lambda: reported() == ("ok", "ok"), START_S)
     broker = rig.supervisor.children["broker"].pid
     assert broker is not None
     os.kill(broker, signal.SIGSTOP)
-    until(lambda: told() == ("unreachable", "ok"))
+    until(lambda: reported() == ("unreachable", "ok"))
     job_id = rig.add(steps=3, pause_s=0.01, published=False)
     rig.until(lambda: rig.job(job_id).finished, WITHIN_S)
     os.kill(broker, signal.SIGCONT)
-    until(lambda: told() == ("ok", "ok"))
+    until(lambda: reported() == ("ok", "ok"))

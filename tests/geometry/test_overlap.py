@@ -109,7 +109,7 @@ def test_a_wing_folded_through_a_tail_crosses_it() -> None:
     assert not overlap(side_by_side, 1.4)
 
 
-def test_the_row_of_a_sweep_is_told() -> None:
+def test_the_row_of_a_sweep_is_reported() -> None:
     """Of a sweep that runs into another surface, a row at which it has arrived there is given."""
     wing = example_aircraft().surfaces[0]
     tail = {"position_m": (-1.5, 1.5, 0.0), "hinges": (), "span_m": 1.0}

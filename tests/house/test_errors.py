@@ -65,7 +65,7 @@ def made(kind: type[BaseException]) -> BaseException:
     return error
 
 
-def told(error: BaseException) -> dict[str, Any]:
+def reported(error: BaseException) -> dict[str, Any]:
     """What an error carries; another error among it by its words."""
     return {
         name: str(item) if isinstance(item, BaseException) else item for name, item in vars(error).items()
@@ -85,7 +85,7 @@ def test_an_error_survives_pickling(kind: type[BaseException]) -> None:
     error = made(kind)
     again = pickle.loads(pickle.dumps(error))  # noqa: S301 - its own
     assert type(again) is type(error)
-    assert (str(again), again.args, told(again)) == (str(error), error.args, told(error))
+    assert (str(again), again.args, reported(again)) == (str(error), error.args, reported(error))
     assert again.__notes__ == error.__notes__
 
 
@@ -97,7 +97,7 @@ def test_an_error_comes_out_of_a_process_pool() -> None:
             error = made(kind)
             caught = pool.submit(exec, "raise error", {"error": error}).exception(timeout=60.0)
             assert type(caught) is kind
-            assert (str(caught), told(caught) | {"__notes__": 0}) == (
+            assert (str(caught), reported(caught) | {"__notes__": 0}) == (
                 str(error),
-                told(error) | {"__notes__": 0},
+                reported(error) | {"__notes__": 0},
             )

@@ -193,8 +193,8 @@ def test_intervals_of_fits_hold_the_truth(links: int, correlation: float) -> Non
         for name, (low, high) in found.intervals.items():
             if low is not None and high is not None:
                 held.setdefault(name, []).append(low <= expected[name] <= high)
-    told = {name: float(np.mean(each)) for name, each in held.items() if len(each) >= FITS / 2}
-    print(links, correlation, {name: round(share, 3) for name, share in told.items()})
-    assert len(told) >= links
-    for name, share in told.items():
+    reported = {name: float(np.mean(each)) for name, each in held.items() if len(each) >= FITS / 2}
+    print(links, correlation, {name: round(share, 3) for name, share in reported.items()})
+    assert len(reported) >= links
+    for name, share in reported.items():
         assert 0.90 - 3.0 * np.sqrt(0.09 / FITS) <= share <= 0.99 + 1.0 / FITS, name

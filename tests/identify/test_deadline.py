@@ -38,8 +38,8 @@ def test_a_deadline_says_whose_stop_it_was() -> None:
     now = iter([0.0, 4.9, 5.0, 5.1])
     deadline = Deadline(5.0, clock=lambda: next(now))
     assert [deadline(), deadline(), deadline.passed] == [False, True, True]
-    asked = Deadline(None, lambda: True)
-    assert (asked(), asked.passed) == (True, False)
+    requested = Deadline(None, lambda: True)
+    assert (requested(), requested.passed) == (True, False)
 
 
 def test_a_search_without_time_flies_the_guess_and_ends() -> None:

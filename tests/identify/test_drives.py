@@ -9,7 +9,7 @@ import pytest
 
 from morphcore.errors import InvalidInput
 from morphcore.identify.cost import costs, sample_cases, sample_schedules
-from morphcore.identify.sought import asymmetric
+from morphcore.identify.free_corrections import asymmetric
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.trajectory import Trajectory

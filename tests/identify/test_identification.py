@@ -144,17 +144,17 @@ def test_every_step_has_a_result() -> None:
 
 def test_stop_interrupts_between_chunks() -> None:
     """A stop that turns true within a generation ends the search there; earlier steps stay valid."""
-    asked = 0
+    requested = 0
 
     def stop() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked > 8
+        nonlocal requested
+        requested += 1
+        return requested > 8
 
     run, done = quick(), []
     with pytest.raises(Interrupted):
         done.extend(run.steps(stop=stop))
-    assert 9 <= asked < 9 + thread_count()  # each thread ends at its own next chunk
+    assert 9 <= requested < 9 + thread_count()  # each thread ends at its own next chunk
 
 
 def test_time_budget_ends_the_search_with_its_best() -> None:
@@ -228,7 +228,7 @@ def test_held_out_samples_do_not_change_the_fit() -> None:
 
 
 def test_one_link_has_only_corrections_to_find() -> None:
-    """The rigid model can be identified too: without joints only the corrections that show are sought."""
+    """The rigid model can be identified too: without joints only the corrections that show are searched."""
     samples = [shortened(example("rate_0.8"), 60)]
     run = Identification(
         reference_aircraft(), reference_flight(), samples, EquivalentModel(links_per_wing=1), QUICK

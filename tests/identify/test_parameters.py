@@ -21,11 +21,11 @@ def space(links: int = 3, **options: object) -> SearchSpace:
 @pytest.mark.parametrize("links", [1, 2, 3, 5, 8])
 def test_the_guess_decodes_to_beam_theory(links: int) -> None:
     """The centre of the box is the physical guess itself, also in the division of the span."""
-    sought = space(links)
-    shares = [name.startswith("log_ratio") for name in sought.names]
-    centre = 0.5 * (sought.lower + sought.upper)
-    np.testing.assert_allclose(centre[shares], sought.guess[shares], atol=1e-12)
-    found, expected = sought.decode(sought.guess), physical_guess(sought.model)
+    searched = space(links)
+    shares = [name.startswith("log_ratio") for name in searched.names]
+    centre = 0.5 * (searched.lower + searched.upper)
+    np.testing.assert_allclose(centre[shares], searched.guess[shares], atol=1e-12)
+    found, expected = searched.decode(searched.guess), physical_guess(searched.model)
     assert found.values.keys() == expected.values.keys()
     for name, value in expected.values.items():
         np.testing.assert_allclose(found[name], value, rtol=1e-12, atol=1e-15)
@@ -35,9 +35,9 @@ def test_the_guess_decodes_to_beam_theory(links: int) -> None:
 @given(st.integers(2, 8), st.integers(0, 2**31))
 def test_every_point_of_the_box_is_a_model(links: int, seed: int) -> None:
     """Anywhere in the box the divisions sum to one and stiffness, damping, lag and lift are positive."""
-    sought = space(links)
-    x = np.random.default_rng(seed).uniform(sought.lower, sought.upper, (4, sought.dimension))
-    batch = sought.decode(x)
+    searched = space(links)
+    x = np.random.default_rng(seed).uniform(searched.lower, searched.upper, (4, searched.dimension))
+    batch = searched.decode(x)
     np.testing.assert_allclose(batch["division"].sum(axis=2), 1.0, rtol=1e-14)
     for values in (
         batch["division"],
@@ -51,14 +51,14 @@ def test_every_point_of_the_box_is_a_model(links: int, seed: int) -> None:
 
 def test_bounds_given_in_si_units_hold() -> None:
     """Corners of the box decode to the bounds that the user gave."""
-    sought = space(
+    searched = space(
         3, bounds={"stiffness_nm_rad": [2e4, 3e5], "lift_factor": [0.9, 1.2], "division": [0.2, 0.5]}
     )
-    low, high = sought.decode(sought.lower), sought.decode(sought.upper)
+    low, high = searched.decode(searched.lower), searched.decode(searched.upper)
     np.testing.assert_allclose([low["stiffness_nm_rad"].min(), high["stiffness_nm_rad"].max()], [2e4, 3e5])
     np.testing.assert_allclose([low["lift_factor"][0], high["lift_factor"][0]], [0.9, 1.2])
-    x = np.random.default_rng(0).uniform(sought.lower, sought.upper, (2000, sought.dimension))
-    division = sought.decode(x)["division"]
+    x = np.random.default_rng(0).uniform(searched.lower, searched.upper, (2000, searched.dimension))
+    division = searched.decode(x)["division"]
     assert division.min() >= 0.2
     assert division.max() <= 0.5
 
@@ -70,22 +70,22 @@ def test_bounds_of_the_division_leave_what_room_they_can(low: float, high: float
     It is as wide as it can be: no share leaves the bounds anywhere, and one reaches them at a corner, or the
     ratios reach their range of 1.5.
     """
-    sought = space(3, bounds={"division": [low, high]})
+    searched = space(3, bounds={"division": [low, high]})
     ratios = slice(0, 2)
-    lower, upper = sought.lower[ratios], sought.upper[ratios]
+    lower, upper = searched.lower[ratios], searched.upper[ratios]
     nominal = np.array([2 / 9, 4 / 9, 1 / 3]) if low < 2 / 9 and high > 4 / 9 else np.full(3, 1 / 3)
     np.testing.assert_allclose(0.5 * (lower + upper), np.log(nominal[:2] / nominal[2]), atol=1e-9)
-    limits = sought.parameter_limits[:3]
+    limits = searched.parameter_limits[:3]
     assert limits.min() >= low
     assert limits.max() <= high
     assert np.allclose(upper - lower, 3.0) or np.isclose(limits, [low, high], rtol=1e-9).any()
 
 
-def test_corrections_that_are_not_sought_stay_neutral() -> None:
+def test_corrections_that_are_not_searched_stay_neutral() -> None:
     """Leaving a correction out takes it from the box and keeps its physical default."""
-    sought = space(2, aero_coefficients=["lift_factor"])
-    assert sought.names[-1] == "lift_factor"
-    batch = sought.decode(sought.upper)
+    searched = space(2, aero_coefficients=["lift_factor"])
+    assert searched.names[-1] == "lift_factor"
+    batch = searched.decode(searched.upper)
     assert batch["profile_drag"][0, 0] == 0.01
     assert batch["ac_offset_m"][0] == 0.0
 

@@ -45,26 +45,26 @@ def run(aircraft: Aircraft, model: EquivalentModel = TWO, search: SearchSettings
 @pytest.mark.parametrize(("factor", "expected_s"), [(1.0, 0.01), (0.1, 0.005)])
 def test_a_soft_aircraft_flies_in_shorter_steps(factor: float, expected_s: float) -> None:
     """The reference takes the longest step; wings that bend ten times as far move too far in one."""
-    sought = run(softened(factor))
-    assert sought.step_s == expected_s
-    assert all(case.plan.grid.step_s == pytest.approx(expected_s) for case in sought.cases)
+    searched = run(softened(factor))
+    assert searched.step_s == expected_s
+    assert all(case.plan.grid.step_s == pytest.approx(expected_s) for case in searched.cases)
 
 
 def test_the_result_holds_the_step_used() -> None:
     """Later flights of the model take it from there; what was asked for stays open in the settings."""
-    sought = run(softened(0.1))
-    *_, last = sought.steps()
-    assert sought.result(last.checkpoint).to_document()["model"]["step_s"] == 0.005
-    assert sought.settings.step_s is None
+    searched = run(softened(0.1))
+    *_, last = searched.steps()
+    assert searched.result(last.checkpoint).to_document()["model"]["step_s"] == 0.005
+    assert searched.settings.step_s is None
 
 
 @pytest.mark.parametrize("step_s", [0.01, 0.004])
 def test_a_step_asked_for_is_kept(step_s: float) -> None:
     """Whatever the choice would be."""
-    sought = run(softened(0.1), EquivalentModel(links_per_wing=2, step_s=step_s))
-    assert sought.step_s == step_s
-    *_, last = sought.steps()
-    assert sought.result(last.checkpoint).to_document()["model"]["step_s"] == step_s
+    searched = run(softened(0.1), EquivalentModel(links_per_wing=2, step_s=step_s))
+    assert searched.step_s == step_s
+    *_, last = searched.steps()
+    assert searched.result(last.checkpoint).to_document()["model"]["step_s"] == step_s
 
 
 def test_a_resumed_search_flies_the_same_steps() -> None:
@@ -78,8 +78,8 @@ def test_a_resumed_search_flies_the_same_steps() -> None:
 def test_held_out_flights_have_no_say() -> None:
     """The step follows from the flights to fit alone."""
     hard = replace(shortened(example("asymmetric"), 90), role="held_out")
-    sought = Identification(softened(0.1), reference_flight(), [FLIGHT, hard], TWO, QUICK)
-    assert sought.step_s == run(softened(0.1)).step_s
+    searched = Identification(softened(0.1), reference_flight(), [FLIGHT, hard], TWO, QUICK)
+    assert searched.step_s == run(softened(0.1)).step_s
 
 
 def test_without_a_trim_the_default_is_flown() -> None:
@@ -87,12 +87,12 @@ def test_without_a_trim_the_default_is_flown() -> None:
     assert run(softened(0.05)).step_s == STEP_S
 
 
-def test_the_choice_heeds_a_stop() -> None:
+def test_the_choice_checks_a_stop() -> None:
     """It gives up at once, before anything is flown, and is made anew by who comes later."""
-    sought = run(softened(0.1))
+    searched = run(softened(0.1))
     with pytest.raises(Interrupted):
-        next(sought.steps(stop=lambda: True))
-    assert sought.step_s == 0.005
+        next(searched.steps(stop=lambda: True))
+    assert searched.step_s == 0.005
 
 
 def test_every_number_of_links_chooses_its_own() -> None:

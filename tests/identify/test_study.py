@@ -146,9 +146,9 @@ def test_every_step_has_rows(undisturbed: tuple[Study, list[Step]]) -> None:
 
 def test_stop_interrupts_between_chunks(undisturbed: tuple[Study, list[Step]]) -> None:
     """A stop that turns true ends the study at once, in a search as in a round of timing."""
-    asked = itertools.count()
+    requested = itertools.count()
     with pytest.raises(Interrupted):
-        list(quick().steps(stop=lambda: next(asked) > 5))
+        list(quick().steps(stop=lambda: next(requested) > 5))
     _, steps = undisturbed
     with pytest.raises(Interrupted):
         list(quick().steps(steps[-3].checkpoint, stop=lambda: True))

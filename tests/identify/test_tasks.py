@@ -30,13 +30,13 @@ def search(settings: SearchSettings = SWARM) -> Identification:
 
 
 @pytest.mark.parametrize("particles", [1, 15, 16, 17, 75, 160])
-@pytest.mark.parametrize("most", [1, 2, 7, 100])
-def test_parts_are_whole_blocks_and_make_up_the_task(particles: int, most: int) -> None:
+@pytest.mark.parametrize("maximum", [1, 2, 7, 100])
+def test_parts_are_whole_blocks_and_make_up_the_task(particles: int, maximum: int) -> None:
     """Parts come in order, are whole blocks of lanes but for the end, and are never empty or too many."""
     points = np.arange(3.0 * particles).reshape(particles, 3)
-    parts = Batch(points).parts(most)
+    parts = Batch(points).parts(maximum)
     np.testing.assert_array_equal(np.concatenate(parts), points)
-    assert len(parts) == min(most, -(-particles // TOGETHER))
+    assert len(parts) == min(maximum, -(-particles // TOGETHER))
     assert all(part.shape[0] % TOGETHER == 0 for part in parts[:-1])
     assert all(part.shape[0] > 0 for part in parts)
 
@@ -48,8 +48,8 @@ def test_a_cost_does_not_depend_on_its_part() -> None:
     task = run.task(first.checkpoint)
     assert task is not None
     whole = run.task_costs(task.points)
-    for most in (2, 3, 5):
-        parts = [run.task_costs(part) for part in task.parts(most)]
+    for maximum in (2, 3, 5):
+        parts = [run.task_costs(part) for part in task.parts(maximum)]
         np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 

@@ -43,7 +43,7 @@ def test_an_unseen_parameter_is_reported() -> None:
 def test_standard_errors_cover_the_truth() -> None:
     """Refits of one flight under fresh noise scatter as the standard errors say.
 
-    Two corrections are sought from twelve noisy copies of a flight with known parameters. The estimates'
+    Two corrections are searched from twelve noisy copies of a flight with known parameters. The estimates'
     deviations from the truth, in standard errors, must have a mean square near one: chi-square with 24
     degrees of freedom lies in 0.4..2.0 with 99.8 per cent probability.
     """

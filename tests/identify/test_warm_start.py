@@ -46,9 +46,9 @@ def flights_to(steps: Iterable[Step], cost: float) -> int:
 
 def identified(search: SearchSettings = COLD) -> tuple[list[Step], ParameterBatch]:
     """All steps of a search, and its model."""
-    sought = run(search)
-    steps = list(sought.steps())
-    document = sought.best_so_far(steps[-1].checkpoint).to_document()
+    searched = run(search)
+    steps = list(searched.steps())
+    document = searched.best_so_far(steps[-1].checkpoint).to_document()
     return steps, parameters_from_document(document)
 
 
@@ -120,8 +120,8 @@ def test_first_particles_of_a_swarm() -> None:
     swarm = SearchSettings(method="pso", seed=3)
     cold, warm = run(swarm), run(replace(swarm, warm_start=parameters_from_document(MODEL)))
     tasks = []
-    for sought in (cold, warm):
-        task = sought.task(next(iter(sought.steps())).checkpoint)
+    for searched in (cold, warm):
+        task = searched.task(next(iter(searched.steps())).checkpoint)
         assert task is not None
         tasks.append(task.points)
     # the box is mapped onto the unit cube and back

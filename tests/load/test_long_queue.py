@@ -63,7 +63,7 @@ def test_looking_at_jobs(rig: Rig, tell: Tell) -> None:
     assert max(times.p95_ms for times in lists.values()) < LIST_P95_MS
 
 
-def test_a_short_queue_beside_a_long_one(rig: Rig, tell: Tell) -> None:
+def test_a_short_queue_next_to_a_long_one(rig: Rig, tell: Tell) -> None:
     """Of two tenants one has 5,000 jobs queued: each job of the other starts within two job lengths."""
     many = fill(rig.database, "many", 5_000, steps=10, pause_s=JOB_S / 10)
     for job_id in many:

@@ -36,18 +36,18 @@ class PlayedService:
         self.operation = operation
         self.result = result
         self.ending = ending
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.body: dict[str, Any] = {}
 
     def __call__(self, request: httpx.Request) -> httpx.Response:
         """Answer one request."""
         call = f"{request.method} {request.url.path}"
-        self.asked.append(call)
+        self.requested.append(call)
         if call == f"POST /{self.operation}":
             self.body = json.loads(request.content)
-        status = "running" if self.asked.count(call) < 2 else self.ending
+        status = "running" if self.requested.count(call) < 2 else self.ending
         answers = {
-            "POST /trajectories": httpx.Response(201, json={"id": f"traj_{self.asked.count(call)}"}),
+            "POST /trajectories": httpx.Response(201, json={"id": f"traj_{self.requested.count(call)}"}),
             f"POST /{self.operation}": httpx.Response(202, json=self.job("queued")),
             "GET /jobs/job_1": httpx.Response(200, json=self.job(status)),
             "GET /jobs/job_1/request": httpx.Response(200, json=self.request),

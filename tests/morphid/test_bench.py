@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks import fresh_process, run
-from morphcore.stopping import Interrupted, heed, stoppable
+from morphcore.stopping import Interrupted, check_stop, stoppable
 from morphid.exits import Exit
 from morphid.main import app
 
@@ -32,7 +32,7 @@ def test_ctrl_c_ends_it(interrupts: int, monkeypatch: pytest.MonkeyPatch) -> Non
         reached.append("loaded")
         if interrupts == 2:
             os.kill(os.getpid(), signal.SIGINT)
-        heed()
+        check_stop()
         reached.append("worked on")
         return {}
 

@@ -48,8 +48,10 @@ def test_keys_copies_and_the_doctor_agree(tmp_path: Path, monkeypatch: pytest.Mo
     run("db", "restore", copy, "--data-dir", home)
     assert len(json.loads(run("keys", "ls", "--json", "--data-dir", home))) == 2
     monkeypatch.setattr("morphid.doctor.machine.COMPILE", """print('{"numba": "0", "cache": "/tmp"}')""")
-    told = json.loads(RUNNER.invoke(app, ["doctor", "--json", "--data-dir", str(home)]).stdout)["findings"]
-    states = {each["name"]: (each["state"], each["message"]) for each in told}
+    reported = json.loads(RUNNER.invoke(app, ["doctor", "--json", "--data-dir", str(home)]).stdout)[
+        "findings"
+    ]
+    states = {each["name"]: (each["state"], each["message"]) for each in reported}
     assert states["data directory"] == ("ok", str(home))
     assert states["database"][0] == "ok"
     assert states["integrity"][0] == "ok"

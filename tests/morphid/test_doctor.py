@@ -68,9 +68,9 @@ def doctor(*words: str, **variables: str) -> tuple[int, dict[str, dict[str, str]
         check=False,
     )
     assert done.returncode in {Exit.OK, Exit.ENVIRONMENT}, done.stderr
-    told = json.loads(done.stdout)
-    assert (told["status"] == "fail") == (done.returncode == Exit.ENVIRONMENT)
-    return done.returncode, {each["name"]: each for each in told["findings"]}
+    reported = json.loads(done.stdout)
+    assert (reported["status"] == "fail") == (done.returncode == Exit.ENVIRONMENT)
+    return done.returncode, {each["name"]: each for each in reported["findings"]}
 
 
 def test_this_installation_is_sound(tmp_path: Path) -> None:
@@ -102,8 +102,8 @@ def test_other_packages_than_tested(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_a_compiler_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kernels that cannot be compiled are a fault, kernels that cannot be kept a nuisance."""
     (tmp_path / "file").touch()
-    told = json.dumps({"numba": "0", "cache": str(tmp_path / "file" / "cache")})
-    monkeypatch.setattr(machine, "COMPILE", f"print({told!r})")
+    reported = json.dumps({"numba": "0", "cache": str(tmp_path / "file" / "cache")})
+    monkeypatch.setattr(machine, "COMPILE", f"print({reported!r})")
     assert states(machine.compiler()) == {"compiler": State.OK, "kernel cache": State.WARN}
     monkeypatch.setattr(machine, "COMPILE", "raise RuntimeError('no compiler')")
     (finding,) = machine.compiler()
@@ -141,9 +141,9 @@ def test_contradicting_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_few_open_files(monkeypatch: pytest.MonkeyPatch) -> None:
     """A limit below what the API needs is a fault."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    told = machine.resource
-    for most, state in ((200, State.FAIL), (800, State.WARN), (100_000, State.OK)):
-        monkeypatch.setattr(told, "getrlimit", lambda _which, most=most: (most, most))
+    reported = machine.resource
+    for maximum, state in ((200, State.FAIL), (800, State.WARN), (100_000, State.OK)):
+        monkeypatch.setattr(reported, "getrlimit", lambda _which, maximum=maximum: (maximum, maximum))
         assert states(machine.files()) == {"open files": state}
     monkeypatch.undo()
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == (soft, hard)

@@ -80,10 +80,10 @@ def test_a_running_search_is_cancelled_within_two_seconds(live_service: LiveServ
         for seen in service.watch(job["id"], poll_s=0.1):
             if ((seen.get("progress") or {}).get("generation") or 0) >= 1:
                 break
-        asked_at = time.monotonic()
+        requested_at = time.monotonic()
         service.cancel(job["id"])
         *_, ended = service.watch(job["id"], poll_s=0.05)
-        took_s = time.monotonic() - asked_at
+        took_s = time.monotonic() - requested_at
         assert ended["status"] == "cancelled"
         result = service.result(job["id"])
     print(f"cancel to end: {took_s:.2f} s")

@@ -74,7 +74,7 @@ def test_bounds_are_options_too(examples: Path, play: Play) -> None:
 
 
 @pytest.mark.parametrize(
-    ("bounds", "code", "told"),
+    ("bounds", "code", "reported"),
     [
         ("lag_s", Exit.USAGE, "NAME=LOW:HIGH"),
         ("lag_s=a:b", Exit.USAGE, "NAME=LOW:HIGH"),
@@ -83,12 +83,12 @@ def test_bounds_are_options_too(examples: Path, play: Play) -> None:
         ("lift=0.8:1.2", Exit.INVALID_INPUT, "/model/bounds/lift"),
     ],
 )
-def test_bounds_that_make_no_sense_are_named(examples: Path, bounds: str, code: Exit, told: str) -> None:
+def test_bounds_that_make_no_sense_are_named(examples: Path, bounds: str, code: Exit, reported: str) -> None:
     """A bound that cannot be read, cannot be searched, or leaves no room, before anything is loaded."""
     words = [word for word in arguments(examples) if word not in ("--url", "http://there")]
     ended = RUNNER.invoke(app, [*words, "--bounds", bounds])
     assert ended.exit_code == code, ended.output
-    assert told in " ".join(ended.stderr.replace("│", " ").split())
+    assert reported in " ".join(ended.stderr.replace("│", " ").split())
 
 
 def test_the_verdict_is_printed(examples: Path, play: Play) -> None:

@@ -68,7 +68,7 @@ def test_a_key_has_what_was_asked_for(here: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (("--scope", "everything"), "no scope"),
         (("--expires", "soon"), "is no time"),
@@ -80,11 +80,11 @@ def test_a_key_has_what_was_asked_for(here: Path) -> None:
         (("--name", 65 * "x"), "the name"),
     ],
 )
-def test_what_makes_no_key_is_a_sentence(here: Path, words: tuple[str, str], told: str) -> None:
+def test_what_makes_no_key_is_a_sentence(here: Path, words: tuple[str, str], reported: str) -> None:
     """Nothing is stored, and the way out is told."""
     result = keys(here, "create", "--owner", "lab", "--name", "x", *words)
     assert result.exit_code in (Exit.USAGE, Exit.INVALID_INPUT)
-    assert told in result.output
+    assert reported in result.output
     assert json.loads(keys(here, "ls", "--json").stdout) == []
 
 

@@ -136,7 +136,7 @@ def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "reported"),
     [
         ("", Exit.USAGE, "--parameters"),
         ("--model-id model_1", Exit.USAGE, "--url"),
@@ -151,12 +151,12 @@ def test_an_optimum_is_found_and_flown(tmp_path: Path) -> None:
         ("--parameters M --out nowhere/s.csv", Exit.ENVIRONMENT, "--out nowhere/s.csv"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_option(tmp_path: Path, words: str, code: Exit, told: str) -> None:
+def test_what_is_wrong_is_said_with_its_option(tmp_path: Path, words: str, code: Exit, reported: str) -> None:
     """A mistake in the command line is answered with the option at fault and a way out."""
     chosen = [parameters_file(tmp_path) if word == "M" else word for word in words.split()]
     ended = RUNNER.invoke(app, command("optimize", *MORPH, *chosen))
     assert ended.exit_code == code, ended.output
-    assert told in " ".join(ended.stderr.replace("│", " ").split())
+    assert reported in " ".join(ended.stderr.replace("│", " ").split())
 
 
 @pytest.mark.timeout(600)

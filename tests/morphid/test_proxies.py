@@ -82,8 +82,8 @@ def test_the_command_s_clients_reach_this_machine(here: str) -> None:
     """`jobs`, `doctor`, the readiness that `serve` waits for, and the client scripts."""
     ended = RUNNER.invoke(app, ["jobs", "ls", "--json", "--url", here])
     assert (ended.exit_code, json.loads(ended.stdout)) == (Exit.OK, []), ended.output
-    told = json.loads(RUNNER.invoke(app, ["doctor", "--json", "--url", here]).stdout)["findings"]
-    assert "has version 0" in told[0]["message"]
+    reported = json.loads(RUNNER.invoke(app, ["doctor", "--json", "--url", here]).stdout)["findings"]
+    assert "has version 0" in reported[0]["message"]
     assert _alive("127.0.0.1", int(here.rpartition(":")[2]))
     with client_for(here.replace("127.0.0.1", "localhost")) as client:
         assert client.get("/livez").status_code == httpx.codes.OK

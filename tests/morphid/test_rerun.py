@@ -27,7 +27,7 @@ def test_the_request_goes_to_its_operation_again(play: Play) -> None:
     done = RUNNER.invoke(app, ["jobs", "rerun", "job_1", "--url", "http://morphid"])
     assert (done.exit_code, done.stdout) == (Exit.OK, "job_1\n"), done.output
     assert service.body == REQUEST
-    assert service.asked == ["GET /jobs/job_1", "GET /jobs/job_1/request", "POST /identify"]
+    assert service.requested == ["GET /jobs/job_1", "GET /jobs/job_1/request", "POST /identify"]
 
 
 def test_changes_are_made_where_they_point(play: Play) -> None:

@@ -117,11 +117,11 @@ def test_serve_takes_option_then_variable_then_default(
 def test_what_serve_is_told_reaches_its_children(tmp_path: Path) -> None:
     """The API, the worker and the beat read variables: they get the ones that the options came to."""
     settings = settings_for(data_dir=tmp_path / "x", host="127.0.0.5", workers=7)
-    told = serving._environment(settings, 8123)
+    reported = serving._environment(settings, 8123)
     for name, value in load_settings(**{k: getattr(settings, k) for k in ("data_dir", "host", "workers")}):
-        variable = told.get(PREFIX + name.upper())
+        variable = reported.get(PREFIX + name.upper())
         assert variable is None or variable == str(8123 if name == "port" else value)
-    assert told["MORPHID_DATABASE_URL"] == sqlite_url(tmp_path / "x" / "morphid.sqlite3")
+    assert reported["MORPHID_DATABASE_URL"] == sqlite_url(tmp_path / "x" / "morphid.sqlite3")
 
 
 @pytest.mark.parametrize("words", ON_A_DATABASE, ids=" ".join)

@@ -134,7 +134,7 @@ def test_a_model_of_the_service_is_named_by_its_id(play: Play) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "reported"),
     [
         ("", Exit.USAGE, "--rate and --final"),
         ("--rate 1", Exit.USAGE, "--rate and --final"),
@@ -150,11 +150,11 @@ def test_a_model_of_the_service_is_named_by_its_id(play: Play) -> None:
         ("--rate 1 --final 1 --out nowhere/f.csv", Exit.ENVIRONMENT, "--out nowhere/f.csv"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_option(words: str, code: Exit, told: str) -> None:
+def test_what_is_wrong_is_said_with_its_option(words: str, code: Exit, reported: str) -> None:
     """A mistake in the command line is answered with the option at fault and a way out."""
     ended = RUNNER.invoke(app, command("simulate", *words.split()))
     assert ended.exit_code == code, ended.output
-    assert told in " ".join(ended.stderr.replace("│", " ").split())
+    assert reported in " ".join(ended.stderr.replace("│", " ").split())
 
 
 def test_what_is_wrong_in_a_file_is_said_with_the_file(tmp_path: Path) -> None:

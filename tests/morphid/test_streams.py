@@ -121,13 +121,13 @@ def test_the_c_locale(tmp_path: Path) -> None:
     create = ["create", "--owner", "a", "--name", "Flügel φ"]
     data_dir = tmp_path / "Fluß"
     for words in (create, ["ls"]):
-        told = environment(LC_ALL="C")
+        reported = environment(LC_ALL="C")
         line = [*command, *words, "--data-dir", str(data_dir)]
-        ended = subprocess.run(line, env=told, cwd=ROOT, capture_output=True, check=False)
+        ended = subprocess.run(line, env=reported, cwd=ROOT, capture_output=True, check=False)
         assert ended.returncode == 0, ended.stderr
     assert (data_dir / "morphid.sqlite3").is_file()
-    told |= {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    ended = subprocess.run(line, env=told, cwd=ROOT, capture_output=True, check=False)
+    reported |= {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    ended = subprocess.run(line, env=reported, cwd=ROOT, capture_output=True, check=False)
     assert ended.returncode == 2
     assert b"PYTHONUTF8" in ended.stderr
     assert b"Traceback" not in ended.stderr
@@ -181,13 +181,13 @@ def test_a_reader_who_leaves_changes_nothing_else(tmp_path: Path, more: list[str
         text=True,
     )
     os.close(writing)
-    _, told = process.communicate(timeout=60)
-    assert process.returncode == 4, told
+    _, reported = process.communicate(timeout=60)
+    assert process.returncode == 4, reported
     assert json.loads((tmp_path / "r.json").read_text("utf-8")) == RESULT
     assert (tmp_path / "a.svg").read_bytes() == b"x"
     if which == "stdout":
-        assert "Traceback" not in told
-        assert "BrokenPipe" not in told
+        assert "Traceback" not in reported
+        assert "BrokenPipe" not in reported
 
 
 @pytest.mark.parametrize("words", [["--help"], ["keys", "scopes", "--json"], ["keys", "scopes"]])

@@ -57,18 +57,18 @@ def test_the_choices_reach_the_service(play: Play) -> None:
 
 
 @pytest.mark.parametrize(
-    ("links", "code", "told"),
+    ("links", "code", "reported"),
     [
         ("1,two", Exit.USAGE, "write --links 1,2,3"),
         ("1,1", Exit.INVALID_INPUT, "given by --links 1,1"),
         ("1,99", Exit.INVALID_INPUT, "given by --links 1,99"),
     ],
 )
-def test_wrong_numbers_of_links_are_named(links: str, code: Exit, told: str) -> None:
+def test_wrong_numbers_of_links_are_named(links: str, code: Exit, reported: str) -> None:
     """What is wrong with ``--links`` is said so."""
     ended = RUNNER.invoke(app, command("study", *SAMPLES, "--links", links))
     assert ended.exit_code == code, ended.output
-    assert told in ended.stderr
+    assert reported in ended.stderr
 
 
 @pytest.mark.timeout(600)

@@ -27,11 +27,11 @@ class Bench:
     Every asked point is remembered.
     """
 
-    def __init__(self, wanted=LATE, most_nm=None, space=SPACE):
-        self.wanted, self.limit, self.space, self.asked = wanted, TorqueLimit(most_nm), space, []
+    def __init__(self, wanted=LATE, max_nm=None, space=SPACE):
+        self.wanted, self.limit, self.space, self.requested = wanted, TorqueLimit(max_nm), space, []
 
     def __call__(self, points):  # noqa: D102 - see the class
-        self.asked.append(points)
+        self.requested.append(points)
         x = points - self.wanted
         errors = np.concatenate([x + 0.3 * x**2, 0.5 * (x[:, 1:] - x[:, :-1])], axis=1)
         torque = np.stack([200.0 * points.sum(axis=1), -50.0 + 0.0 * points[:, 0]], axis=1)
@@ -47,7 +47,7 @@ class Bench:
     @property
     def flown(self):
         """All points asked for, (n, d)."""
-        return np.concatenate(self.asked)
+        return np.concatenate(self.requested)
 
 
 def iterated(solver, bench, state):
@@ -76,7 +76,7 @@ def independent(space, bench, torque=np.inf):
             {"type": "ineq", "fun": lambda x: min(torque, 1e9) - 200.0 * x.sum()},
         ]
         found = minimize(lambda x: bench(x[None, :]).cost[0], start, constraints=constraints, method="SLSQP")
-        if found.success and space.least_slack(found.x[None, :])[0] > -1e-6:
+        if found.success and space.min_slack(found.x[None, :])[0] > -1e-6:
             best = min(best, found.fun)
     return best
 
@@ -86,7 +86,7 @@ def test_finds_the_minimum_at_the_limits():
     bench = Bench()
     state = descended(bench)
     assert state.cost[0] == pytest.approx(independent(SPACE, Bench()), rel=1e-5)
-    assert SPACE.least_slack(state.point)[0] < 1e-6
+    assert SPACE.min_slack(state.point)[0] < 1e-6
     assert not state.active.any()
 
 
@@ -122,7 +122,7 @@ def test_nothing_is_flown_that_breaks_a_limit():
 def test_a_torque_limit_is_met_and_kept():
     """The minimum under a torque limit is found to a per mille, and no better point was taken above it."""
     limit = 430.0
-    bench = Bench(most_nm=limit)
+    bench = Bench(max_nm=limit)
     assert bench(SPACE.centre[None, :]).peak[0] < limit
     state = descended(bench, iterations=20)
     assert state.torque[0] <= limit
@@ -168,7 +168,7 @@ def test_probes_keep_the_limits_at_every_corner(knots):
 
 def test_trials_above_the_torque_limit_are_drawn_back_to_just_below():
     """Of schedules above the limit each ends on its ray below it, close to it."""
-    bench = Bench(most_nm=440.0)
+    bench = Bench(max_nm=440.0)
     anchor = SPACE.centre
     anchors = np.tile(anchor, (5, 1))
     points = SPACE.drawn_back(LATE + np.random.default_rng(0).normal(0.0, 0.02, (5, 4)))
@@ -214,7 +214,7 @@ def test_torque_is_lowered_to_its_least():
         assert state.peak <= before
         assert state.peak == bench(state.point[None, :]).peak[0]
     assert SPACE.keeps(bench.flown).all()
-    least = np.inf
+    minimum = np.inf
     for first in (SPACE.centre, start[0]):
         found = minimize(
             lambda x: x.sum(),
@@ -222,5 +222,5 @@ def test_torque_is_lowered_to_its_least():
             constraints={"type": "ineq", "fun": lambda x: SPACE.slack(x[None, :])[0] - HELD},
             method="SLSQP",
         )
-        least = min(least, 200.0 * found.fun)
-    assert state.peak == pytest.approx(least, rel=0.02)
+        minimum = min(minimum, 200.0 * found.fun)
+    assert state.peak == pytest.approx(minimum, rel=0.02)

@@ -45,11 +45,11 @@ def test_an_impossible_morph_names_the_limit_and_the_time_that_it_takes(morph, l
     with pytest.raises(InvalidInput) as caught:
         require_schedules(space)
     assert caught.value.pointer == pointer
-    told = float(caught.value.hint.split("raise duration_s to ")[1].split()[0])
-    assert f"{told:g}" in caught.value.message
-    require_schedules(replace(space, duration_s=told))
+    reported = float(caught.value.hint.split("raise duration_s to ")[1].split()[0])
+    assert f"{reported:g}" in caught.value.message
+    require_schedules(replace(space, duration_s=reported))
     with pytest.raises(InvalidInput):
-        require_schedules(replace(space, duration_s=0.97 * told))
+        require_schedules(replace(space, duration_s=0.97 * reported))
 
 
 def test_the_looser_limit_that_the_error_tells_is_enough():

@@ -129,17 +129,17 @@ def test_stop_is_asked_between_flights(flights):
 def test_stop_is_asked_within_long_flights(flights, monkeypatch):
     """A flight of many steps is broken off in its midst, by one question at a time."""
     monkeypatch.setattr(module, "LONG_FLIGHT", 10)
-    asking, asked = threading.Lock(), []
+    asking, requested = threading.Lock(), []
 
     def stop():
         assert asking.acquire(blocking=False)
-        asked.append(None)
+        requested.append(None)
         asking.release()
-        return len(asked) > 2
+        return len(requested) > 2
 
     with pytest.raises(Interrupted):
         flights.fly(SCHEDULES[:2], torque=False, stop=stop)
-    assert len(asked) >= 3
+    assert len(requested) >= 3
 
 
 def test_a_diverged_flight_is_charged(flights):

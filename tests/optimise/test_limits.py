@@ -102,7 +102,7 @@ def test_drawing_back_goes_no_further_than_it_must(space):
 def test_the_centre_leaves_room_on_all_sides(space):
     """The centre keeps the limits with a margin that is no less than any random schedule's."""
     assert space.room > 0.05
-    assert space.room >= space.least_slack(random_points(space, 200)).max()
+    assert space.room >= space.min_slack(random_points(space, 200)).max()
 
 
 @pytest.mark.parametrize("space", SPACES[::3])
@@ -111,7 +111,7 @@ def test_the_nearest_point_with_a_margin(space):
     for point in space.drawn_back(random_points(space, 5, seed=4)):
         inside = space.nearest(point, 1e-3)
         assert inside is not None
-        assert space.least_slack(inside[None, :])[0] >= 1e-3
+        assert space.min_slack(inside[None, :])[0] >= 1e-3
         assert np.abs(inside - point).max() < 0.02
 
 

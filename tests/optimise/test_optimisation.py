@@ -191,17 +191,17 @@ def test_weights_steer_the_search_and_not_the_variation() -> None:
 
 def test_stop_interrupts_between_flights() -> None:
     """A stop that turns true within a step ends the search there; earlier steps stay valid."""
-    asked = 0
+    requested = 0
 
     def stop() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked > 8
+        nonlocal requested
+        requested += 1
+        return requested > 8
 
     done: list[Step] = []
     with pytest.raises(Interrupted):
         done.extend(optimisation().steps(stop=stop))
-    assert asked == 9
+    assert requested == 9
 
 
 def test_time_budget_is_shared_between_the_searches() -> None:
@@ -235,9 +235,9 @@ def test_a_torque_that_no_schedule_keeps_is_an_error_with_a_way_out() -> None:
     with pytest.raises(InvalidInput) as caught:
         last(run)
     assert caught.value.pointer == "/limits/max_hinge_torque_nm"
-    told = float(caught.value.message.split("bear ")[1].split()[0])
+    reported = float(caught.value.message.split("bear ")[1].split()[0])
     longer = float(caught.value.hint.split("about ")[1].split(",")[0])
-    assert told > 430.0
+    assert reported > 430.0
     assert longer > SHORT.duration_s
     last(
         optimisation(
@@ -338,7 +338,7 @@ def test_a_flexible_flight_can_be_cancelled(flexible: FlexibleDouble) -> None:
     assert document["variation"]["optimum"]["flexible"] is None
 
 
-def test_a_flexible_flight_that_fails_is_told(flexible: FlexibleDouble) -> None:
+def test_a_flexible_flight_that_fails_is_reported(flexible: FlexibleDouble) -> None:
     """What cannot be flown in the flexible model leaves its cell empty, and says why."""
     flexible.diverges = True
     run = optimisation(verify="flexible")

@@ -25,7 +25,7 @@ from morphcore.multibody.kernels.beam import beam_tangents
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 STATIC_TOLERANCE = 1e-11  # rad and m, of the last Newton step
 
 
@@ -86,7 +86,7 @@ def clamped_equilibrium(
     roots = np.setdiff1d(np.arange(beams.nodes), beams.ends[:, 1])
     right: Array = rest
     for part in np.linspace(0.0, 1.0, increments + 1)[1:]:
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             right = -node_forces(beams, work, now, rest, rest, part * gravity)
             if follower is not None:
                 right += part * follower

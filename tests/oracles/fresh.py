@@ -36,7 +36,7 @@ from tests.oracles.tree import Tree
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MOST_ITERATIONS = 20
+MAX_ITERATIONS = 20
 TRIM_TOLERANCE = 1e-10  # rad, of the last Newton step in angle of attack and joint angles
 TRIM_PROBE = 1e-5  # rad, central differences
 STEP_TOLERANCE = 1e-9  # rad/s and m/s, of the last correction to the velocities at the end of a step
@@ -255,7 +255,7 @@ class FreshModel:
 
         free = n if given is not None else n + 1
         step: Array = np.zeros(free)
-        for _ in range(MOST_ITERATIONS if free else 0):
+        for _ in range(MAX_ITERATIONS if free else 0):
             probes = TRIM_PROBE * np.eye(n + 1)[:free]
             jacobian = np.stack(
                 [(residual(x + probe) - residual(x - probe)) / (2.0 * TRIM_PROBE) for probe in probes], axis=1
@@ -265,7 +265,7 @@ class FreshModel:
             if np.abs(step).max() < TRIM_TOLERANCE:
                 break
         if free and not np.abs(step).max() < TRIM_TOLERANCE:
-            raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MOST_ITERATIONS)
+            raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MAX_ITERATIONS)
         h, state = imbalance(x)
         if given is not None:
             return FreshTrim(float(x[n]), given.force_B, given.moment_B, x[:n]), state
@@ -324,7 +324,7 @@ def _settled(
 ) -> tuple[Array, Array]:
     """Mean accelerations (6 + n,) of a step and the circulations (r,) amid it, from a guess ``a``."""
     tree, gravity_N = fresh.tree, np.array([0.0, 0.0, fresh.model.flight.gravity_m_s2])
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         motion = fresh.motion(_moved(state, a, h, 0.5 * h), hinges)
         found = fresh.loads(motion, state.lag, 0.5 * h)
         found.wrench[0] += constant

@@ -89,7 +89,7 @@ def test_ids_are_unique(outline: Outline) -> None:
     assert len(outline.ids) == len(set(outline.ids))
 
 
-def test_the_papers_headlines_stand_beside_ours(text: str) -> None:
+def test_the_papers_headlines_stand_next_to_ours(text: str) -> None:
     """10 per cent, -4.23 and +4.12 per cent, and what the made-up stages say."""
     for shown in ("about 10 %", "−4.23 %", "+4.12 %", "−25.00 %", "0.40 %"):
         assert shown in text, shown

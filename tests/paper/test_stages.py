@@ -156,13 +156,13 @@ def test_work_as_a_part_of_other_work() -> None:
         result = yield from part(Count()({}, None), 0.5, 0.25)
         return {"inner": result}
 
-    told: list[Progress] = []
+    reported: list[Progress] = []
     results: list[Document] = []
 
     def observed() -> Iterator[Progress]:
         results.append((yield from whole()))
 
-    told += observed()
+    reported += observed()
     assert results[0]["inner"]["counted"] == STEPS
-    assert [progress.fraction for progress in told] == [0.5625, 0.625, 0.6875, 0.75]
-    assert {progress.checkpoint for progress in told} == {None}
+    assert [progress.fraction for progress in reported] == [0.5625, 0.625, 0.6875, 0.75]
+    assert {progress.checkpoint for progress in reported} == {None}

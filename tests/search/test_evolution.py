@@ -20,12 +20,12 @@ def test_reaches_the_least_point_of_the_box(d: int) -> None:
     """On a bowl stretched a thousandfold it ends at the constrained minimum."""
     problem = unit_cube(ellipsoid, np.full(d, 0.3))
     end = searched(problem, EvolutionStrategy(problem, EvolutionSettings(16, 150), 7))[-1]
-    least = np.full(d, 0.8)
-    least[-1] = 1.0
-    np.testing.assert_allclose(end.best, least, atol=1e-3)
+    minimum = np.full(d, 0.8)
+    minimum[-1] = 1.0
+    np.testing.assert_allclose(end.best, minimum, atol=1e-3)
 
 
-def test_goes_on_from_what_it_was_told() -> None:
+def test_goes_on_from_what_it_was_reported() -> None:
     """Another strategy, told the same costs, asks for the same points; so does one told otherwise between."""
     settings, problem = EvolutionSettings(particles=12, generations=9), unit_cube(ellipsoid, np.full(6, 0.4))
     first, other = (EvolutionStrategy(problem, settings, 3) for _ in range(2))

@@ -68,9 +68,9 @@ def test_the_field_narrows_to_the_best_start() -> None:
     inner: list[LeastSquaresState] = [state.solver for state in states]
     for before, after in itertools.pairwise(inner):
         moved = np.flatnonzero(np.any(after.point != before.point, axis=1))
-        most = 8 if before.iteration < 3 else 4 if before.iteration < 6 else 1
-        assert moved.size <= most
-        assert set(moved) <= set(np.argsort(before.cost, kind="stable")[:most])
+        maximum = 8 if before.iteration < 3 else 4 if before.iteration < 6 else 1
+        assert moved.size <= maximum
+        assert set(moved) <= set(np.argsort(before.cost, kind="stable")[:maximum])
     assert inner[-1].iteration > 6
 
 

@@ -94,20 +94,20 @@ def test_tasks_evaluated_elsewhere_are_the_search_itself(make: Make) -> None:
     """Where a step needs costs alone, told them it goes on to the state that the loop goes to."""
     problem = unit_cube(wavy, GUESS)
     states = searched(problem, make(problem))
-    asked = 0
+    requested = 0
     for before, after in itertools.pairwise(states):
         search = Search(problem, make(problem))
         task = search.task(through_bytes(before))
         if task is None:
             assert before.history[-1] != after.history[-1]
             continue
-        asked += 1
+        requested += 1
         cost = np.concatenate([problem.evaluate(replace(task, points=p), None).cost for p in task.parts(2)])
-        told = search.tell(through_bytes(before), Outcome(task.points, cost, None, cost.size), 1.0)
-        assert content(told) == content(after)
-        assert told.wall_s == before.wall_s + 1.0
+        reported = search.tell(through_bytes(before), Outcome(task.points, cost, None, cost.size), 1.0)
+        assert content(reported) == content(after)
+        assert reported.wall_s == before.wall_s + 1.0
     assert Search(problem, make(problem)).task(states[-1]) is None
-    assert (asked > 0) == (make is not MAKERS["least_squares"])
+    assert (requested > 0) == (make is not MAKERS["least_squares"])
 
 
 def test_the_second_descent_comes_only_where_the_first_leaves_much() -> None:

@@ -70,7 +70,7 @@ def test_threads_do_not_matter(flown):
         use_threads(threads)
 
 
-def test_chunks_are_short_and_stop_is_asked(flown):
+def test_chunks_are_short_and_stop_is_requested(flown):
     """Flights come in chunks whose rows follow on each other; a stop between two of them ends it."""
     model, batch, plan, together = flown
     constants = lane_constants(model, batch, STEP_S)
@@ -80,16 +80,16 @@ def test_chunks_are_short_and_stop_is_asked(flown):
     assert firsts == [0, *np.cumsum(lengths)[:-1]]
     assert sum(lengths) == plan.grid.steps + 1
     assert max(lengths) <= LONGEST_CHUNK
-    asked = []
+    requested = []
 
     def stop():
-        asked.append(None)
-        return len(asked) > 1
+        requested.append(None)
+        return len(requested) > 1
 
     flying = fly_batch(model, plan, constants, together.states[0], stop=stop)
     with pytest.raises(Interrupted):
         list(flying)
-    assert len(asked) == 2
+    assert len(requested) == 2
 
 
 def mirrored(states, model):

@@ -328,11 +328,11 @@ def test_the_given_start_is_taken() -> None:
 
 def test_a_flight_can_be_watched_and_stopped() -> None:
     """Steps report a rising fraction; `stop` ends the flight between two of them."""
-    asked = []
+    requested = []
 
     def stop() -> bool:
-        asked.append(True)
-        return len(asked) > 3
+        requested.append(True)
+        return len(requested) > 3
 
     steps = flight_steps(
         example_aircraft(), example_flight(), {"left": Hold(), "right": Hold()}, model="flexible",
@@ -341,7 +341,7 @@ def test_a_flight_can_be_watched_and_stopped() -> None:
     fractions = []
     with pytest.raises(Interrupted):
         fractions += [step.fraction for step in steps]
-    assert len(asked) == 4
+    assert len(requested) == 4
     del fractions
 
 

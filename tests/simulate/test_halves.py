@@ -162,7 +162,7 @@ def test_unequal_sweeps_fly_whole() -> None:
         assert case.plan.flown(model) is model
 
 
-def test_plans_are_of_the_whole_unless_asked() -> None:
+def test_plans_are_of_the_whole_unless_requested() -> None:
     """Who does not know of halves gets a plan for the model at hand."""
     model = example_model(2)
     schedules = sample_schedules("train_rate_0.8")

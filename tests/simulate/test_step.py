@@ -190,11 +190,11 @@ def test_accelerations_balance_momentum_and_power_to_round_off(links):
     n = model.coordinates
     rates = state_rates(model, instant(model, hinges), 0, lane_constants(model, batch, STEP_S), state)[0]
     tree, motion = chain_tree(model, batch), motion_of(model, hinges, state[0])
-    asked = inverse_dynamics(tree, motion, Acceleration(rates[4:10], rates[13 + n : 13 + 2 * n]))
+    requested = inverse_dynamics(tree, motion, Acceleration(rates[4:10], rates[13 + n : 13 + 2 * n]))
     from_springs = tree.stiffness * motion.q_joint
     size = max(np.abs(from_springs).max(initial=0.0), 1e3 * np.abs(rates[4:10]).max())
-    np.testing.assert_allclose(asked.base_wrench_B, 0.0, atol=1e-11 * size)
-    np.testing.assert_allclose(asked.joint_torque, 0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(requested.base_wrench_B, 0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(requested.joint_torque, 0.0, atol=1e-11 * size)
 
 
 def forced_flights(links, duration_s, mujoco_step_s):

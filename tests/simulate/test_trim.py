@@ -70,15 +70,15 @@ def test_forces_balance_by_an_independent_sum():
     found = trim(model, batch, plan).require()
     tree = chain_tree(model, batch)
     motion = motion_of(model, np.zeros((2, 3)), trimmed_state(model, batch, plan, found)[0])
-    asked = inverse_dynamics(
+    requested = inverse_dynamics(
         tree, motion, Acceleration(np.zeros(6), np.zeros(tree.coordinates)), None, [0, 0, 9.81]
     )
     weight = 9.81 * (875.0 + 90.0)
-    assert np.linalg.norm(asked.base_wrench_B[3:]) == pytest.approx(weight, rel=1e-12)
+    assert np.linalg.norm(requested.base_wrench_B[3:]) == pytest.approx(weight, rel=1e-12)
     # along and across the path: thrust bears the drag, the air the weight
     alpha = found.alpha[0]
     up_B = np.array([np.sin(alpha), 0.0, -np.cos(alpha)])
-    lift = asked.base_wrench_B[3:] @ up_B - found.force_B[0] @ up_B
+    lift = requested.base_wrench_B[3:] @ up_B - found.force_B[0] @ up_B
     assert lift == pytest.approx(weight, rel=1e-9)
     area_q = model.flight.dynamic_pressure_pa * 1.8
     # 0.4806 at 5 degrees for the gapless pair; twist adds to the angle, gap and curvature take a little away

@@ -49,7 +49,7 @@ def test_variables_of_another_application_do_not_count(monkeypatch: pytest.Monke
     assert conf.result_backend is None
 
 
-def test_jobs_at_once_are_what_the_worker_was_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_jobs_at_once_are_what_the_worker_was_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """MORPHID_WORKERS, unless `--concurrency` says otherwise; the cores are shared by what it comes to."""
     assert make_app(load_settings(workers=3)).conf.worker_concurrency == 3
     assert make_app(load_settings(reap_every_s=2.5)).conf.beat_schedule["reap"]["schedule"] == 2.5

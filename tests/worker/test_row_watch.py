@@ -21,19 +21,19 @@ class FakeWorker:
 
     def __init__(self) -> None:
         self.semaphore = LaxBoundedSemaphore(1)
-        self.asked: list[dict[str, Callable[[object], None]]] = []
+        self.requested: list[dict[str, Callable[[object], None]]] = []
         self.pool = SimpleNamespace(num_processes=1, apply_async=self._apply_async)
         self.consumer = object()
         self.now = 100.0
 
     def _apply_async(self, target: object, **callbacks: Any) -> None:
         assert target is work_waits
-        self.asked.append(callbacks)
+        self.requested.append(callbacks)
 
     def answer(self, kind: str, value: object) -> None:
         """Answer the last question; the pool gives the slot back, as Celery's does."""
         self.semaphore.release()
-        self.asked[-1][kind](value)
+        self.requested[-1][kind](value)
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_a_busy_worker_does_not_look(
     monkeypatch.setattr(state, "reserved_requests", {"a request"})
     watch._look(worker)
     worker.now += 3600.0
-    assert worker.asked == []
+    assert worker.requested == []
     assert watch.unanswered_s == 0.0
 
 
@@ -82,11 +82,11 @@ def test_children_that_do_not_answer_are_known(worker: FakeWorker, watch: RowWat
     for _ in range(3):
         watch._look(worker)
         worker.now += 1.0
-    assert len(worker.asked) == 1
+    assert len(worker.requested) == 1
     worker.now += ANSWER_WITHIN_S
     worker.semaphore.release()
     watch._look(worker)
-    assert len(worker.asked) == 2
+    assert len(worker.requested) == 2
     worker.answer("error_callback", "the child died")
     assert watch.unanswered_s == pytest.approx(3.0 + ANSWER_WITHIN_S)
     watch._look(worker)

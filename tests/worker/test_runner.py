@@ -112,10 +112,10 @@ def test_cancel_ends_a_running_job_within_two_seconds(
     time.sleep(0.5)
     with database.write() as connection:
         request_cancel(connection, OWNER, job_id)
-    asked_at = time.monotonic()
+    requested_at = time.monotonic()
     thread.join(10.0)
     assert endings == [Ending.CANCELLED]
-    assert time.monotonic() - asked_at < 2.0
+    assert time.monotonic() - requested_at < 2.0
     result = result_of(database, job_id)
     assert result is not None
     assert result["partial"] is True

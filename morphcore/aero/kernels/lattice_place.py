@@ -324,7 +324,7 @@ def _sum_induced(parts, place, gamma):
 
 
 @kernel
-def refine(influence, inverse, right, residual, tolerance, most, gamma):
+def refine(influence, inverse, right, residual, tolerance, maximum, gamma):
     """Improve gamma (r,) until ``influence`` (r + 1, r), ring by point, times it gives right (r,).
 
     With the inverse (r, r) of a like matrix, point by ring: what is left goes down by the part by which both
@@ -334,7 +334,7 @@ def refine(influence, inverse, right, residual, tolerance, most, gamma):
     scale = 0.0
     for p in range(rings):
         scale = max(scale, abs(right[p]))
-    for turn in range(most + 1):
+    for turn in range(maximum + 1):
         for p in range(rings):
             residual[p] = right[p]
         for q in range(rings):
@@ -346,7 +346,7 @@ def refine(influence, inverse, right, residual, tolerance, most, gamma):
             left = max(left, abs(residual[p]))
         if left <= tolerance * scale:
             return True
-        if turn < most:
+        if turn < maximum:
             for p in range(rings):
                 strength, row = residual[p], inverse[p]
                 for q in range(rings):

@@ -16,7 +16,7 @@ from morphcore.paper.stages import Results
 
 Document = dict[str, Any]
 
-LEAST_PLAIN = 1e-4  # smaller limits are written with a power of ten
+MIN_PLAIN = 1e-4  # smaller limits are written with a power of ten
 ALIKE_RAD = 0.05  # schedules no further apart are called nearly one
 OTHER_MORPHS = {
     "swarm_morph": "optimum, the paper's swarm of 50",
@@ -27,7 +27,7 @@ OTHER_MORPHS = {
 
 def limit(value: float) -> str:
     """A limit as it was set."""
-    return f"{value:g}" if value >= LEAST_PLAIN else number(value)
+    return f"{value:g}" if value >= MIN_PLAIN else number(value)
 
 
 def mid_span(surface: Surface) -> SectionProperties:

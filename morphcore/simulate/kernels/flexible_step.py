@@ -47,10 +47,10 @@ IntArray = NDArray[np.int64]
 
 TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
 SLOW = 0.1  # of the last iteration's change: then the matrix may be too old
-MOST_ITERATIONS = 50
+MAX_ITERATIONS = 50
 REFINED = 1e-12  # what is left of the flow through the panels, of its largest before
 STILL = 1e-7  # of the largest circulation: smaller changes within a step leave the induced velocities
-MOST_PASSES = 8  # of refinement; beyond, the inverse is renewed
+MAX_PASSES = 8  # of refinement; beyond, the inverse is renewed
 FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
 # numbers of a record before those of the tips: R_NB row by row, twist, position, twist rate of the fuselage
 RECORD = 24
@@ -308,7 +308,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
         trial.circulation[q] = state.circulation[q]
     tied, last, arrived = False, math.inf, False
     status = LOST
-    for iteration in range(MOST_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         _moved(structure, path, rule, state, trial, scratch, row)
         if arrived:
             status = FLOWN
@@ -362,7 +362,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
             scratch.blocked,
             scratch.residual,
             REFINED,
-            MOST_PASSES,
+            MAX_PASSES,
             trial.circulation,
         ):
             status = INVERSE_WANTED

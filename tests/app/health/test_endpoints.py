@@ -141,8 +141,8 @@ def equipped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running
 
 def parts(service: RunningService) -> tuple[str, str, str]:
     """Ask for readiness anew: whole, broker, workers."""
-    told = service.client.get("/readyz").json()
-    return told["status"], told["broker"], told["workers"]["status"]
+    reported = service.client.get("/readyz").json()
+    return reported["status"], reported["broker"], reported["workers"]["status"]
 
 
 def test_workers_that_fall_silent_are_stalled(equipped: tuple[RunningService, Supervisor]) -> None:

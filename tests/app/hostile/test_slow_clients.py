@@ -17,7 +17,7 @@ from tests.waiting import until
 
 LIMIT_S = 1.0  # of headers, bodies and readers in these tests
 PATIENCE_S = 15.0  # the machine of the tests is a busy one
-MOST_CONNECTIONS = 260
+MAX_CONNECTIONS = 260
 SLOW = 200
 GET = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 POST = b"POST /identify HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
@@ -32,7 +32,7 @@ def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ApiProcess]:
         body_grace_s=LIMIT_S,
         write_timeout_s=LIMIT_S,
         keep_alive_s=0.5,
-        max_connections=MOST_CONNECTIONS,
+        max_connections=MAX_CONNECTIONS,
     ) as running:
         yield running
 
@@ -217,16 +217,16 @@ def hung_up(link: socket.socket, piece: bytes) -> bool:
         return True
 
 
-def test_one_connection_too_many_is_told_so(api: ApiProcess) -> None:
+def test_one_connection_too_many_is_reported(api: ApiProcess) -> None:
     """Beyond the limit a connection gets 503 at once; when others end there is room again."""
     with ExitStack() as stack:
-        for _ in range(MOST_CONNECTIONS):
+        for _ in range(MAX_CONNECTIONS):
             stack.enter_context(api.connect())
         answers = [api.raw(GET + b"\r\n") for _ in range(5)]
         assert problem(answers[-1]) == (503, "service_busy")
         assert b"retry-after" in answers[-1].lower()
-    asked = GET + b"Connection: close\r\n\r\n"
-    until(lambda: api.raw(asked).startswith(b"HTTP/1.1 200"), PATIENCE_S, 0.1)
+    requested = GET + b"Connection: close\r\n\r\n"
+    until(lambda: api.raw(requested).startswith(b"HTTP/1.1 200"), PATIENCE_S, 0.1)
 
 
 GARBAGE: dict[str, tuple[bytes, int]] = {
@@ -249,7 +249,7 @@ GARBAGE: dict[str, tuple[bytes, int]] = {
 
 
 @pytest.mark.parametrize("name", GARBAGE)
-def test_what_is_no_request_is_told_so(api: ApiProcess, name: str) -> None:
+def test_what_is_no_request_is_reported(api: ApiProcess, name: str) -> None:
     """A problem document and a closed connection."""
     request, status = GARBAGE[name]
     got, _ = problem(api.raw(request))

@@ -89,14 +89,14 @@ def test_many_bombs_at_once_wait_in_line(api: ApiProcess) -> None:
             return client.post("/trajectories", files={"file": ("x.mat", content)}).status_code
 
     with Onlooker(api) as onlooker, ThreadPoolExecutor(8) as threads:
-        most = 0
+        maximum = 0
         answers = threads.map(send, range(8))
         while not onlooker.answers or onlooker.answers < 20:
-            most = max(most, len(api.children()))
+            maximum = max(maximum, len(api.children()))
             time.sleep(0.02)
         statuses = list(answers)
     assert set(statuses) <= {422, 503}, statuses
-    assert 1 <= most <= 2
+    assert 1 <= maximum <= 2
     assert onlooker.grown_mib < GROWN_MIB
     assert onlooker.slowest_s < CALM_S
     assert_no_process_left(api)

@@ -48,7 +48,7 @@ def readable_paths() -> Iterator[str]:
     yield from UNLISTED
 
 
-def told(answer: httpx.Response) -> Document:
+def reported(answer: httpx.Response) -> Document:
     """The headers that must be the same."""
     return {name: value for name, value in answer.headers.items() if name not in OWN}
 
@@ -61,7 +61,7 @@ def test_head_is_get_without_its_body(service: RunningService, known: Document, 
     if path == "/metrics":  # its numbers rise with every request
         head.headers.pop("content-length")
         got.headers.pop("content-length")
-    assert (head.status_code, told(head)) == (got.status_code, told(got))
+    assert (head.status_code, reported(head)) == (got.status_code, reported(got))
     assert head.content == b""
     assert path in UNLISTED or got.status_code == STATUS.get(path, 404 if "webhook_id" in path else 200)
 
@@ -70,7 +70,7 @@ def test_head_is_get_without_its_body(service: RunningService, known: Document, 
 def test_where_there_is_no_get_there_is_no_head(service: RunningService, path: str) -> None:
     """405, with the methods that there are."""
     head, got = (service.client.request(method, path) for method in ("HEAD", "GET"))
-    assert (head.status_code, told(head)) == (got.status_code, told(got)) == (405, told(head))
+    assert (head.status_code, reported(head)) == (got.status_code, reported(got)) == (405, reported(head))
     assert "HEAD" not in head.headers["allow"]
 
 
@@ -88,7 +88,7 @@ def test_head_has_the_answers_of_conditions_and_faults(service: RunningService, 
     ]
     for path, headers in cases:
         head, got = (service.client.request(method, path, headers=headers) for method in ("HEAD", "GET"))
-        assert (head.status_code, told(head)) == (got.status_code, told(got)), path
+        assert (head.status_code, reported(head)) == (got.status_code, reported(got)), path
         assert head.content == b""
 
 

@@ -97,9 +97,9 @@ def test_the_services_own_page_and_programs_are_let_in(service: RunningService) 
 
 def test_no_answer_opens_the_service_to_other_sites(service: RunningService) -> None:
     """There is no CORS header, not even for a preflight that asks nicely."""
-    asked = {"Origin": "https://evil.example", "Access-Control-Request-Method": "POST"}
-    asked |= {"Access-Control-Request-Headers": "authorization"}
-    for headers in (asked, {}):
+    requested = {"Origin": "https://evil.example", "Access-Control-Request-Method": "POST"}
+    requested |= {"Access-Control-Request-Headers": "authorization"}
+    for headers in (requested, {}):
         answer = service.client.options("/simulate", headers=headers)
         assert answer.status_code in (403, 405)
         assert not [name for name in answer.headers if name.startswith("access-control")]

@@ -102,7 +102,7 @@ def test_validation_makes_no_job(service: RunningService) -> None:
     assert newest_jobs(service) == before
 
 
-def test_waits_when_asked(service: RunningService) -> None:
+def test_waits_when_requested(service: RunningService) -> None:
     """`Prefer: wait=1` waits for an end that does not come, and says so."""
     start = time.perf_counter()
     answer = post(service, identify_document(), Prefer="respond-async, wait=1")

@@ -34,5 +34,7 @@ def test_the_unknowns_are_those_of_the_search(
     if listed is not None:
         document["model"]["aero_coefficients"] = listed
     document["aircraft"]["surfaces"] += tail
-    told = service.client.post("/validate/identify", json=document).json()["cost"]
-    assert told["parameters"] == identification_from_request(IdentifyRequest.parse(document)).space.dimension
+    reported = service.client.post("/validate/identify", json=document).json()["cost"]
+    assert (
+        reported["parameters"] == identification_from_request(IdentifyRequest.parse(document)).space.dimension
+    )

@@ -98,11 +98,11 @@ def test_a_job_deleted_before_it_is_shown(
     any_service.finish(any_service.claim(first), "succeeded", result=SIMULATE_RESULT)
     read = event_stream.read_in_turn
 
-    async def deleted_before(*asked: Any) -> Any:
+    async def deleted_before(*requested: Any) -> Any:
         monkeypatch.setattr(event_stream, "read_in_turn", read)
         with any_service.database.write() as session:
             repository.delete_job(session, "local", first)
-        return await read(*asked)
+        return await read(*requested)
 
     monkeypatch.setattr(event_stream, "read_in_turn", deleted_before)
     again = post(any_service, "/simulate", simulate_document(), **headers, **wait)

@@ -79,7 +79,7 @@ def test_life_of_a_job(any_service: RunningService) -> None:
     assert model["aircraft"] == identify_document()["aircraft"]
 
 
-def test_failure_is_told(any_service: RunningService) -> None:
+def test_failure_is_reported(any_service: RunningService) -> None:
     """A failed job tells its code and hint, in the job and where the result would be."""
     job_id = new_job(any_service)
     error = {
@@ -163,11 +163,11 @@ def test_stream_replays_and_follows(any_service: RunningService) -> None:
             if event["type"] == "comment" and len(events) > 3:  # the past was told
                 alive.set()
     worker.join()
-    told = [event for event in events if event["type"] != "comment"]
-    assert [event["type"] for event in told] == ["queued", "started", "progress", "progress", "succeeded"]
-    assert [int(event["id"]) for event in told] == [1, 2, 3, 4, 5]
-    assert [event["data"].get("fraction") for event in told] == [None, None, 0.1, 0.6, None]
-    assert len(events) > len(told)  # signs of life while nothing happened
+    reported = [event for event in events if event["type"] != "comment"]
+    assert [event["type"] for event in reported] == ["queued", "started", "progress", "progress", "succeeded"]
+    assert [int(event["id"]) for event in reported] == [1, 2, 3, 4, 5]
+    assert [event["data"].get("fraction") for event in reported] == [None, None, 0.1, 0.6, None]
+    assert len(events) > len(reported)  # signs of life while nothing happened
 
 
 @pytest.mark.parametrize("how", ["header", "query"])
@@ -239,14 +239,14 @@ def test_many_watchers_cost_one_query(service: RunningService) -> None:
     job_id = new_job(service)
     claim = service.claim(job_id)
     limits = httpx.Limits(max_connections=120)
-    told: list[list[str]] = []
+    reported: list[list[str]] = []
     begun: list[str] = []
     with httpx.Client(base_url=service.url, timeout=30.0, limits=limits) as client:
 
         def follow() -> None:
             with client.stream("GET", f"/jobs/{job_id}/events", params={"after": 2}) as answer:
                 begun.append(job_id)
-                told.append(kinds(sse(answer)))
+                reported.append(kinds(sse(answer)))
 
         followers = [threading.Thread(target=follow) for _ in range(100)]
         for follower in followers:
@@ -258,7 +258,7 @@ def test_many_watchers_cost_one_query(service: RunningService) -> None:
         service.finish(claim, "succeeded", result=RESULT)
         for follower in followers:
             follower.join(20.0)
-    assert told == [["succeeded"]] * 100
+    assert reported == [["succeeded"]] * 100
 
 
 def test_artifact_names_cannot_leave(service: RunningService) -> None:

@@ -23,7 +23,7 @@ COUNT = 10_000
 FIRST_S = 1_800_000_000.0  # when the oldest was made; the next ones a second apart
 PAGE = 50
 OPERATIONS = ("identify", "study", "simulate")
-READ_AT_MOST = len(STATUSES) * PAGE  # rows that the database touches for a page, of ten thousand
+MAX_READ_ROWS = len(STATUSES) * PAGE  # rows that the database touches for a page, of ten thousand
 
 
 def moment(number: int) -> datetime:
@@ -170,8 +170,8 @@ def test_postgres_touches_few_rows(full: Database) -> None:
     for kind in KINDS:
         for statement, parameters in statements(full, JobFilter(**kind)):
             with full.read() as session:
-                told = session.exec_driver_sql(
+                reported = session.exec_driver_sql(
                     f"EXPLAIN (ANALYZE, FORMAT JSON) {statement}", parameters
                 ).scalar()
-            plan = json.loads(told) if isinstance(told, str) else told
-            assert visited(plan[0]["Plan"]) <= READ_AT_MOST, (kind, plan)
+            plan = json.loads(reported) if isinstance(reported, str) else reported
+            assert visited(plan[0]["Plan"]) <= MAX_READ_ROWS, (kind, plan)

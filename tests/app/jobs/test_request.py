@@ -97,16 +97,16 @@ def test_the_request_posted_again_is_the_same_job(
 
 def test_the_request_as_it_was_asked_stands_in_it(service: RunningService) -> None:
     """Aircraft, flight, samples and schedules come back as they were sent."""
-    asked = simulate_document()
-    job = post(service, "/simulate", asked).raise_for_status().json()
+    requested = simulate_document()
+    job = post(service, "/simulate", requested).raise_for_status().json()
     found = service.client.get(f"/jobs/{job['id']}/request").json()
     assert {name: found[name] for name in ("aircraft", "flight", "duration_s")} == {
-        name: asked[name] for name in ("aircraft", "flight", "duration_s")
+        name: requested[name] for name in ("aircraft", "flight", "duration_s")
     }
-    asked = identify_document()
-    job = post(service, "/identify", asked).raise_for_status().json()
+    requested = identify_document()
+    job = post(service, "/identify", requested).raise_for_status().json()
     found = service.client.get(f"/jobs/{job['id']}/request").json()
-    for sample, sent in zip(found["samples"], asked["samples"], strict=True):
+    for sample, sent in zip(found["samples"], requested["samples"], strict=True):
         assert sample == {**sent, "weight": 1.0}
 
 

@@ -53,7 +53,7 @@ def new_job(client: httpx.Client) -> str:
     return job_id
 
 
-def test_one_stream_too_many_is_told_so(limited: RunningService, client: httpx.Client) -> None:
+def test_one_stream_too_many_is_reported(limited: RunningService, client: httpx.Client) -> None:
     """429 with a way out for this owner, by whichever key; nothing for others; room afterwards."""
     events = f"/jobs/{new_job(client)}/events"
     second = holder(limited, make_key(limited.database, "alpha").text)
@@ -95,7 +95,7 @@ def test_head_takes_no_place(client: httpx.Client) -> None:
             assert stack.enter_context(client.stream("GET", events)).status_code == 200
 
 
-def test_one_wait_too_many_is_told_so(limited: RunningService, client: httpx.Client) -> None:
+def test_one_wait_too_many_is_reported(limited: RunningService, client: httpx.Client) -> None:
     """A read that would wait is refused, one that does not is answered; a post is made, and does not wait."""
     job_id = new_job(client)
     waits = {"Prefer": f"wait={WAIT_S}"}

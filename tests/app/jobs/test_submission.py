@@ -121,7 +121,7 @@ def test_what_all_refuse(
     assert first["hint"]
 
 
-def test_waits_when_asked(service: RunningService, operation: Operation) -> None:
+def test_waits_when_requested(service: RunningService, operation: Operation) -> None:
     """`Prefer: wait` is honoured, and said so."""
     answer = post(service, f"/{operation.name}", operation.request(), Prefer="wait=1")
     assert answer.headers["preference-applied"] == "wait=1"

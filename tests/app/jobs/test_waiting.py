@@ -34,10 +34,10 @@ def test_positions_are_the_order_of_turns(database: Database, taken_before: int)
         new_job(database, owner=owner, terms=Terms(priority=priority))
     for _ in range(taken_before):
         served(database)
-    told = places(database)
+    reported = places(database)
     began = [claim.job_id for claim in iter(lambda: served(database), None)]
-    assert sorted(told, key=told.__getitem__) == began
-    assert sorted(told.values()) == list(range(1, len(began) + 1))
+    assert sorted(reported, key=reported.__getitem__) == began
+    assert sorted(reported.values()) == list(range(1, len(began) + 1))
 
 
 def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
@@ -45,12 +45,12 @@ def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
     queue(database, many=4, few=1)
     served(database)
     with database.read() as session:
-        told = QueueView().place_of_next(session, "few", "identify", 0).position
+        reported = QueueView().place_of_next(session, "few", "identify", 0).position
     job = new_job(database, owner="few")
-    assert places(database)[job.id] == told
+    assert places(database)[job.id] == reported
 
 
-def told_eta(database: Database, job: Job) -> float | None:
+def eta_of(database: Database, job: Job) -> float | None:
     """When the job is told to begin, s."""
     with database.read() as session:
         return queue_place(session, job, count_queue(session)).eta_s
@@ -60,7 +60,7 @@ def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
     """Nothing known, nothing told; then ends needed before it, times the usual duration, over the workers."""
     queue(database, a=2)
     last = new_job(database, owner="a")
-    assert told_eta(database, last) is None
+    assert eta_of(database, last) is None
     claim = served(database)
     assert claim is not None
     with database.write() as session:
@@ -69,14 +69,14 @@ def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
             update(jobs).where(jobs.c.id == claim.job_id).values(started_at=jobs.c.finished_at - 10.0)
         )
     served(database)  # one runs, none before the last
-    assert told_eta(database, last) == pytest.approx(10.0, abs=1e-3)
+    assert eta_of(database, last) == pytest.approx(10.0, abs=1e-3)
     with database.write() as session:
         for name, age_s in (("live", 1.0), ("gone", 3600.0)):
             seen = database_time() - age_s
             session.execute(
                 insert(workers).values(name=name, version="1", slots=4, busy=0, started_at=seen, seen_at=seen)
             )
-    assert told_eta(database, last) == 0.0  # three of four slots are free
+    assert eta_of(database, last) == 0.0  # three of four slots are free
 
 
 def test_the_queue_is_counted_once_for_all(database: Database) -> None:

@@ -23,10 +23,10 @@ def numbers(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """The last event of each job, as the database would tell; the test changes it."""
     found: dict[str, int] = {}
 
-    def told(_watcher: JobWatcher, ids: list[str]) -> dict[str, int]:
+    def reported(_watcher: JobWatcher, ids: list[str]) -> dict[str, int]:
         return {job_id: found[job_id] for job_id in ids if job_id in found}
 
-    monkeypatch.setattr(JobWatcher, "_event_numbers", told)
+    monkeypatch.setattr(JobWatcher, "_event_numbers", reported)
     return found
 
 
@@ -68,7 +68,7 @@ def test_news_wake_those_who_have_not_seen_them(numbers: dict[str, int]) -> None
     played(play)
 
 
-def test_news_that_came_before_the_wait_are_told(numbers: dict[str, int]) -> None:
+def test_news_that_came_before_the_wait_are_reported(numbers: dict[str, int]) -> None:
     """A client that begins to wait when the watcher has long seen the news hears of them all the same."""
     numbers["one"] = 3
 

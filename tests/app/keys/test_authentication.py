@@ -25,7 +25,7 @@ FROM_PROXY = "X-Forwarded-For"  # the server believes its own machine: tests com
 PATIENCE_S = 10.0
 
 
-def asked(service: RunningService, headers: dict[str, str], path: str = "/jobs") -> httpx.Response:
+def requested(service: RunningService, headers: dict[str, str], path: str = "/jobs") -> httpx.Response:
     """Ask with these headers."""
     return service.client.get(path, headers=headers)
 
@@ -54,10 +54,10 @@ def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_on_sqlite: Ru
         "empty": "",
         "no scheme": good.text,
     }
-    answers = {"none": asked(keyed_on_sqlite, {"X-Request-ID": "same"})}
+    answers = {"none": requested(keyed_on_sqlite, {"X-Request-ID": "same"})}
     for number, (name, header) in enumerate(wrong.items()):
-        told = {"Authorization": header, "X-Request-ID": "same", FROM_PROXY: f"203.0.113.{number}"}
-        answers[name] = asked(keyed_on_sqlite, told)
+        reported = {"Authorization": header, "X-Request-ID": "same", FROM_PROXY: f"203.0.113.{number}"}
+        answers[name] = requested(keyed_on_sqlite, reported)
     for name, answer in answers.items():
         assert answer.status_code == 401, name
         assert answer.content == answers["none"].content, name
@@ -78,21 +78,21 @@ def test_keys_are_read_from_the_header_only(keyed_on_sqlite: RunningService) -> 
     key = make_key(keyed_on_sqlite.database).text
     for query in ("api_key", "key", "access_token", "token"):
         assert keyed_on_sqlite.client.get("/jobs", params={query: key}).status_code == 401
-    assert asked(keyed_on_sqlite, {"Cookie": f"Authorization={key}; api_key={key}"}).status_code == 401
-    assert asked(keyed_on_sqlite, {"X-API-Key": key}).status_code == 401
+    assert requested(keyed_on_sqlite, {"Cookie": f"Authorization={key}; api_key={key}"}).status_code == 401
+    assert requested(keyed_on_sqlite, {"X-API-Key": key}).status_code == 401
 
 
 def test_the_scheme_has_no_case(keyed_on_sqlite: RunningService) -> None:
     """``bearer`` is ``Bearer`` (RFC 9110, section 11.1)."""
     key = make_key(keyed_on_sqlite.database).text
-    assert asked(keyed_on_sqlite, {"Authorization": f"bEARER {key}"}).status_code == 200
+    assert requested(keyed_on_sqlite, {"Authorization": f"bEARER {key}"}).status_code == 200
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/livez", "/readyz", "/static/app.js"])
 def test_the_public_list_needs_no_key(keyed_on_sqlite: RunningService, path: str) -> None:
     """Pages and probes are open, and a wrong key beside the request does not matter there."""
-    assert asked(keyed_on_sqlite, {}, path).status_code in (200, 503)
-    assert asked(keyed_on_sqlite, bearer("nonsense"), path).status_code in (200, 503)
+    assert requested(keyed_on_sqlite, {}, path).status_code in (200, 503)
+    assert requested(keyed_on_sqlite, bearer("nonsense"), path).status_code in (200, 503)
 
 
 @pytest.mark.parametrize(
@@ -177,8 +177,10 @@ def test_guessing_is_limited(keyed_on_sqlite: RunningService) -> None:
     """An address that sends wrong keys is told to wait; who works there or elsewhere is not held up."""
     place = {FROM_PROXY: "198.51.100.7"}
     good = make_key(keyed_on_sqlite.database).text
-    assert asked(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
-    answers = [asked(keyed_on_sqlite, {**bearer(KeyText.new().text()), **place}) for _ in range(BURST + 5)]
+    assert requested(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
+    answers = [
+        requested(keyed_on_sqlite, {**bearer(KeyText.new().text()), **place}) for _ in range(BURST + 5)
+    ]
     statuses = [answer.status_code for answer in answers]
     assert statuses[:BURST] == [401] * BURST
     # the bucket may refill by one or two on a slow machine
@@ -186,12 +188,14 @@ def test_guessing_is_limited(keyed_on_sqlite: RunningService) -> None:
     limited = next(answer for answer in answers if answer.status_code == 429)
     assert limited.json()["code"] == "too_many_refusals"
     assert 1 <= int(limited.headers["retry-after"]) <= 6
-    assert asked(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
+    assert requested(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200
     fresh = make_key(keyed_on_sqlite.database).text
-    assert asked(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.8"}).status_code == 200
+    assert requested(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.8"}).status_code == 200
     for _ in range(BURST):
-        assert asked(keyed_on_sqlite, {FROM_PROXY: "198.51.100.9"}).status_code == 401  # no key is no guess
-    assert asked(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.9"}).status_code == 200
+        assert (
+            requested(keyed_on_sqlite, {FROM_PROXY: "198.51.100.9"}).status_code == 401
+        )  # no key is no guess
+    assert requested(keyed_on_sqlite, {**bearer(fresh), FROM_PROXY: "198.51.100.9"}).status_code == 200
 
 
 def test_me_tells_what_a_key_may_do(keyed_on_sqlite: RunningService) -> None:

@@ -47,8 +47,8 @@ def idle_stream(service: RunningService, made: NewKey, job: str) -> Ended:
     """Follow a job of which there is nothing to tell."""
     with holder(service, made.text) as client, client.stream("GET", f"/jobs/{job}/events") as stream:
         assert stream.status_code == 200
-        told = "".join(stream.iter_text())
-    assert "event: queued" in told
+        reported = "".join(stream.iter_text())
+    assert "event: queued" in reported
     return time.monotonic(), None
 
 

@@ -43,12 +43,16 @@ def demanded(operation: dict[str, Any]) -> set[str]:
 def operations() -> list[tuple[str, str, dict[str, Any]]]:
     """Every documented operation: method, path, description."""
     paths = openapi_document(routed_app())["paths"]
-    return [(method.upper(), path, told) for path, found in paths.items() for method, told in found.items()]
+    return [
+        (method.upper(), path, reported)
+        for path, found in paths.items()
+        for method, reported in found.items()
+    ]
 
 
 def test_every_route_demands_a_scope_or_is_public() -> None:
     """No route of the application is open by mistake; the public ones are exactly the short list."""
-    documented = {(method, path): told for method, path, told in operations()}
+    documented = {(method, path): reported for method, path, reported in operations()}
     public = set()
     for route in routes():
         if isinstance(route, Mount):
@@ -77,24 +81,24 @@ def test_the_paper_names_every_scope_and_public_path(root: Path) -> None:
 
 def test_every_scope_is_demanded_somewhere() -> None:
     """There is no scope that opens nothing."""
-    assert set().union(*(demanded(told) for _, _, told in operations())) == set(EVERY_SCOPE)
+    assert set().union(*(demanded(reported) for _, _, reported in operations())) == set(EVERY_SCOPE)
 
 
 def test_reading_scopes_change_nothing() -> None:
     """What a reading scope opens is only read: every other method demands a scope to write."""
-    for method, path, told in operations():
-        if demanded(told) & {Scope.JOBS_READ, Scope.DATA_READ, Scope.METRICS}:
+    for method, path, reported in operations():
+        if demanded(reported) & {Scope.JOBS_READ, Scope.DATA_READ, Scope.METRICS}:
             assert method == "GET", path
 
 
 def test_refusals_are_documented_everywhere() -> None:
     """401, 403, 421 and 429 stand in the document wherever a key is demanded, with their headers."""
-    for method, path, told in operations():
-        wanted = {"401", "403", "421", "429"} if "security" in told else {"403", "421"}
-        assert wanted <= set(told["responses"]), f"{method} {path}"
-        if "security" in told:
-            assert "WWW-Authenticate" in told["responses"]["401"]["headers"]
-            assert "Retry-After" in told["responses"]["429"]["headers"]
+    for method, path, reported in operations():
+        wanted = {"401", "403", "421", "429"} if "security" in reported else {"403", "421"}
+        assert wanted <= set(reported["responses"]), f"{method} {path}"
+        if "security" in reported:
+            assert "WWW-Authenticate" in reported["responses"]["401"]["headers"]
+            assert "Retry-After" in reported["responses"]["429"]["headers"]
 
 
 @pytest.mark.parametrize("scope", sorted(EVERY_SCOPE))
@@ -102,12 +106,12 @@ def test_a_key_opens_what_its_scope_says(keyed_on_sqlite: RunningService, scope:
     """Each operation lets in a key with its scope alone, and tells any other what it lacks."""
     key = make_key(keyed_on_sqlite.database, scopes=[scope])
     with holder(keyed_on_sqlite, key.text) as client:
-        for method, path, told in operations():
-            if "security" not in told:
+        for method, path, reported in operations():
+            if "security" not in reported:
                 continue
             place = path.replace("{", "").replace("}", "")
             answer = client.request(method, place, headers={"Accept": "application/json"}, content=b"")
-            if demanded(told) <= {scope}:
+            if demanded(reported) <= {scope}:
                 assert answer.status_code not in (401, 403), f"{method} {path}"
             elif answer.status_code != 403:
                 # the framework looks at parameters and body before a route's scope; it did nothing else
@@ -115,4 +119,4 @@ def test_a_key_opens_what_its_scope_says(keyed_on_sqlite: RunningService, scope:
             else:
                 assert answer.json()["code"] == "missing_scope"
                 (enough,) = re.findall(r' scope="([^"]*)"', answer.headers["www-authenticate"])
-                assert set(enough.split()) == demanded(told)
+                assert set(enough.split()) == demanded(reported)

@@ -77,7 +77,7 @@ def made(answer: httpx.Response) -> str:
     return identifier
 
 
-def told(answer: httpx.Response, ids: dict[str, str]) -> tuple[int, dict[str, str], str]:
+def reported(answer: httpx.Response, ids: dict[str, str]) -> tuple[int, dict[str, str], str]:
     """Everything that an answer tells, but for the ids that the caller sent and the time of day."""
     text = answer.text
     for identifier in ids.values():
@@ -112,7 +112,7 @@ def test_anothers_thing_is_no_thing(tenants: Tenants, method: str, path: str) ->
         for ids in (tenants.things, NOBODYS)
     )
     assert theirs.status_code == 404
-    assert told(theirs, tenants.things) == told(nobodys, NOBODYS)
+    assert reported(theirs, tenants.things) == reported(nobodys, NOBODYS)
 
 
 def test_the_owner_still_has_everything(tenants: Tenants) -> None:
@@ -169,7 +169,7 @@ def id_fields(start: Any) -> set[str]:
 def test_every_field_with_an_id_is_in_these_tests() -> None:
     """A request field that names something and is missing here would go untested."""
     paths = published()["paths"]
-    bodies = [told.get("requestBody") for found in paths.values() for told in found.values()]
+    bodies = [reported.get("requestBody") for found in paths.values() for reported in found.values()]
     fields = id_fields(bodies)
     assert fields == {"trajectory_id", "model_id", "job_id"}
 
@@ -181,7 +181,7 @@ def test_bodies_cannot_name_anothers_things(tenants: Tenants) -> None:
         for path in (f"/{operation}", f"/validate/{operation}"):
             answers = [tenants.stranger.post(path, json=body, headers=headers) for body in (theirs, nobodys)]
             assert answers[0].status_code == 422, path
-            assert told(answers[0], tenants.things) == told(answers[1], NOBODYS)
+            assert reported(answers[0], tenants.things) == reported(answers[1], NOBODYS)
         assert tenants.owner.post(f"/validate/{operation}", json=theirs).status_code == 200
 
 

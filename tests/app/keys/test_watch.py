@@ -44,10 +44,10 @@ HARMLESS: dict[str, Change] = {
 def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
     """Whatever takes from a key what its request was let in by breaks off the wait; nothing else does."""
     mine, other = make_key(database).key, make_key(database).key
-    told: list[ApiKey] = []
+    reported: list[ApiKey] = []
 
     async def play() -> tuple[bool, bool]:
-        watch = KeyWatch(database, on_lost=told.append)
+        watch = KeyWatch(database, on_lost=reported.append)
 
         async def wait(in_use: KeyInUse) -> None:
             async with in_use.while_valid():
@@ -71,7 +71,7 @@ def test_a_wait_ends_with_its_key(database: Database, name: str) -> None:
             return ended == [True] and first.lost, second.lost
 
     assert asyncio.run(play()) == (name in LOSSES, False)
-    assert [key.id for key in told] == [mine.id] * (name in LOSSES)
+    assert [key.id for key in reported] == [mine.id] * (name in LOSSES)
 
 
 def test_a_database_that_is_away_ends_nothing(database: Database, tmp_path: Path) -> None:

@@ -90,10 +90,10 @@ def test_a_failed_export_tells_what_its_job_tells(fresh: RunningService) -> None
     for _ in range(2):
         problem = fresh.client.get(address, params={"format": "npz"})
         assert problem.status_code == 409
-        told = problem.json()
-        assert (told["code"], told["detail"]) == (job["error"]["code"], job["error"]["detail"])
-        assert told["job"] == f"/jobs/{job_id}"
-        assert f"DELETE /jobs/{job_id}" in told["hint"]
+        reported = problem.json()
+        assert (reported["code"], reported["detail"]) == (job["error"]["code"], job["error"]["detail"])
+        assert reported["job"] == f"/jobs/{job_id}"
+        assert f"DELETE /jobs/{job_id}" in reported["hint"]
     assert fresh.client.delete(f"/jobs/{job_id}").status_code == 204
     anew = fresh.client.get(address, params={"format": "npz"}, headers=NOT_WAITING)
     assert (anew.status_code, anew.json()["id"] != job_id) == (202, True)

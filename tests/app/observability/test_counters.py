@@ -27,11 +27,11 @@ def test_counters_add_up_over_their_rows(database: Database, monkeypatch: pytest
             count(session, "jobs_finished", {"status": "failed", "operation": "study"})
             count(session, "jobs_finished", {"operation": "study", "status": "succeeded"}, by=2)
             count(session, "leases_lost")
-    told = 2 * SHARDS + 1
+    reported = 2 * SHARDS + 1
     assert values(database) == {
-        "jobs_finished{operation=study,status=failed}": told,
-        "jobs_finished{operation=study,status=succeeded}": 2 * told,
-        "leases_lost": told,
+        "jobs_finished{operation=study,status=failed}": reported,
+        "jobs_finished{operation=study,status=succeeded}": 2 * reported,
+        "leases_lost": reported,
     }
 
 

@@ -111,7 +111,7 @@ def test_secrets_are_masked(message: str, secret: str) -> None:
 def test_nobody_forges_a_line(as_text: Written) -> None:
     """What comes from outside neither begins a line of its own nor moves the cursor."""
     as_text.logger.info("GET %s", "/a\n2026-01-01T00:00:00Z info forged: yes\x1b[2J")
-    as_text.logger.info("asked", extra={"facts": {"path": "/a\nforged\x1b[2J"}})
+    as_text.logger.info("requested", extra={"facts": {"path": "/a\nforged\x1b[2J"}})
     assert "\x1b" not in as_text.text
     assert not any(line.startswith(("2026-01-01", "forged")) for line in as_text.text.splitlines())
 

@@ -144,7 +144,7 @@ def test_every_option_reaches_the_worker(service: RunningService) -> None:
     assert answer.json()["request"]["final_rad"] == 1.0
 
 
-def test_cost_grows_with_what_is_asked(service: RunningService) -> None:
+def test_cost_grows_with_what_is_requested(service: RunningService) -> None:
     """More particles, a front of durations, verification: each costs more; too much is refused."""
 
     def cost(path: str = "/search/seed", value: Any = 1) -> float:

@@ -117,7 +117,7 @@ def test_faults_come_with_their_place(file_of: FileOf) -> None:
 
 
 @pytest.mark.slow
-def test_a_million_keys_and_a_deep_nest_are_told(file_of: FileOf) -> None:
+def test_a_million_keys_and_a_deep_nest_are_reported(file_of: FileOf) -> None:
     """Bodies that are costly to parse are refused in the words of the parser."""
     many = b"{" + b",".join(b'"%d":1' % number for number in range(1_000_000)) + b"}"
     for body, words in ((many, "more than 100 fields"), (b"[" * 99_999, "nested")):

@@ -133,15 +133,15 @@ BAD_URLS = (
 @pytest.mark.parametrize("url", BAD_URLS)
 def test_bad_urls_are_refused_before_any_look_up(url: str) -> None:
     """Other schemes, names and passwords, odd ports, disguised addresses: refused without a look-up."""
-    asked: list[str] = []
+    requested: list[str] = []
 
     def resolve(host: str, _port: int) -> list[str]:
-        asked.append(host)
+        requested.append(host)
         return ["8.8.8.8"]
 
     with pytest.raises(AddressRefused):
         AddressPolicy(resolve=resolve).check_now(url)
-    assert asked == []
+    assert requested == []
 
 
 @pytest.mark.parametrize(
@@ -212,10 +212,10 @@ def test_a_name_server_that_hangs_holds_nobody_up() -> None:
 )
 def test_only_named_hosts_are_looked_up(url: str, named: bool) -> None:  # noqa: FBT001
     """Where hosts are named no other is looked up, neither at creation nor at a try."""
-    asked: list[str] = []
+    requested: list[str] = []
 
     def resolve(host: str, _port: int) -> list[str]:
-        asked.append(host)
+        requested.append(host)
         return ["8.8.8.8"]
 
     names = frozenset({"hooks.example.com", "other.example.com:9000", "[2606:4700::1]"})
@@ -228,4 +228,4 @@ def test_only_named_hosts_are_looked_up(url: str, named: bool) -> None:  # noqa:
         policy.check_now(url)
     with pytest.raises(AddressRefused, match="certain hosts"):
         asyncio.run(policy.target(url))
-    assert asked == []
+    assert requested == []

@@ -38,7 +38,7 @@ from tests.waiting import until
 on_sqlite = pytest.mark.parametrize("migrated_url", ["sqlite"], indirect=True)
 STEP_S = 5.0  # of the clock, between two looks of the sender
 SOON_S = 1800.0  # within which a dead host must be left alone for good
-MOST_CONNECTIONS = 50
+MAX_CONNECTIONS = 50
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_a_dead_host_sees_a_handful_of_connections(
     assert len(disabled()) == hooks
     assert max(disabled()) - began < SOON_S
     print(f"{dialled[dead_port]} connections, disabled after {(max(disabled()) - began) / 60:.1f} min")
-    assert MAX_TRIES <= dialled[dead_port] <= MOST_CONNECTIONS
+    assert MAX_TRIES <= dialled[dead_port] <= MAX_CONNECTIONS
     assert {row.status for row in deliveries(database)} == {"given_up"}
     many_ends(database, 10)
     clock.turn(1e6)
@@ -110,14 +110,14 @@ def test_a_dead_host_sees_a_handful_of_connections(
 
 def test_one_try_at_a_time(database: Database, there: Receiver) -> None:
     """Two webhooks of one owner at one host, many deliveries and two senders: never two tries at once."""
-    under_way, most = 0, 0
+    under_way, maximum = 0, 0
     lock = threading.Lock()
 
     def answer(handler: BaseHTTPRequestHandler, _number: int) -> None:
-        nonlocal under_way, most
+        nonlocal under_way, maximum
         with lock:
             under_way += 1
-            most = max(most, under_way)
+            maximum = max(maximum, under_way)
         time.sleep(0.01)
         with lock:
             under_way -= 1
@@ -134,7 +134,7 @@ def test_one_try_at_a_time(database: Database, there: Receiver) -> None:
     until(lambda: not deliveries(database, status="waiting"), 30.0)
     for one in both:
         one.stop()
-    assert most == 1
+    assert maximum == 1
     assert len(there.received) == 30
 
 

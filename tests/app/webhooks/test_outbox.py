@@ -56,11 +56,11 @@ def test_ends_without_a_worker_are_told_too(database: Database) -> None:
             store.claim_job(session, lost, "w", lease_s=-100.0)
         with database.write() as session:
             reap(session)
-    told = {row.job_id: row.type for row in deliveries(database)}
-    assert told == {cancelled: "job.cancelled", lost: "job.failed", released: "job.cancelled"}
+    reported = {row.job_id: row.type for row in deliveries(database)}
+    assert reported == {cancelled: "job.cancelled", lost: "job.failed", released: "job.cancelled"}
 
 
-def test_only_who_asked_is_told(database: Database) -> None:
+def test_only_who_asked_is_reported(database: Database) -> None:
     """Other owners, other events and disabled webhooks get nothing; nor does any change but the end."""
     new_hook(database, NOBODY, owner="another")
     new_hook(database, NOBODY, events=["job.failed"])

@@ -95,14 +95,14 @@ def test_a_name_that_changes_its_mind_is_not_connected_to() -> None:
 
 def test_each_try_looks_up_once(server: Receiver, authority: Authority) -> None:
     """The address that was checked is the one that is connected to: there is no second look-up."""
-    asked: list[str] = []
+    requested: list[str] = []
 
     def resolve(host: str, _port: int) -> list[str]:
-        asked.append(host)
-        return ["127.0.0.1"] if len(asked) == 1 else ["127.0.0.99"]
+        requested.append(host)
+        return ["127.0.0.1"] if len(requested) == 1 else ["127.0.0.99"]
 
     assert post(server.url(), authority, AddressPolicy(allow_private=True, resolve=resolve)).delivered
-    assert asked == [HOST]
+    assert requested == [HOST]
 
 
 def test_the_next_address_is_tried(server: Receiver, authority: Authority) -> None:
@@ -136,7 +136,7 @@ def test_redirects_are_failures(server: Receiver, authority: Authority) -> None:
         assert inside.connections == 0
 
 
-def test_proxies_of_the_environment_are_not_asked(
+def test_proxies_of_the_environment_are_not_requested(
     server: Receiver, authority: Authority, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A proxy would connect to addresses that nobody has checked."""

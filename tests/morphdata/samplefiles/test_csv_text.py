@@ -12,12 +12,12 @@ from morphdata.samplefiles.csv_text import read_csv
 from morphdata.samplefiles.fault import FileFault
 
 PLAIN = "t,sweep_left,sweep_right,phi,theta,psi\n0,0,0.5,0,0.1,0\n0.01,0,0.6,0,0.2,0\n"
-MOST_ROWS = 1000
+MAX_ROWS = 1000
 
 
 def read(text: str, *, others: bool = False) -> FlightColumns:
     """Read a text as an uploaded file is read."""
-    return read_csv(io.BytesIO(text.encode()), Wanted(most_rows=MOST_ROWS, others=others))
+    return read_csv(io.BytesIO(text.encode()), Wanted(max_rows=MAX_ROWS, others=others))
 
 
 def test_units_in_names_mean_the_same_flight() -> None:
@@ -71,7 +71,7 @@ def test_further_columns_are_kept_when_asked_for() -> None:
         ("x" * 100_000, "line_too_long", None, ""),
         ('t,"' + "\n" * 200_000, "not_csv", None, ""),
         (PLAIN.replace(",", " "), "missing", None, "titles"),
-        (PLAIN + "1,0,0,0,0,0\n" * MOST_ROWS, "too_many_rows", None, ""),
+        (PLAIN + "1,0,0,0,0,0\n" * MAX_ROWS, "too_many_rows", None, ""),
         (PLAIN + "\n" * 1_000_000, "too_many_rows", None, ""),
     ],
 )
@@ -84,7 +84,7 @@ def test_bad_files_are_refused_by_place(text: str, code: str, line: int | None, 
     assert fault.hint
 
 
-def test_text_that_is_none_is_told() -> None:
+def test_text_that_is_none_is_reported() -> None:
     """Bytes that are no UTF-8 are no CSV."""
     with pytest.raises(FileFault, match="not CSV"):
         read_csv(io.BytesIO(b"\xff\xfe\x00t"), Wanted())

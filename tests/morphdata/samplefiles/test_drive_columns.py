@@ -16,7 +16,7 @@ import scipy.io
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.drives import Drive
 from morphdata.faults import InvalidInput
-from morphdata.samplefiles.columns import MOST_DRIVES
+from morphdata.samplefiles.columns import MAX_DRIVES
 from morphdata.samplefiles.reading import read_flight
 from morphdata.samplefiles.titles import drive_meant
 from morphdata.samples import load_sample
@@ -200,7 +200,7 @@ def test_a_wide_logger_file_gives_no_more_than_there_can_be_drives(tmp_path: Pat
     path = tmp_path / "flight.csv"
     as_csv(path, {**ATTITUDE, **{f"c{i}": T for i in range(200)}, "fold_left": T, "fold_right": T})
     found = read_flight(path)
-    assert len(found.drives) == MOST_DRIVES
+    assert len(found.drives) == MAX_DRIVES
     assert {"fold_left", "fold_right"} <= set(found.drives)
     assert "more than 64" in found.unreadable["c199"].detail
 

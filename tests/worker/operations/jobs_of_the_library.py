@@ -117,9 +117,9 @@ class RealWorker:
             time.sleep(0.02)
         with self.database.write() as session:
             request_cancel(session, OWNER, job_id)
-        asked_at = time.monotonic()
+        requested_at = time.monotonic()
         thread.join(30.0)
-        return endings[0], time.monotonic() - asked_at
+        return endings[0], time.monotonic() - requested_at
 
     def job(self, job_id: str) -> Job:
         """Get a job."""

@@ -10,7 +10,7 @@ import pytest
 
 from morphcore.errors import InvalidInput
 from morphcore.search.checkpoint import UnreadableCheckpoint
-from morphcore.stopping import Interrupted, heed
+from morphcore.stopping import Interrupted, check_stop
 from worker.attempt import error_document
 from worker.operations import Document, Stop
 from worker.operations.library_work import BEGUN_AGAIN, SearchWork
@@ -116,13 +116,13 @@ def test_a_refusal_keeps_its_words() -> None:
     }
 
 
-def test_a_stop_between_two_pictures_is_heeded() -> None:
+def test_a_stop_between_two_pictures_is_respected() -> None:
     """Whoever cancels while plots are drawn waits for one picture, not for all of them."""
     drawn: list[str] = []
 
     def files(_result: Counted, _document: Document) -> dict[str, bytes]:
         for name in ("a", "b", "c"):
-            heed()  # as every picture and every chunk of a flight does
+            check_stop()  # as every picture and every chunk of a flight does
             drawn.append(name)
         return {}
 

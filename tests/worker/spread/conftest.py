@@ -95,10 +95,10 @@ class Spread:
         }
         return Runner(**{**settings, **changes})
 
-    def work(self, runner: Runner, *, most: int = 10_000) -> list[Ending]:
+    def work(self, runner: Runner, *, maximum: int = 10_000) -> list[Ending]:
         """Let a worker do whatever there is to do."""
         endings: list[Ending] = []
-        while len(endings) < most and (ending := runner.run_next()[0]) is not Ending.NOTHING_QUEUED:
+        while len(endings) < maximum and (ending := runner.run_next()[0]) is not Ending.NOTHING_QUEUED:
             endings.append(ending)
         return endings
 

@@ -32,9 +32,9 @@ def test_a_cancelled_spread_job_ends_soon(live_service: LiveService) -> None:
         while not (client.job(job_id)["progress"] or {}).get("generation"):
             time.sleep(0.1)
         client.cancel(job_id)
-        asked_at = time.monotonic()
+        requested_at = time.monotonic()
         *_, job = client.watch(job_id, poll_s=0.05)
-        took_s = time.monotonic() - asked_at
+        took_s = time.monotonic() - requested_at
         assert (job["status"], job["partial"]) == ("cancelled", True)
         assert client.result(job_id)["search"]["generations"] >= 1
     print(f"cancelled within {took_s:.2f} s")

@@ -127,7 +127,7 @@ def test_nobody_advances_a_generation_that_is_flown(spread: Spread) -> None:
     """A worker that dies between storing the last chunk and advancing: the reaper wakes another, who does."""
     job_id = spread.add()
     runner = spread.runner()
-    spread.work(runner, most=1)
+    spread.work(runner, maximum=1)
     with spread.database.write() as session:
         outcome = b"[1, 2, 3]"
         session.execute(update(job_chunks).values(status="done", outcome=outcome, at=database_time() - 10.0))
@@ -140,7 +140,7 @@ def test_a_generation_survives_whoever_advances_it(spread: Spread) -> None:
     """A worker that dies while it advances: the job is queued again with its outcomes; one attempt counts."""
     job_id = spread.add()
     runner = spread.runner()
-    spread.work(runner, most=1 + 3)
+    spread.work(runner, maximum=1 + 3)
     with spread.database.write() as session:  # the last chunk is stored and the job taken over, then nothing
         session.execute(
             update(job_chunks)
@@ -207,11 +207,11 @@ def test_a_chunk_that_is_refused_fails_the_job(spread: Spread) -> None:
 def test_a_stopped_worker_gives_its_chunk_back(spread: Spread) -> None:
     """A worker told to end lets another fly its chunk at once, and no attempt is counted."""
     job_id = spread.add(pause_s=0.5)
-    spread.work(spread.runner(), most=1)
-    asked_at = time.monotonic() + 0.2
-    stopped = spread.runner(shutting_down=lambda: time.monotonic() > asked_at)
+    spread.work(spread.runner(), maximum=1)
+    requested_at = time.monotonic() + 0.2
+    stopped = spread.runner(shutting_down=lambda: time.monotonic() > requested_at)
     assert stopped.run_next() == (Ending.RELEASED, job_id)
-    assert time.monotonic() - asked_at < 1.0
+    assert time.monotonic() - requested_at < 1.0
     assert {(chunk.status, chunk.attempt) for chunk in spread.chunks(job_id)} == {("open", 0)}
 
 
@@ -232,10 +232,10 @@ def test_a_spread_job_ends_with_its_best(spread: Spread, why: str) -> None:
             request_cancel(session, OWNER, job_id)
         else:
             session.execute(update(jobs).values(deadline_at=database_time()))
-    asked_at = time.monotonic()
+    requested_at = time.monotonic()
     for thread in threads:
         thread.join(20.0)
-    assert time.monotonic() - asked_at < 2.0
+    assert time.monotonic() - requested_at < 2.0
     assert spread.job(job_id).status is (JobStatus.CANCELLED if why == "cancel" else JobStatus.EXPIRED)
     assert (spread.result(job_id) or {})["generation"] >= 2
     assert spread.job(job_id).partial
@@ -245,7 +245,7 @@ def test_a_spread_job_ends_with_its_best(spread: Spread, why: str) -> None:
 def test_a_spread_job_that_nobody_flies_is_cancelled_at_once(spread: Spread) -> None:
     """With nobody at work there is nobody to wind it down: like a queued job it ends in the call itself."""
     job_id = spread.add()
-    spread.work(spread.runner(), most=1)
+    spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
         session.execute(update(job_chunks).values(at=database_time() - 5.0))
         assert request_cancel(session, OWNER, job_id).status is JobStatus.CANCELLED
@@ -257,7 +257,7 @@ def test_a_cancelled_job_between_two_chunks(spread: Spread) -> None:
     """Cancelled while its chunks wait for a worker: the next worker that is woken winds it down."""
     job_id = spread.add()
     runner = spread.runner()
-    spread.work(runner, most=3)
+    spread.work(runner, maximum=3)
     with spread.database.write() as session:
         assert request_cancel(session, OWNER, job_id).status is JobStatus.CANCELLING
     assert spread.work(runner) == [Ending.CANCELLED]
@@ -267,7 +267,7 @@ def test_a_cancelled_job_between_two_chunks(spread: Spread) -> None:
 def test_a_cancelled_job_without_workers_ends_by_the_reaper(spread: Spread) -> None:
     """If no worker comes to wind a cancelled job down, the reaper ends it."""
     job_id = spread.add()
-    spread.work(spread.runner(), most=1)
+    spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
         request_cancel(session, OWNER, job_id)
         assert reap(session).cancelled == ()
@@ -279,7 +279,7 @@ def test_a_cancelled_job_without_workers_ends_by_the_reaper(spread: Spread) -> N
 def test_lost_messages_are_repeated(spread: Spread) -> None:
     """Chunks that nobody heard of are announced again, a message each, but not while somebody is at work."""
     job_id = spread.add()
-    spread.work(spread.runner(), most=1)
+    spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
         assert reap(session, republish_after_s=15.0).publish == ()
         session.execute(update(jobs).values(published_at=database_time() - 20.0))
@@ -287,7 +287,7 @@ def test_lost_messages_are_repeated(spread: Spread) -> None:
         session.execute(update(job_chunks).values(at=database_time() - 20.0))
         assert reap(session, republish_after_s=15.0).publish == (job_id,) * 4
         assert reap(session, republish_after_s=15.0).publish == (), "just told"
-    spread.work(spread.runner(), most=1)
+    spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
         session.execute(update(jobs).values(published_at=database_time() - 20.0))
         assert reap(session, republish_after_s=15.0).publish == ()

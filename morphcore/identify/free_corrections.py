@@ -1,4 +1,4 @@
-"""Which aerodynamic corrections flights can tell: those that are sought if a request names none."""
+"""Which aerodynamic corrections flights can tell: those that are searched if a request names none."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ def _apart(drives: Mapping[str, Array], name: str) -> float:
     return 0.0  # a word moves both sides
 
 
-def corrections_told(parameters: Sequence[Parameter], training: Sequence[Trajectory]) -> tuple[str, ...]:
+def determined_corrections(
+    parameters: Sequence[Parameter], training: Sequence[Trajectory]
+) -> tuple[str, ...]:
     """The corrections among a model's parameters that the flights to fit can tell."""
     uneven = any(asymmetric(sample) for sample in training)
     return tuple(each.name for each in parameters if each.correction and (uneven or not each.asymmetric))

@@ -1,4 +1,4 @@
-"""Corrections are sought from flights that can tell them, unless a request says which."""
+"""Corrections are searched from flights that can tell them, unless a request says which."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from morphcore.identify import Identification, identify
-from morphcore.identify.sought import ASYMMETRIC_RAD, asymmetric
+from morphcore.identify.free_corrections import ASYMMETRIC_RAD, asymmetric
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.identify import EquivalentModel, IdentifySearch
 from tests.identify.flights import (
@@ -24,28 +24,28 @@ WITHOUT_DRAG = tuple(name for name in AERO_COEFFICIENTS if name != "profile_drag
 LISTED = ("profile_drag", "lag_s")
 
 
-def sought(*samples: Trajectory, corrections: tuple[str, ...] | None = None) -> tuple[str, ...]:
+def searched(*samples: Trajectory, corrections: tuple[str, ...] | None = None) -> tuple[str, ...]:
     """The corrections that an identification seeks."""
     model = EquivalentModel(links_per_wing=1, aero_coefficients=corrections)
     return Identification(reference_aircraft(), reference_flight(), samples, model).space.free_aero
 
 
 @pytest.mark.parametrize(("role", "expected"), [("train", AERO_COEFFICIENTS), ("held_out", WITHOUT_DRAG)])
-def test_drag_is_sought_where_an_asymmetric_flight_is_fitted(role: str, expected: tuple[str, ...]) -> None:
+def test_drag_is_searched_where_an_asymmetric_flight_is_fitted(role: str, expected: tuple[str, ...]) -> None:
     """One such flight among those to fit is enough; one that is held out tells a fit nothing."""
-    assert sought(example("rate_0.8"), example("asymmetric", role)) == expected
+    assert searched(example("rate_0.8"), example("asymmetric", role)) == expected
 
 
-def test_drag_is_not_sought_from_symmetric_flights() -> None:
+def test_drag_is_not_searched_from_symmetric_flights() -> None:
     """Whatever their number."""
-    assert sought(*(example(f"rate_{rate}") for rate in ("0.2", "0.5", "0.8"))) == WITHOUT_DRAG
+    assert searched(*(example(f"rate_{rate}") for rate in ("0.2", "0.5", "0.8"))) == WITHOUT_DRAG
 
 
 @pytest.mark.parametrize("name", ["rate_0.8", "asymmetric"])
 def test_a_list_is_honoured(name: str) -> None:
-    """What a request names is sought from any flight, and nothing else; none may be named at all."""
-    assert sought(example(name), corrections=LISTED) == LISTED
-    assert sought(example(name), corrections=()) == ()
+    """What a request names is searched from any flight, and nothing else; none may be named at all."""
+    assert searched(example(name), corrections=LISTED) == LISTED
+    assert searched(example(name), corrections=()) == ()
 
 
 @pytest.mark.parametrize("column", ["sweep_left", "sweep_right", "phi", "psi"])
@@ -70,7 +70,7 @@ def test_a_heading_is_no_yaw() -> None:
     assert not asymmetric(replace(flight, psi=psi, phi=flight.phi + 0.2))
 
 
-def test_the_result_names_what_was_sought() -> None:
+def test_the_result_names_what_was_searched() -> None:
     """The corrections, and those left out have the values of the physical guess."""
     found = identify(
         *reference_documents(),
