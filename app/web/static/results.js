@@ -9,11 +9,12 @@ const RMS_TITLES = ANGLES.map(([, letter]) => number(`RMS ${letter}, mrad`));
 /* ---- requests in few words ---- */
 
 const links = (asked) => (asked.links_per_wing ? count(asked.links_per_wing, "link") : null);
+const drives = (asked) => asked.drives?.join(", ").replaceAll("_", " ");
 const DESCRIBED = {
-  identify: (asked) => [links(asked), asked.method],
-  study: (asked) => [`${asked.compared_links.join(", ")} links`, asked.method],
-  simulate: (asked) => [`${asked.model} model`, links(asked), `${asked.duration_s} s`],
-  optimize: (asked) => [`to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
+  identify: (asked) => [drives(asked), links(asked), asked.method],
+  study: (asked) => [drives(asked), `${asked.compared_links.join(", ")} links`, asked.method],
+  simulate: (asked) => [drives(asked), `${asked.model} model`, links(asked), `${asked.duration_s} s`],
+  optimize: (asked) => [drives(asked), `to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
   export: (asked) => [links(asked), asked.format],
 };
 const OPERATIONS = document.body.dataset.operations.split(" ");
