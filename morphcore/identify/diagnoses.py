@@ -19,6 +19,7 @@ from morphcore.frames import wrap_angle
 from morphcore.identify.column_checks import MIN_MOTION_RAD, column_warnings, constant_runs
 from morphcore.identify.cost import SampleCase, sample_cases
 from morphcore.identify.readings import (
+    HALF,
     TENFOLD,
     angle_costs,
     attitude_cost,
@@ -39,8 +40,6 @@ Array = NDArray[np.float64]
 WRONG_DATA = frozenset(
     {
         "looks_like_degrees",
-        "milliseconds",
-        "seconds_as_milliseconds",
         "flipped_sign",
         "swapped_sides",
         "late",
@@ -53,7 +52,6 @@ POOR_SHARE = 0.05  # of the motion, rms: no equivalent model that fits leaves so
 LATE_SHARE = 0.005  # chains of two links and more leave a thousandth; a delay of 20 ms leaves this much
 UNLIKE_SHARE = 0.03
 MIN_DELAY_S = 0.005  # half a row of most records
-HALF = 0.5  # of the motion: what another reading may leave at most to be believed
 OFF_TRIM_RAD = 0.01  # above the bias of attitude sensors
 MOVING_START_RAD_S = 0.02
 START_ROWS = 10
@@ -179,11 +177,11 @@ def _other_reading(fit: SampleFit, reference: Array, number: int) -> str:
     return name if clear and missed and costs[name] < HALF**2 * size else ""
 
 
-# drives and time
+# drives
 
 
 def _drive_warnings(run: Identification, fit: SampleFit, pointer: str) -> Iterator[ResultWarning]:
-    """Units, signs and sides of drives, and the unit of time: each reading is flown by the physical guess."""
+    """Units, signs and sides of drives: each reading is flown by the physical guess."""
     sample = fit.case.sample
     # a rigid model leaves what bending does; a chain does not
     if not error_share(fit) > (POOR_SHARE if run.settings.links_per_wing > 1 else HALF):
@@ -251,8 +249,8 @@ def _cut_off_warning(sample: Trajectory, pointer: str, name: str, row: int) -> R
     angle, time_s = float(sample.drives[name][row]), float(sample.time_s[row])
     return ResultWarning(
         "clipped_column",
-        f"the drive {name} of sample {sample.name!r} stops abruptly at {angle:.4g} rad at t = {time_s:.2f} s, "
-        "but the aircraft moves as if it went on",
+        f"the drive {name} of sample {sample.name!r} stops abruptly at {angle:.4g} rad at t = {time_s:.2f} s,"
+        " but the aircraft moves as if it went on",
         "the sensor or the record is probably saturated (clipped) there: leave out the rows after it, or "
         "record the flight with a wider range",
         f"{pointer}/{name}_rad/{row}",

@@ -21,6 +21,7 @@ from morphcore.frames import wrap_angle
 from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, fly_attitudes, sample_cases, shared_trims
 from morphcore.search.least_squares import LeastSquares
 from morphcore.search.solver import Batch, Box, Outcome
+from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.drives import SIDES
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Change = Callable[[Trajectory], Trajectory]
 
+HALF = 0.5  # of the motion, rms: what another reading may leave at most to be believed
 TENFOLD = 10.0  # the cost by which another reading must be better to be named
 HEADING = 2  # the angle that is measured from any direction
 DELAY_UNIT_S = 0.05  # of the search coordinate of a delay
@@ -91,8 +93,8 @@ def angle_costs(sample: Trajectory, flown: Array, number: int) -> dict[str, floa
 
 
 def drive_readings(sample: Trajectory) -> list[Reading]:
-    """The mistakes with drives and time that a sample may have been made with."""
-    found = _time_readings(sample)
+    """The mistakes with drives that a sample may have been made with."""
+    found = []
     words = _words(sample)
     for names in words.values():
         found += _unit_readings(sample, names)
@@ -172,10 +174,32 @@ def _flipped(names: Sequence[str]) -> Reading:
     )
 
 
-def flown_guess(run: Identification, sample: Trajectory) -> Array | None:
+def require_seconds(run: Identification) -> None:
+    """Refuse samples whose time is in another unit, before a search flies them for minutes.
+
+    Raises
+    ------
+    InvalidInput
+        The rows of a sample are seconds apart, or hardly apart, and with a time in the right unit the
+        physical guess flies the sample.
+    """
+    for number, sample in enumerate(run.samples):
+        for reading in _time_readings(sample):
+            meant = reading.change(sample)
+            motion = float(np.sum(wrap_angle(sample.euler - sample.euler[0]) ** 2))
+            if attitude_cost(meant, flown_guess(run, meant, STEP_S)) < HALF**2 * motion:
+                raise InvalidInput(
+                    reading.message.format(name=f"sample {sample.name!r}"),
+                    pointer=f"/samples/{number}/{reading.column}",
+                    hint=reading.hint,
+                )
+
+
+def flown_guess(run: Identification, sample: Trajectory, step_s: float | None = None) -> Array | None:
     """Attitudes (k, 3) of the physical guess along a sample; None where it cannot fly it."""
+    step_s = run.step_s if step_s is None else step_s
     try:
-        cases = sample_cases(run.model, [sample], run.step_s, separate_wings=run.settings.separate_wings)
+        cases = sample_cases(run.model, [sample], step_s, separate_wings=run.settings.separate_wings)
         batch = run.space.decode(run.space.guess[None, :])
         ((case, found),) = shared_trims(run.model, batch, cases, run.settings.start)
         flown = fly_attitudes(run.model, batch, case, found)[0]
