@@ -31,25 +31,25 @@ class Trajectory(Shown):
     Attributes
     ----------
     name : str
-        Its name, unique among the samples of an identification.
+        Name, unique among the samples of an identification.
     time_s : ndarray, shape (k,)
-        Rising times, s.
+        Increasing times, s.
     drives : mapping of str to ndarray, shape (k,)
-        Angle of each drive that moves, rad, by its name (``sweep_left``), or by its word where both sides
-        move alike (``sweep``).
+        Angle of each moving drive, rad, by its name (``sweep_left``), or by its word if both sides move
+        together (``sweep``).
     phi, theta, psi : ndarray, shape (k,)
         Euler angles from N to B (z-y-x), rad.
     role : {"train", "held_out"}
-        Whether an identification fits it, or only reports it.
+        Whether an identification fits the flight or only reports it.
     weight : float
         Weight of its errors in a fit.
     extra : dict of str to ndarray, shape (k,)
         Other columns.
     of_file : bool
-        Whether ``drives`` are all columns of a file that could be drives, in which case those that the
-        aircraft does not have are left out.
+        Whether ``drives`` holds all columns of a file that could be drives; those that the aircraft does not
+        have are then ignored.
     unreadable : mapping of str to str
-        What is wrong with further columns, by their names.
+        What is wrong with further columns, by name.
     """
 
     name: str
@@ -90,12 +90,12 @@ class Trajectory(Shown):
 
     @property
     def sweep_left(self) -> Array:
-        """Angle (k,) of the first drive of the left side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the left side, rad; zeros if there is none."""
         return self._side("left")
 
     @property
     def sweep_right(self) -> Array:
-        """Angle (k,) of the first drive of the right side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the right side, rad; zeros if there is none."""
         return self._side("right")
 
     def _side(self, side: str) -> Array:
@@ -106,27 +106,27 @@ class Trajectory(Shown):
 
     @property
     def drive_order(self) -> tuple[str, ...]:
-        """Names of the drives as tables and pictures have them: left before right of each word."""
+        """Names of the drives in the order of tables and figures: left before right for each word."""
         names = list(self.drives)
         words = list(dict.fromkeys(without_side(name) for name in names))
         return tuple(sorted(names, key=lambda name: (words.index(without_side(name)), name)))
 
 
 def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
-    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, phi, theta, psi and those of drives.
+    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, phi, theta, psi and those of the drives.
 
-    The ending of its name tells the kind. A drive's column bears its name (``sweep_left``), or the word of
-    both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``); columns of numbers
-    beside the first ones land in ``extra`` as they are, and in ``drives``, in rad, if they could be drives.
-    Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
-    object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
+    The file extension selects the format. The column of a drive is named after it (``sweep_left``), or after
+    the word of both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``). Other
+    columns of numbers are stored in ``extra`` as they are, and in ``drives``, in rad, if they could be
+    drives. Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists
+    of one object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
 
     Parameters
     ----------
     path : str or Path
         The file.
     role : {"train", "held_out"}
-        Whether an identification fits the flight, or only reports it.
+        Whether an identification fits the flight or only reports it.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     ------
     InvalidInput
         The file cannot be read, a column is missing or holds something that is not a finite number, time does
-        not increase, the flight is longer than 600 s, or an angle is no angle in rad.
+        not increase, the flight is longer than 600 s, or an angle cannot be in rad.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
 
 
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
-    """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
+    """Raise InvalidInput if a sample violates the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in ANGLES}}
     columns |= trajectory.drives
     called = {name: INLINE.get(name, f"{name}_rad") for name in columns}
