@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
 from morphdata.drives import without_side
+from morphdata.samplefiles.channel_columns import without_gaps
 from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import read_flight
@@ -50,6 +51,9 @@ class Trajectory(Shown):
         aircraft does not have are left out.
     unreadable : mapping of str to str
         What is wrong with further columns, by their names.
+    channels : mapping of str to ndarray, shape (k,)
+        Measured channels by their columns (``p``, ``nz``, ``tip_z_right_wing``, as in
+        ``morphdata.channels``), SI units; NaN where a value is missing.
     """
 
     name: str
@@ -63,6 +67,7 @@ class Trajectory(Shown):
     extra: dict[str, Array] = field(default_factory=dict)
     of_file: bool = False
     unreadable: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sample: InlineSample) -> Trajectory:
@@ -76,6 +81,7 @@ class Trajectory(Shown):
             psi=_column(sample.psi_rad),
             role=sample.role,
             weight=sample.weight,
+            channels={name: _column(without_gaps(values)) for name, values in sample.channels.items()},
         )
 
     @property
@@ -117,8 +123,9 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
 
     The ending of its name tells the kind. A drive's column bears its name (``sweep_left``), or the word of
     both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``); columns of numbers
-    beside the first ones land in ``extra`` as they are, and in ``drives``, in rad, if they could be drives.
-    Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
+    beside the first ones land in ``extra`` as they are, in ``drives``, in rad, if they could be drives, and
+    in ``channels``, in SI units, if they are named like channels; these alone may have empty cells. Time that
+    counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
     object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
 
     Parameters
@@ -157,6 +164,7 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
         extra={title: _column(values) for title, values in columns.others.items()},
         of_file=True,
         unreadable={name: said_of(fault) for name, fault in columns.unreadable.items()},
+        channels={name: _column(values) for name, values in columns.channels.items()},
     )
 
 

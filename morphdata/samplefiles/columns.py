@@ -7,6 +7,8 @@ from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from morphdata.samplefiles.channel_columns import MAX_CHANNELS, channel_columns, without_gaps
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.flight import MAX_ROWS, angle_fault, from_first_row
 from morphdata.samplefiles.titles import (
@@ -33,7 +35,7 @@ class Wanted:
     names : the columns that are read strictly, and given in SI units.
     optional : those of them that may be missing.
     others : whether further columns of numbers are given too, as they are; those that could be drives are
-        given in any case, in rad.
+        given in any case, in rad, and so are those of channels, in SI units.
     max_rows : a longer file is refused.
     """
 
@@ -46,7 +48,10 @@ class Wanted:
         """Which of the further columns are read."""
         if self.others:
             return [title for title in titles if title]
-        return _preferred([title for title in titles if drive_meant(title) is not None], MAX_DRIVES)
+        listed = list(titles)
+        drives = _preferred([title for title in listed if drive_meant(title) is not None], MAX_DRIVES)
+        channels = [title for title in listed if channel_meant(title) is not None][:MAX_CHANNELS]
+        return [title for title in listed if title in {*drives, *channels}]
 
     def too_many_rows(self) -> FileFault:
         """The fault of a file that is too long."""
@@ -67,7 +72,8 @@ class FlightColumns:
     others : further ones by their own titles, units as they are.
     lines : of a text file the line of each row, from 1; else empty.
     candidates : further ones that could be drives by the drive's name, rad.
-    unreadable : what is wrong with columns that could be drives as well, by the drive's name.
+    unreadable : what is wrong with columns that could be drives or are channels as well, by the name.
+    channels : further ones of channels by the channel's column, SI units; NaN where a value is missing.
     """
 
     values: dict[str, array[float]]
@@ -75,6 +81,7 @@ class FlightColumns:
     lines: Sequence[int] = ()
     candidates: dict[str, array[float]] = field(default_factory=dict)
     unreadable: dict[str, FileFault] = field(default_factory=dict)
+    channels: dict[str, array[float]] = field(default_factory=dict)
 
     @property
     def drives(self) -> dict[str, array[float]]:
@@ -108,6 +115,16 @@ def in_si(values: Numbers, factor: float | None, title: str) -> array[float]:
         row = next(number for number, value in enumerate(scaled) if not math.isfinite(value))
         raise not_finite(title, scaled[row], row)
     return scaled
+
+
+def further_column(values: Iterable[float | None], title: str) -> array[float]:
+    """A further column, units as they are; NaN in the gaps of a channel, which alone may have some.
+
+    Raises
+    ------
+    FileFault : naming the first row that is no finite number.
+    """
+    return without_gaps(values) if channel_meant(title) else in_si(values, 1.0, title)  # type: ignore[arg-type]
 
 
 def not_finite(title: str, value: object, row: int, line: int | None = None) -> FileFault:
@@ -146,14 +163,14 @@ def gathered(
     units: Mapping[str, float | FileFault] | None = None,
     faults: Mapping[str, FileFault] | None = None,
 ) -> FlightColumns:
-    """The columns that were read, with the further ones that could be drives.
+    """The columns that were read, with the further ones that could be drives or are channels.
 
     Parameters
     ----------
     wanted : what was asked for.
     titles : of all columns of the file but the wanted ones.
-    columns : those that were read; the further ones with units as they are.
-    units : of further columns, by title, where they stand apart from the title: factor to rad, or what is
+    columns : those that were read; the further ones with units as they are, and NaN in channels' gaps.
+    units : of further columns, by title, where they stand apart from the title: factor to SI, or what is
         wrong with them.
     faults : what is wrong with further columns that could not be read, by title.
 
@@ -183,13 +200,25 @@ def gathered(
                 candidates[name] = angles
             else:
                 unreadable[name] = fault
+    channels, broken = channel_columns(titles, columns.others, units or {}, faults or {})
+    others = {title: values for title, values in columns.others.items() if _whole(title, values)}
     found = FlightColumns(
-        columns.values, columns.others if wanted.others else {}, columns.lines, candidates, unreadable
+        columns.values,
+        others if wanted.others else {},
+        columns.lines,
+        candidates,
+        unreadable | broken,
+        channels,
     )
     if not found.drives and wanted.optional:
         sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))
         raise next(sided, missing_columns(titles, wanted.names, wanted.optional))
     return found
+
+
+def _whole(title: str, values: array[float]) -> bool:
+    """Whether a further column has a finite number in each row; only those of channels may have gaps."""
+    return channel_meant(title) is None or all(map(math.isfinite, values))
 
 
 def _meant(

@@ -9,13 +9,14 @@ from array import array
 from typing import Any, BinaryIO
 
 from morphdata.samplefiles.cells import Clock, Numbers
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.columns import (
     FlightColumns,
     Wanted,
     column_in_si,
     equally_long,
+    further_column,
     gathered,
-    in_si,
     not_finite,
 )
 from morphdata.samplefiles.comments import is_comment, is_octave
@@ -79,10 +80,11 @@ def _column_of_numbers(title: str, items: list[Any], rows: int) -> array[float]:
     if len(items) != rows:
         detail = f"{shown(title)} has {len(items)} rows, time has {rows}"
         raise FileFault("unequal_lengths", detail, "give equal lengths", title=title)
+    gaps = channel_meant(title) is not None
     for row, item in enumerate(items):
-        if not _is_number(item):
+        if not _is_number(item) and not (gaps and item is None):
             raise not_finite(title, item, row)
-    return in_si(items, 1.0, title)
+    return further_column(items, title)
 
 
 def _is_number(item: object) -> bool:

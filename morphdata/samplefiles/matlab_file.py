@@ -6,7 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, gathered, in_si
+from morphdata.samplefiles.columns import (
+    FlightColumns,
+    Wanted,
+    column_in_si,
+    equally_long,
+    further_column,
+    gathered,
+)
 from morphdata.samplefiles.comments import is_octave
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
 from morphdata.samplefiles.titles import MAX_COLUMNS, chosen, meaning
@@ -193,7 +200,7 @@ def _keep_numbers(columns: FlightColumns, arrays: Mapping[str, Any]) -> dict[str
     for title, item in arrays.items():
         if getattr(item, "size", 0) == rows and item.dtype.kind in "iuf":
             try:
-                columns.others[title] = in_si(item.ravel().astype(float), 1.0, title)
+                columns.others[title] = further_column(item.ravel().astype(float).tolist(), title)
             except FileFault as fault:
                 faults[title] = fault
     return faults

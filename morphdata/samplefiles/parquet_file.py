@@ -5,7 +5,14 @@ from __future__ import annotations
 from array import array
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, gathered, in_si, not_finite
+from morphdata.samplefiles.columns import (
+    FlightColumns,
+    Wanted,
+    column_in_si,
+    further_column,
+    gathered,
+    not_finite,
+)
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.titles import MAX_COLUMNS, chosen
 
@@ -77,7 +84,7 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
     columns, faults = FlightColumns(values), {}
     for title, raw in further.items():
         try:
-            columns.others[title] = in_si(raw, 1.0, title)
+            columns.others[title] = further_column(raw, title)
         except FileFault as fault:
             faults[title] = fault
     return gathered(wanted, [title for title in titles if title not in requested], columns, faults=faults)

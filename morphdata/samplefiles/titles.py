@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 
 from morphdata.channels import is_channel
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
+from morphdata.samplefiles.units import ANGLE_UNITS, TIME_UNITS, UNIT_IN_BRACKETS, plain, unit_pattern
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 SWEEPS = ("sweep_left", "sweep_right")
 ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
 DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
 MAX_COLUMNS = 1000  # a file of more is something else, or an attack
-LONGEST_TITLE = 200
 SYNONYMS = {"time": "t"}
-DEGREE = math.pi / 180.0
-TIME_UNITS = {  # -> s
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "μs", "usec", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 1e-9),
-}
-ANGLE_UNITS = {  # -> rad
-    **dict.fromkeys(("rad", "rads", "radian", "radians"), 1.0),
-    **dict.fromkeys(("mrad", "milliradian", "milliradians"), 1e-3),
-    # signs of degree, of ordinals (typed in its place) and of rings above
-    **dict.fromkeys(("deg", "degs", "degree", "degrees", "°", "º", "˚"), DEGREE),
-}
-_UNITS = "|".join(sorted((*TIME_UNITS, *ANGLE_UNITS), key=len, reverse=True))
 # the unit last, after a mark or in brackets: theta_deg, theta [deg], theta/deg, theta, deg, theta in deg
-UNIT = re.compile(rf"(?P<name>.+?)[_./,:;-]*(?:in_)?[\[({{<]?_*(?P<unit>{_UNITS})_*[\])}}>]?")
-BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
-
-
-def plain(text: str) -> str:
-    """A title or unit in small letters, its blanks as underscores."""
-    return re.sub(r"\s+", "_", text[:LONGEST_TITLE].strip().strip('"').strip().lower())
+UNIT = unit_pattern((*TIME_UNITS, *ANGLE_UNITS))
 
 
 def unit_factor(name: str, unit: str) -> float | None:
@@ -73,6 +53,8 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
     >>> drive_meant("Fold_left [deg]"), drive_meant("cant"), drive_meant("p_rad_s")
     (('fold_left', 0.017453292519943295), ('cant', None), None)
     """
+    if channel_meant(title) is not None:
+        return None
     whole = plain(title)
     factor = None
     match = UNIT.fullmatch(whole)
@@ -86,7 +68,7 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
 
 def drive_in_brackets(title: str) -> str | None:
     """The drive that a title could mean whose unit in brackets is none that is read; None for all others."""
-    match = BRACKETS.fullmatch(plain(title))
+    match = UNIT_IN_BRACKETS.fullmatch(plain(title))
     name = None if match is None else match["name"].rstrip("_")
     return name if name and _could_be_a_drive(name) else None
 
@@ -155,7 +137,7 @@ def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequen
 def _way_out(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> str:
     """What to do about missing columns: where one stands there in a unit that is not read, that."""
     for title in titles:
-        match = BRACKETS.fullmatch(plain(title))
+        match = UNIT_IN_BRACKETS.fullmatch(plain(title))
         if match and SYNONYMS.get(match["name"], match["name"]) in missing:
             return f"the unit of {shown(title)!r} is not read: {known_units(match['name'])}"
     drives = "; other drives of the aircraft by their names" if SWEEPS[0] in names else ""
