@@ -7,9 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag
-from pydantic_core import PydanticKnownError
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticKnownError
 
+from morphdata.axes import ATTITUDE_FIELDS, in_axes_of_here
 from morphdata.base import AngleSeries, ChannelSeries, Document, Identifier, SampleName, TimeSeries
 from morphdata.channels import channel_field, document_name, is_channel
 from morphdata.drives import (
@@ -23,13 +33,16 @@ from morphdata.drives import (
 )
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.samplefiles.channel_columns import with_gaps
+from morphdata.samplefiles.declared import NOTHING, Declared
 from morphdata.samplefiles.fault import as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
+from morphdata.samplefiles.frames import Body, Earth
 from morphdata.samplefiles.reading import read_flight
 from morphdata.samplefiles.titles import DRIVE
 from morphdata.samplefiles.units import DEGREE
 
 Role = Literal["train", "held_out"]
+QuaternionSeries = AngleSeries | None
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
 
 EXAMPLE_SAMPLE: dict[str, Any] = {
@@ -47,7 +60,6 @@ EXAMPLE_FOLD: dict[str, Any] = {
     name: values for name, values in EXAMPLE_SAMPLE.items() if not name.startswith("sweep")
 } | {"name": "fold_30", "sweep_rad": [0.0, 0.0, 0.001, 0.003], "fold_left_deg": [0.0, 0.0, 0.1, 0.3]}
 UNITS = {"_rad": 1.0, "_deg": DEGREE}  # of the columns of drives inline
-ATTITUDE_FIELDS = ("phi_rad", "theta_rad", "psi_rad")
 MISSPELT = 0.9  # so near to one of them no column is that of a drive
 
 
@@ -66,6 +78,13 @@ def drive_key(field: str) -> str | None:
     """Return the drive, or the word of both sides, of a column inline; None of all other columns."""
     key, unit = field[:-4], field[-4:]
     return key if unit in UNITS and channel_field(field) is None else None
+
+
+class Axes(Document):
+    """Axes in which a sample's attitude and channels are given."""
+
+    earth: Earth = Field(default="NED", description="North, east, down; or east, north, up.")
+    body: Body = Field(default="FRD", description="Forward, right, down; or forward, left, up.")
 
 
 class TrajectoryColumns(Document):
@@ -92,6 +111,37 @@ class TrajectoryColumns(Document):
     phi_rad: AngleSeries = Field(description="Roll (z-y-x Euler angles, body FRD against earth NED).")
     theta_rad: AngleSeries = Field(description="Pitch.")
     psi_rad: AngleSeries = Field(description="Yaw.")
+    qw: QuaternionSeries = Field(
+        default=None,
+        description="In the place of the three angles: the rotation from body to earth as a unit quaternion, "
+        "qw + qx i + qy j + qz k, which turns vectors of the body into the earth's axes.",
+    )
+    qx: QuaternionSeries = None
+    qy: QuaternionSeries = None
+    qz: QuaternionSeries = None
+    frames: Axes | None = Field(
+        default=None,
+        description="Axes of the angles or the quaternion and of the channels, if they are others than NED "
+        "and FRD. Drives have signs of their own.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_here(cls, given: Any) -> Any:
+        """Turn attitude and channels to NED and FRD, where they are sound; the fields say what is not."""
+        return in_axes_of_here(given) if isinstance(given, dict) else given
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Describe that a quaternion may stand in the place of the angles."""
+        schema = super().__get_pydantic_json_schema__(core_schema, handler)
+        if handler.mode == "validation":
+            described = handler.resolve_ref_schema(schema)
+            required = described["required"]
+            described["required"] = [name for name in required if name not in ATTITUDE_FIELDS]
+        return schema
 
     @property
     def drive_fields(self) -> dict[str, str]:
@@ -294,7 +344,10 @@ def columns_of_aircraft(
 
 
 def load_sample(
-    path: str | Path, role: Role = "train", drives: Mapping[str, Drive] | None = None
+    path: str | Path,
+    role: Role = "train",
+    drives: Mapping[str, Drive] | None = None,
+    declared: Declared = NOTHING,
 ) -> InlineSample:
     """Read a sample flight from its CSV, JSON, Parquet or MATLAB file, as it stands inline in a request.
 
@@ -307,6 +360,8 @@ def load_sample(
     drives : mapping of str to Drive, optional
         Of the aircraft that flew (`Aircraft.drives`): columns that move none of them are left out. By default
         every column that could be a drive is kept. Columns of channels are always kept.
+    declared : Declared
+        What the file's owner says about its axes and columns.
 
     Raises
     ------
@@ -314,7 +369,7 @@ def load_sample(
         The file cannot be read, holds no flight, or moves no drive; the sentence names the file and the line.
     """
     path = Path(path)
-    columns = read_flight(path)
+    columns = read_flight(path, declared)
     names = list(columns.drives)
     if drives is not None:
         unreadable = {name: said_of(fault) for name, fault in columns.unreadable.items()}

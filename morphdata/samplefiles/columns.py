@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from morphdata.samplefiles.channel_columns import MAX_CHANNELS, channel_columns, without_gaps
 from morphdata.samplefiles.channel_titles import channel_meant
+from morphdata.samplefiles.declared import NOTHING, Declared
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.flight import MAX_ROWS, angle_fault, from_first_row
+from morphdata.samplefiles.frames import (
+    EULER,
+    HERE,
+    QUATERNION,
+    Frames,
+    channels_in_here,
+    euler_in_ned,
+    euler_of_quaternions,
+    quaternion_fault,
+)
 from morphdata.samplefiles.titles import (
     FLIGHT,
     SWEEPS,
@@ -37,12 +48,25 @@ class Wanted:
     others : whether further columns of numbers are given too, as they are; those that could be drives are
         given in any case, in rad, and so are those of channels, in SI units.
     max_rows : a longer file is refused.
+    declared : what the file's owner says about it.
     """
 
     names: tuple[str, ...] = FLIGHT
     optional: tuple[str, ...] = SWEEPS
     others: bool = False
     max_rows: int = MAX_ROWS
+    declared: Declared = NOTHING
+
+    def called(self, titles: Iterable[str]) -> list[str]:
+        """What columns are called by what was declared about them.
+
+        Raises
+        ------
+        FileFault : a declared column is missing.
+        """
+        listed = list(titles)
+        self.declared.require_found(listed)
+        return [self.declared.called(title) for title in listed]
 
     def further(self, titles: Iterable[str]) -> list[str]:
         """Which of the further columns are read."""
@@ -184,6 +208,7 @@ def gathered(
     candidates: dict[str, array[float]] = {}
     kept = _preferred([name for name, (title, _) in meant.items() if title in columns.others], maximum)
     read = wanted.further(titles)
+    columns = in_declared_axes(_as_declared(columns, wanted.declared), wanted.declared.frames)
     for name, (title, factor) in meant.items():
         if title not in columns.others and title in read:
             unreadable[name] = (faults or {}).get(title) or _no_numbers(title)
@@ -194,13 +219,15 @@ def gathered(
                 "leave out the columns that are none",
             )
         else:
-            angles = in_si(columns.others[title], factor, title)
+            angles = _affine(in_si(columns.others[title], factor, title), wanted.declared.affine(name))
             fault = angle_fault(name, angles, shown(title))
             if fault is None:
                 candidates[name] = angles
             else:
                 unreadable[name] = fault
     channels, broken = channel_columns(titles, columns.others, units or {}, faults or {})
+    channels = {name: _affine(values, wanted.declared.affine(name)) for name, values in channels.items()}
+    channels = channels_in_here(channels, wanted.declared.frames)
     others = {title: values for title, values in columns.others.items() if _whole(title, values)}
     found = FlightColumns(
         columns.values,
@@ -214,6 +241,52 @@ def gathered(
         sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))
         raise next(sided, missing_columns(titles, wanted.names, wanted.optional))
     return found
+
+
+def _as_declared(columns: FlightColumns, declared: Declared) -> FlightColumns:
+    """The columns with declared scales and offsets in those that count."""
+    if not declared.columns:
+        return columns
+    values = {name: _affine(column, declared.affine(name)) for name, column in columns.values.items()}
+    return replace(columns, values=values)
+
+
+def _affine(values: array[float], affine: tuple[float, float] | None) -> array[float]:
+    if affine is None:
+        return values
+    scale, offset = affine
+    return array("d", (scale * value + offset for value in values))
+
+
+def in_declared_axes(columns: FlightColumns, frames: Frames) -> FlightColumns:
+    """The columns with the attitude as Euler angles between NED and FRD.
+
+    Raises
+    ------
+    FileFault : naming the row of a quaternion that is none, or of a pitch angle that is none.
+    """
+    values = dict(columns.values)
+    quaternion = [values.pop(name) for name in QUATERNION if name in values]
+    if quaternion:
+        rows = list(zip(*quaternion, strict=True))
+        for row, components in enumerate(rows):
+            detail = quaternion_fault(components)
+            if detail is not None:
+                line = columns.lines[row] if len(columns.lines) else None
+                hint = "repair the row; a quaternion has four components whose squares add up to 1"
+                raise FileFault("no_rotation", detail, hint, row=row, line=line, title="qw")
+        values |= zip(EULER, euler_of_quaternions(rows, frames), strict=True)
+    elif frames != HERE and "theta" in values:
+        fault = angle_fault("theta", values["theta"], "theta")  # of other axes it is an angle as steep
+        if fault is not None:
+            raise fault
+        rows = list(zip(*(values[name] for name in EULER), strict=True))
+        values |= zip(EULER, euler_in_ned(rows, frames), strict=True)
+    return replace(columns, values={name: values[name] for name in sorted(values, key=_place)})
+
+
+def _place(name: str) -> int:
+    return FLIGHT.index(name) if name in FLIGHT else len(FLIGHT)
 
 
 def _whole(title: str, values: array[float]) -> bool:

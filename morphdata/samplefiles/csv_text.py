@@ -19,6 +19,7 @@ from morphdata.samplefiles.channel_titles import channel_meant, channel_unit_fac
 from morphdata.samplefiles.columns import FlightColumns, Wanted, gathered, not_finite
 from morphdata.samplefiles.comments import is_comment, is_octave, uncommented
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.frames import QUATERNION
 from morphdata.samplefiles.titles import chosen, drive_meant, known_units, meaning, unit_factor
 
 LONGEST_LINE = 64 * 1024  # characters; one endless line must not fill the memory
@@ -158,12 +159,14 @@ def _titled(line: str, wanted: Wanted) -> tuple[str, list[str], Found]:
     ------
     FileFault : no delimiter gives them; as of the one that gives most.
     """
+    names = (*wanted.names, *QUATERNION)
 
     def known(delimiter: str) -> int:
-        return sum(meaning(cell, wanted.names) is not None for cell in _cells(line, delimiter))
+        called = map(wanted.declared.called, _cells(line, delimiter))
+        return sum(meaning(cell, names) is not None for cell in called)
 
     delimiter = max(DELIMITERS, key=lambda mark: (known(mark), line.count(mark)))
-    cells = _cells(line, delimiter)
+    cells = wanted.called(_cells(line, delimiter))
     return delimiter, cells, chosen(cells, wanted.names, wanted.optional)
 
 
@@ -236,7 +239,7 @@ class _Table:
             raise _no_rows()
         self._numbers.require_decimals()
         columns = FlightColumns(
-            values={name: self._columns[name].values for name in self._wanted.names if name in self._columns},
+            values={name: column.values for name, column in self._columns.items()},
             others={column.title: column.values for column in self._sound if self._is_read_right(column)},
             lines=self._lines,
         )

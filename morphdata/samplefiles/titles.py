@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from morphdata.channels import is_channel
 from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
+from morphdata.samplefiles.frames import EULER, QUATERNION
 from morphdata.samplefiles.units import ANGLE_UNITS, TIME_UNITS, UNIT_IN_BRACKETS, plain, unit_pattern
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
@@ -15,6 +16,7 @@ SWEEPS = ("sweep_left", "sweep_right")
 ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
 DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
 MAX_COLUMNS = 1000  # a file of more is something else, or an attack
+NUMBERED = re.compile(r"q_?\[?([0-3])\]?")  # q0, q_0, q[0]: of a quaternion in an order that nobody knows
 SYNONYMS = {"time": "t"}
 # the unit last, after a mark or in brackets: theta_deg, theta [deg], theta/deg, theta, deg, theta in deg
 UNIT = unit_pattern((*TIME_UNITS, *ANGLE_UNITS))
@@ -86,7 +88,7 @@ def chosen(
     Parameters
     ----------
     titles : of all columns.
-    names : the columns that are wanted.
+    names : the columns that are wanted; a quaternion may stand in the place of phi, theta, psi.
     optional : those of them that may be missing.
 
     Returns
@@ -104,8 +106,9 @@ def chosen(
             f"keep the {len(names)} that count: {', '.join(names)}",
         )
     found: dict[str, tuple[int, float | None]] = {}
+    attitude = set(ATTITUDE) <= set(names)
     for position, title in enumerate(titles):
-        meant = meaning(title, names)
+        meant = meaning(title, (*names, *QUATERNION) if attitude else names)
         if meant is None:
             continue
         name, factor = meant
@@ -118,10 +121,18 @@ def chosen(
                 title=TITLES,
             )
         found[name] = position, factor
-    missing = [name for name in names if name not in found and name not in optional]
+    left_out = _other_attitude(found) if attitude else ()
+    found = {name: column for name, column in found.items() if name not in left_out}
+    missing = [name for name in names if name not in {*found, *left_out, *optional}]
     if missing:
         raise missing_columns(titles, names, missing)
     return found
+
+
+def _other_attitude(found: Collection[str]) -> tuple[str, ...]:
+    """Which columns of attitude do not count: Euler angles come first, if they are complete."""
+    has_quaternion = all(name in found for name in QUATERNION)
+    return EULER if has_quaternion and not all(name in found for name in EULER) else QUATERNION
 
 
 def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> FileFault:
@@ -136,6 +147,12 @@ def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequen
 
 def _way_out(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> str:
     """What to do about missing columns: where one stands there in a unit that is not read, that."""
+    numbered = [title for title in titles if NUMBERED.fullmatch(plain(title))]
+    if len(numbered) == len(QUATERNION) and set(EULER) & set(missing):
+        return (
+            f"{', '.join(map(shown, numbered))} may be a quaternion in the order w, x, y, z or x, y, z, w: "
+            "declare which (--quaternion wxyz), or name its columns qw, qx, qy, qz"
+        )
     for title in titles:
         match = UNIT_IN_BRACKETS.fullmatch(plain(title))
         if match and SYNONYMS.get(match["name"], match["name"]) in missing:
