@@ -427,3 +427,23 @@ def shown_names(drives: Mapping[str, Drive]) -> str:
 def label(name: str) -> str:
     """Return the name of a drive for people: `fold left`."""
     return name.replace("_", " ")
+
+
+def shown_drives(names: Iterable[str]) -> list[str]:
+    """Return what a listing says of the drives that move: nothing where only the sweep of both sides does.
+
+    Both sides of a word are one entry.
+
+    Examples
+    --------
+    >>> shown_drives(["sweep_left", "sweep_right"])
+    []
+    >>> shown_drives(["sweep_left", "sweep_right", "elevator", "fold_left"])
+    ['sweep', 'elevator', 'fold_left']
+    """
+    names = list(dict.fromkeys(names))
+    shown: dict[str, None] = {}
+    for name in names:
+        word = without_side(name)
+        shown[word if all(f"{word}_{side}" in names for side in SIDES) else name] = None
+    return [] if list(shown) == ["sweep"] else list(shown)
