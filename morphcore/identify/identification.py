@@ -15,7 +15,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.parameters import SearchSpace, search_space
-from morphcore.identify.readings import require_seconds
+from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
