@@ -1,4 +1,4 @@
-"""Entry points of compiled kernels used by simulate/batch.py, where they can be timed or counted.
+"""Entry points of compiled kernels used by simulate/batch.py, where they can be timed or counted."""
 
 from __future__ import annotations
 
