@@ -174,14 +174,17 @@ class Drive:
     high: float
     held: float
 
-    def fault(self, angle_rad: float, pointer: str) -> Fault | None:
-        """Return the fault of an angle of the drive; None if it is in range."""
+    def fault(self, angle_rad: float, pointer: str, furthest_rad: float = 0.0) -> Fault | None:
+        """Return the fault of an angle of the drive; None if it is in range.
+
+        ``furthest_rad`` : the largest angle of its column, which may show its unit.
+        """
         if self.low - ANGLE_TOLERANCE_RAD <= angle_rad <= self.high + ANGLE_TOLERANCE_RAD:
             return None
         of = "Its hinge on" if len(self.surfaces) == 1 else "Its hinges on"
         hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
         hint += f"from {self.low:g} to {self.high:g} rad."
-        if abs(angle_rad) > math.pi:
+        if max(abs(angle_rad), abs(furthest_rad)) > math.pi:
             hint += f" Is the angle in degrees? A column may say so in its name: {self.name}_deg."
         return Fault(
             # the old code for sweep, which clients know

@@ -133,7 +133,7 @@ def _angle_warnings(fit: SampleFit, pointer: str) -> Iterator[ResultWarning]:
     reference, sample = _reference(fit), fit.case.sample
     if reference is None:
         return
-    readings = {name: _other_reading(fit, reference, number) for number, name in enumerate(ANGLES)}
+    readings = _other_readings(fit, reference)
     degrees = [name for name, reading in readings.items() if reading.endswith("degrees")]
     negated = [name for name, reading in readings.items() if reading.startswith("negated")]
     if degrees:
@@ -163,18 +163,26 @@ def _angle_warnings(fit: SampleFit, pointer: str) -> Iterator[ResultWarning]:
         )
 
 
-def _other_reading(fit: SampleFit, reference: Array, number: int) -> str:
-    """The reading of one angle that fits tenfold better than as it is given; "" if there is none."""
-    costs = angle_costs(fit.case.sample, reference, number)
-    given = costs.pop("given")
-    name = min(costs, key=lambda each: costs[each])
-    rows = fit.case.sample.time_s.size
-    turned = reference[:, number] - reference[0, number]
-    size = float(np.sum((reference[:, number] if name == "negated" else turned) ** 2))
-    clear = TENFOLD * costs[name] < given and given > rows * MIN_MOTION_RAD**2
-    fitted = angle_costs(fit.case.sample, fit.identified, number)["given"]
-    missed = not np.isfinite(fitted) or fitted > costs[name]
-    return name if clear and missed and costs[name] < HALF**2 * size else ""
+def _other_readings(fit: SampleFit, reference: Array) -> dict[str, str]:
+    """The reading of each angle that fits tenfold better than as it is given; "" where there is none.
+
+    A model that does something else altogether proves nothing: with the best reading of every angle it must
+    follow the sample.
+    """
+    sample, found = fit.case.sample, {}
+    left, motion = 0.0, 0.0
+    for number, name in enumerate(ANGLES):
+        costs = angle_costs(sample, reference, number)
+        given = costs.pop("given")
+        best = min(costs, key=lambda each: costs[each])
+        fitted = angle_costs(sample, fit.identified, number)["given"]
+        clear = TENFOLD * costs[best] < given and given > sample.time_s.size * MIN_MOTION_RAD**2
+        missed = not np.isfinite(fitted) or fitted > costs[best]
+        found[name] = best if clear and missed else ""
+        turned = np.unwrap(sample.euler[:, number]) - sample.euler[0, number]
+        left += costs[best] if found[name] else given
+        motion += float(np.sum((np.radians(turned) if found[name].endswith("degrees") else turned) ** 2))
+    return found if left < HALF**2 * motion else dict.fromkeys(ANGLES, "")
 
 
 # drives

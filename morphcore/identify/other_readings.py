@@ -185,9 +185,13 @@ def require_seconds(run: Identification) -> None:
     """
     for number, sample in enumerate(run.samples):
         for reading in _time_readings(sample):
-            meant = reading.change(sample)
-            motion = float(np.sum(wrap_angle(sample.euler - sample.euler[0]) ** 2))
-            if attitude_cost(meant, flown_guess(run, meant, STEP_S)) < HALF**2 * motion:
+            flown = flown_guess(run, reading.change(sample), STEP_S)
+            if flown is None:
+                continue
+            moved = wrap_angle(
+                sample.euler - sample.euler[0]
+            )  # a trim that is a little off is no matter here
+            if np.sum(wrap_angle(flown - flown[0] - moved) ** 2) < HALF**2 * np.sum(moved**2):
                 raise InvalidInput(
                     reading.message.format(name=f"sample {sample.name!r}"),
                     pointer=f"/samples/{number}/{reading.column}",
