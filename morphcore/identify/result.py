@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.coloured import ColouredNoise, records
-from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
+from morphcore.identify.cost import SampleCase, fly_measured, shared_trims
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.sample_fit import ANGLES, SampleFit
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
-from morphcore.search.least_squares import differences
 from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
@@ -138,22 +137,18 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
     certainty = None
     if judged and space.dimension and flies:
-
-        def errors(points: Array) -> Array:
-            return residuals(run.model, space.decode(points), run.training, start)
-
-        residual, jacobian = differences(state.best[None, :], space.upper, errors)
+        residual, jacobian = run.linearised(state.best)
         trained = [fit for fit in fits if fit.case.sample.role == "train"]
         noise = ColouredNoise(
             records(
                 [fit.case.sample.time_s for fit in trained],
-                residual[0],
-                jacobian[0],
+                residual,
+                jacobian,
                 [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained],
             ),
             run.prior_weight,
         )
-        certainty = uncertainty(space, state.best, residual[0], jacobian[0], noise)
+        certainty = uncertainty(space, state.best, residual, jacobian, noise)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
@@ -197,7 +192,7 @@ def _attitudes(
     model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any
 ) -> list[Array]:
     return [
-        fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
+        fly_measured(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
     ]
 
 
