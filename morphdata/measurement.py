@@ -134,9 +134,12 @@ class SampleMeasurement(Result):
         "begin with cannot be told apart: it is their sum, as in `heading_rad`.",
     )
     delay_s: Estimate | None = Field(
-        default=None, description="How late all channels are against the drives; null where that was not free."
+        default=None,
+        description="How late all channels are against the drives; null where that was not free.",
     )
-    heading_rad: Estimate | None = Field(default=None, description="Heading to begin with, as the readings say.")
+    heading_rad: Estimate | None = Field(
+        default=None, description="Heading to begin with, as the readings say."
+    )
     initial_state: dict[str, Estimate] = Field(
         default={}, description="What the start is off its trim, where that was free; SI units and rad."
     )

@@ -30,7 +30,9 @@ HEADING = "psi"
 MEASURED_RAD = 2e-5
 DIFFERENCE = 3  # order of the differences that show noise: slower motion leaves little in them
 MIN_DIFFERENCES = 12
-ALTERNATING = 0.6  # share of neighbouring differences of unlike sign; noise has 0.77, smooth motion hardly any
+ALTERNATING = (
+    0.6  # share of neighbouring differences of unlike sign; noise has 0.77, smooth motion hardly any
+)
 MAD_TO_SIGMA = 1.4826  # of normal noise
 FLOOR = 1e-6  # of a channel's range: less noise than this no sensor has
 START = ("phi_rad", "theta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "u_m_s", "v_m_s", "w_m_s")
@@ -91,6 +93,10 @@ class Measured:
         Derivatives of the readings by the start; n = 0 where it is not free.
     start_spread : ndarray, shape (n,)
         Standard deviations of the start.
+    angle_columns : ndarray, shape (k, c, n)
+        Derivatives of the readings by errors of the first angles of noisy drives.
+    angle_spread : ndarray, shape (n,)
+        Standard deviations of these.
     """
 
     channels: tuple[str, ...]
@@ -100,6 +106,8 @@ class Measured:
     loss: str = "linear"
     start_columns: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     start_spread: Array = field(default_factory=lambda: np.zeros(0))
+    angle_columns: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    angle_spread: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def plain(self) -> bool:
