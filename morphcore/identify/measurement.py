@@ -30,7 +30,9 @@ HEADING = "psi"
 MEASURED_RAD = 2e-5
 DIFFERENCE = 3  # order of the differences that show noise: slower motion leaves little in them
 MIN_DIFFERENCES = 12
-ALTERNATING = 0.6  # share of neighbouring differences of unlike sign; noise has 0.77, smooth motion hardly any
+ALTERNATING = (
+    0.6  # share of neighbouring differences of unlike sign; noise has 0.77, smooth motion hardly any
+)
 MAD_TO_SIGMA = 1.4826  # of normal noise
 FLOOR = 1e-6  # of a channel's range: less noise than this no sensor has
 START = ("phi_rad", "theta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "u_m_s", "v_m_s", "w_m_s")
@@ -145,7 +147,7 @@ def measured(sample: Trajectory, measurement: Measurement, openness: Openness) -
 
 
 def reference_rad(openness: Openness) -> float:
-    """Noise of an angle to which that of other channels is related: the mean of the fitted angles, or 1 mrad."""
+    """Noise of an angle to which that of other channels is related: mean of the fitted angles, or 1 mrad."""
     angles = [sigma for name, sigma in openness.sigma.items() if name in ANGLES]
     return float(np.exp(np.mean(np.log(angles)))) if angles else 1e-3
 
