@@ -25,8 +25,8 @@ class MeasuredChannel(Document):
 
     sigma: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
         default=None,
-        description="Standard deviation of the channel's noise, SI units and rad. Left out: estimated from the "
-        "data, and again from the residuals of the fit.",
+        description="Standard deviation of the channel's noise, SI units and rad. Left out: estimated from "
+        "the data, and again from the residuals of the fit.",
     )
     bias: bool | None = Field(
         default=None, description="Whether the channel may have a constant bias. Left out: as `bias` says."
@@ -36,8 +36,8 @@ class MeasuredChannel(Document):
 class Measurement(Document):
     """How the sample flights were measured; what is left out is decided from the data.
 
-    A reading is y(t) = h(x(t - delay)) + bias + noise. A flight counts as measured where its angles carry noise
-    that is white above 2e-5 rad: then biases and the delay are free. In flights without noise they are freed
+    A reading is y(t) = h(x(t - delay)) + bias + noise. A flight counts as measured where its angles carry
+    white noise above 2e-5 rad: then biases and the delay are free. In flights without noise they are freed
     where that lowers the squared errors at least tenfold. The heading to begin with is always free.
     """
 
@@ -59,8 +59,8 @@ class Measurement(Document):
     )
     loss: Annotated[Loss, Option("--loss", MEASUREMENT)] = Field(
         default="linear",
-        description="What a residual costs: its square, or less than that where it is large, so that outliers "
-        "hardly count.",
+        description="What a residual costs: its square, or less than that where it is large, so that "
+        "outliers hardly count.",
     )
     drive_bandwidth_hz: Annotated[float, Field(gt=0.0, le=1e4)] | Literal["auto"] | None = Field(
         default=None,
@@ -76,7 +76,7 @@ class Measurement(Document):
                     "unknown_channel",
                     f"There is no channel {name}.",
                     f"/channels/{name}",
-                    "Channels are phi, theta, psi and those of simulated flights: p, q, r, alpha, tip_left_z, ...",
+                    "Channels are phi, theta, psi and those of simulated flights: p, q, r, tip_left_z, ...",
                 )
             elif name in UNFITTED or name.startswith("hinge_torque_"):
                 yield Fault(

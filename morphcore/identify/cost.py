@@ -270,7 +270,7 @@ def residuals(
     start: StartMode,
     stop: Stop | None = None,
 ) -> Array:
-    """(p, m) all weighted errors of all samples in one row per parameter set: row by row, channel by channel."""
+    """(p, m) all weighted errors of all samples in one row per parameter set: by rows, then channels."""
     counts = [case.setup.residual_count for case in cases]
     ends = np.cumsum(counts)
     errors = np.empty((batch.particles, ends[-1]))

@@ -153,7 +153,7 @@ def measured(sample: Trajectory, measurement: Measurement, openness: Openness) -
 
 
 def reference_rad(openness: Openness) -> float:
-    """Noise of an angle to which that of other channels is related: the mean of the fitted angles, or 1 mrad."""
+    """Noise of an angle to which that of other channels is related: mean of the fitted angles, or 1 mrad."""
     angles = [sigma for name, sigma in openness.sigma.items() if name in ANGLES]
     return float(np.exp(np.mean(np.log(angles)))) if angles else 1e-3
 

@@ -130,7 +130,7 @@ def _errors(setup: Measured, time_s: Array, flown: Array | Readings, delay: Arra
     """Errors (p, k, c) of the flights' readings, late by (p,) s, and their derivatives by it."""
     if isinstance(flown, Readings):
         values, rate = flown.at(time_s - delay[:, None])
-        slope = -rate if setup.openness.delay else rate[..., :0]
+        slope: Array = -rate if setup.openness.delay else rate[..., :0]
     else:
         values, slope = flown, flown[..., :0]
     error = values - setup.values
