@@ -60,15 +60,15 @@ OTHER_PHASE = SKY
 ROLES = {"train": "fitted", "held_out": "held out"}
 
 BAND = "#BBD9EE"  # of probable attitudes
-SILENT_SPAN_MRAD = 0.01  # half the height of the axis of an error that is round-off
+SILENT_SPAN_MRAD = 0.01  # half the height of the axis of an error within round-off
 
 
 def identification_plots(document: Document, curves: Document) -> dict[str, bytes]:
-    """Draw everything that an identification's result has to show.
+    """Draw all plots of an identification's result.
 
     Parameters
     ----------
-    document : the result; its ``search.history`` gives the convergence.
+    document : the result; ``search.history`` provides the convergence.
     curves : ``{"samples": [{"name", "role", "time_s", "drives": ["sweep_left", "sweep_right"],
         "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...},
         "initial": {...}, "identified": {...}}]}``; the drives' columns bear their names; a value that a
@@ -120,7 +120,7 @@ def attitude_figure(sample: Document) -> Figure:
 
 
 def residual_figure(sample: Document) -> Figure:
-    """Errors of roll, pitch and yaw in mrad: all models at the left, the identified one at the right."""
+    """Errors of roll, pitch and yaw in mrad: all models on the left, the identified one on the right."""
     time_s = series(sample["time_s"])
     models = [model for model in ("rigid", "initial", "identified") if sample.get(model)]
     figure = Figure(figsize=(9.0, 6.2))
@@ -151,7 +151,7 @@ def residual_figure(sample: Document) -> Figure:
 
 
 def convergence_figure(document: Document) -> Figure:
-    """Least cost J so far against flights flown (or generations, if flights are not counted), logarithmic."""
+    """Minimum cost J so far against flights flown (or generations, if not counted), logarithmic."""
     history = [row for row in document.get("search", {}).get("history", []) if is_cost(row.get("best_cost"))]
     figure = Figure(figsize=(7.2, 3.8))
     axes = figure.add_axes((0.115, 0.13, 0.865, 0.77))
@@ -225,7 +225,7 @@ def _title(sample: Document, subject: str) -> str:
 
 
 def angle_error(sample: Document, model: str, key: str) -> Array:
-    """Wrapped difference of a model's angle to the sample's, rad."""
+    """Wrapped difference between a model's angle and the sample's, rad."""
     return wrap_angle(series(sample[model][key]) - series(sample["measured"][key]))
 
 

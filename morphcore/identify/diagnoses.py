@@ -18,7 +18,7 @@ from morphcore.errors import InvalidInput
 from morphcore.frames import wrap_angle
 from morphcore.identify.column_checks import MIN_MOTION_RAD, column_warnings, constant_runs
 from morphcore.identify.cost import SampleCase, sample_cases
-from morphcore.identify.readings import (
+from morphcore.identify.other_readings import (
     HALF,
     TENFOLD,
     angle_costs,

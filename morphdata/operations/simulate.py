@@ -1,4 +1,4 @@
-"""The operation ``simulate``, and what it would cost."""
+"""The operation ``simulate`` and its cost estimate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from morphdata.drives import shown_drives
 from morphdata.operations.descriptor import Operation
 from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest, SimulateResult
 
-# nominal figures, to an order of magnitude, of a flight alone on one core
+# nominal figures, to an order of magnitude, for a single flight on one core
 STEP_CORE_S = {"rigid": 5e-5, "equivalent": 1e-4, "flexible": 2e-3}
 START_CORE_S = 1.0  # trim, the lattice along the morph, tables and plots
 
@@ -40,8 +40,8 @@ SIMULATE = Operation(
     help="Flies one morph with a rigid, an equivalent or a flexible model.",
     noun="a simulation",
     title="Fly a model through a morph",
-    description="With `Prefer: wait=30` the job of a rigid or an equivalent model has usually ended when the "
-    "answer comes. A flight keeps no checkpoint: where its worker is lost, another flies it again from the "
+    description="With `Prefer: wait=30` the job of a rigid or equivalent model has usually ended when the "
+    "response arrives. A flight keeps no checkpoint: if its worker is lost, another flies it again from the "
     "start.",
     request=SimulateRequest,
     result=SimulateResult,

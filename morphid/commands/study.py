@@ -1,4 +1,4 @@
-"""What ``morphid study`` shows."""
+"""Output of ``morphid study``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from morphid.screen import new_table, short, stdout
 
 
 def show_study(result: Mapping[str, Any]) -> None:
-    """Print what came out, for people."""
+    """Print the result in readable form."""
     stdout().print(study_table(result))
     recommended = result.get("recommended") or {}
     if recommended.get("reason"):
