@@ -87,6 +87,7 @@ class IdentifyResult(Shown):
             self.warnings,
             undetermined=() if self.uncertainty is None else self.uncertainty.undetermined,
             at_bound=self.at_bound,
+            measurement=self.measurement,
             finished=bool(self.search.get("finished", True)),
         )
 
@@ -183,6 +184,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
         return _flight_time(model, batch, run.cases[longest], start) if judged else None
 
+    measurement = measurement_documents(run, nuisances, noise) if nuisances else {}
     settings = run.search
     at_bound = space.at_bound(state.best)
     return IdentifyResult(
@@ -216,12 +218,12 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             fits,
             at_bound,
             certainty.undetermined if certainty is not None else (),
-            diagnoses(run, fits, state.best, fly=judged),
+            diagnoses(run, fits, state.best, measurement, fly=judged),
         ),
         at_bound=tuple(at_bound),
         values=dict(zip(space.parameter_names, space.flatten(best)[0].tolist(), strict=True)),
         cramer_rao_percent={} if certainty is None else cramer_rao_percent(space, state.best, certainty),
-        measurement=measurement_documents(run, nuisances, noise) if nuisances else {},
+        measurement=measurement,
     )
 
 
