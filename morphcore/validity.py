@@ -158,31 +158,6 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
     ]
 
 
-def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> list[ResultWarning]:
-    """Angles that match a rigid aircraft when read as degrees, but not as given.
-
-    measured, rigid : (k, 3) Euler angles of a sample and of the rigid model along its sweep, rad. The rigid
-    model's motion away from the start has the right size, if not the right shape.
-    """
-    moved, expected = measured - measured[0], rigid - rigid[0]
-    if not np.all(np.isfinite(expected)):
-        return []
-    motion = float(np.sqrt(np.mean(expected**2)))
-    as_degrees = float(np.sqrt(np.mean((np.radians(moved) - expected) ** 2)))
-    as_radians = float(np.sqrt(np.mean((moved - expected) ** 2)))
-    if as_degrees < 0.5 * motion and as_radians > 10.0 * max(as_degrees, motion):
-        return [
-            ResultWarning(
-                "looks_like_degrees",
-                f"the angles of {name} are about {as_radians / motion:.0f} times what the aircraft would do, "
-                "and fit if they are read as degrees",
-                "give them in rad, or name the columns phi_deg, theta_deg, psi_deg",
-                pointer,
-            )
-        ]
-    return []
-
-
 def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list[ResultWarning]:
     """An error (k, 3) above LARGEST_ERROR of a sample's motion (k, 3), both rms of the angles together."""
     error, size = (float(np.sqrt(np.mean(np.sum(values**2, axis=1)))) for values in (errors, motion))

@@ -27,6 +27,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, faults_of
 from morphdata.renamed import FORMER_NOTE, RENAMED
+from morphdata.samplefiles.channel_columns import LARGEST_VALUE
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
@@ -249,5 +250,10 @@ AngleSeries = Annotated[
     list[
         Annotated[float, Field(ge=-1e6, le=1e6)]
     ],  # impossible angles are reported by `samplefiles.flight` with a hint
+    Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
+]
+# a measured channel; null is a gap
+ChannelSeries = Annotated[
+    list[Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE)] | None],
     Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
 ]

@@ -5,6 +5,7 @@ The computation of a channel is under the same name in ``morphcore/simulate/chan
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -145,6 +146,17 @@ def document_name(column: str) -> str:
     return column
 
 
+def channel_of(column: str) -> ChannelFacts | None:
+    """Find the channel that a column is of; None for other columns.
+
+    Examples
+    --------
+    >>> channel_of("tip_z_right_wing").unit, channel_of("fold_left")
+    ('m', None)
+    """
+    return next((each for each in CHANNELS if _is_of(each, column)), None)
+
+
 def is_channel(column: str) -> bool:
     """Whether a column belongs to a channel.
 
@@ -153,22 +165,26 @@ def is_channel(column: str) -> bool:
     >>> is_channel("nz"), is_channel("tip_z_right_wing"), is_channel("fold_left")
     (True, True, False)
     """
-    return any(_is_of(each, column) for each in CHANNELS)
+    return channel_of(column) is not None
 
 
-def is_channel_field(field: str) -> bool:
-    """Whether a field of a JSON document is the column of a channel, with its unit as suffix.
+def channel_field(field: str) -> tuple[str, float] | None:
+    """Column and factor to SI of a channel's field in a JSON document; None for other fields.
+
+    The unit stands at the end of the field's name. Angles and rates may be in degrees.
 
     Examples
     --------
-    >>> is_channel_field("nz"), is_channel_field("p_rad_s"), is_channel_field("p_rad")
-    (True, True, False)
+    >>> channel_field("p_rad_s"), channel_field("nz"), channel_field("p_rad")
+    (('p', 1.0), ('nz', 1.0), None)
     """
-    ends = {each.name: "".join(f"_{word}" for word in unit_words(each.unit)) for each in CHANNELS}
-    return any(
-        field.endswith(ends[each.name]) and _is_of(each, field.removesuffix(ends[each.name]))
-        for each in CHANNELS
-    )
+    for each in CHANNELS:
+        end = "".join(f"_{word}" for word in unit_words(each.unit))
+        ends = {end: 1.0} | ({end.replace("rad", "deg"): math.pi / 180.0} if "rad" in end else {})
+        for spelt, factor in ends.items():
+            if field.endswith(spelt) and _is_of(each, field.removesuffix(spelt)):
+                return field.removesuffix(spelt), factor
+    return None
 
 
 def _is_of(channel: ChannelFacts, column: str) -> bool:

@@ -174,14 +174,17 @@ class Drive:
     high: float
     held: float
 
-    def fault(self, angle_rad: float, pointer: str) -> Fault | None:
-        """Return the fault of an angle of the drive; None if it is in range."""
+    def fault(self, angle_rad: float, pointer: str, furthest_rad: float = 0.0) -> Fault | None:
+        """Return the fault of an angle of the drive; None if it is in range.
+
+        ``furthest_rad`` : the largest angle of its column, which may show its unit.
+        """
         if self.low - ANGLE_TOLERANCE_RAD <= angle_rad <= self.high + ANGLE_TOLERANCE_RAD:
             return None
         of = "Its hinge on" if len(self.surfaces) == 1 else "Its hinges on"
         hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
         hint += f"from {self.low:g} to {self.high:g} rad."
-        if abs(angle_rad) > math.pi:
+        if max(abs(angle_rad), abs(furthest_rad)) > math.pi:
             hint += f" Is the angle in degrees? A column may say so in its name: {self.name}_deg."
         return Fault(
             # the old code for sweep, which clients know
@@ -426,3 +429,23 @@ def shown_names(drives: Mapping[str, Drive]) -> str:
 def label(name: str) -> str:
     """Return the display name of a drive: `fold left`."""
     return name.replace("_", " ")
+
+
+def shown_drives(names: Iterable[str]) -> list[str]:
+    """Return what a listing says of the drives that move: nothing where only the sweep of both sides does.
+
+    Both sides of a word are one entry.
+
+    Examples
+    --------
+    >>> shown_drives(["sweep_left", "sweep_right"])
+    []
+    >>> shown_drives(["sweep_left", "sweep_right", "elevator", "fold_left"])
+    ['sweep', 'elevator', 'fold_left']
+    """
+    names = list(dict.fromkeys(names))
+    shown: dict[str, None] = {}
+    for name in names:
+        word = without_side(name)
+        shown[word if all(f"{word}_{side}" in names for side in SIDES) else name] = None
+    return [] if list(shown) == ["sweep"] else list(shown)

@@ -20,6 +20,7 @@ from morphdata.identify import (
 )
 from morphdata.options import MODEL, Option
 from morphdata.parameters import MAX_LINKS
+from morphdata.verdict import Verdict
 from morphdata.warnings import Warnings
 
 Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
@@ -77,6 +78,7 @@ class StudyRow(Result):
     model: IdentifiedParameters | None = Field(
         description="null if no model of this size could fly the samples to fit."
     )
+    verdict: Verdict | None = Field(default=None, description="As of an identification with this model.")
     warnings: Warnings = Field(default=[])
 
 

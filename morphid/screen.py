@@ -24,6 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 LINE_EVERY_S = 5.0
+LETTERS = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 STATUS_COLOURS = {
     "queued": "yellow",
     "running": "cyan",
@@ -217,6 +218,38 @@ def fit_table(result: Document) -> Table:
             "" if ratio is None else f"{ratio:.1e}",
             *("" if rms[angle] is None else f"{1e3 * rms[angle]:.2f}" for angle in ("phi", "theta", "psi")),
         )
+    return table
+
+
+def statistics_table(result: Document) -> Table | None:
+    """Show Theil's coefficient with its parts, and what the residuals are like; None where nobody counted."""
+    rows = [
+        (fit, angle, found)
+        for fit in result["fit"]
+        for angle, found in (fit.get("statistics") or {}).items()
+        if found.get("theil") is not None
+    ]
+    if not rows:
+        return None
+    table = new_table(
+        *("sample", "angle", "Theil U", "bias", "variance", "covariance", "lag 1", "white", "drives"),
+        title="Residuals: Theil's U and its parts in %, autocorrelation, correlation with the drives",
+        left=2,
+    )
+    last = None
+    for fit, angle, found in rows:
+        parts = (found.get(f"theil_{part}") for part in ("bias", "variance", "covariance"))
+        white = found.get("white")
+        table.add_row(
+            "" if fit is last else str(fit["sample"]),
+            LETTERS.get(angle, angle),
+            f"{found['theil']:.4f}",
+            *("" if part is None else f"{100.0 * part:.0f}" for part in parts),
+            "" if found.get("lag_1") is None else f"{found['lag_1']:.2f}",
+            "" if white is None else "yes" if white else "no",
+            "" if found.get("drive_correlation") is None else f"{found['drive_correlation']:.2f}",
+        )
+        last = fit
     return table
 
 

@@ -71,6 +71,10 @@ class RequestSummary(BaseModel):
     compared_links: list[int] = Field(default=[], description="Numbers of links per wing of a study.")
     model: str | None = Field(default=None, description="The model that a simulation flies.")
     method: str | None = Field(default=None, description="Of the search.")
+    drives: list[str] = Field(
+        default=[],
+        description="The drives that move, both sides of a kind under its word; empty where it is the sweep.",
+    )
     samples: list[SampleSummary] = []
     duration_s: float | None = Field(default=None, description="Of the flight or of the morph.")
     final_rad: float | None = Field(default=None, description="Sweep at the end of the morph.")

@@ -31,7 +31,12 @@ def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
             return {"document": parse_json(stream.read())}
         read = read_columns(stream, kind, wanted)
         unreadable = {name: _words(fault) for name, fault in list(read.unreadable.items())[:MAX_DRIVES]}
-        return {"columns": read.values, "candidates": read.candidates, "unreadable": unreadable}
+        return {
+            "columns": read.values,
+            "candidates": read.candidates,
+            "channels": read.channels,
+            "unreadable": unreadable,
+        }
     except MalformedBody as error:
         return {"malformed": [error.detail, error.pointer, error.hint]}
     except FileFault as fault:

@@ -68,6 +68,8 @@ def _restored(found: dict[str, Any], arrays: list[list[Any]]) -> Any:
     if MARK not in found:
         return found
     numbers = arrays[found[MARK]]
+    for position in arrays[found["null"]] if "null" in found else ():
+        numbers[position] = None
     for position, item in found["else"]:
         numbers[position] = item
     return numbers
@@ -80,28 +82,44 @@ def _skeleton(value: Any, arrays: list[tuple[bytes, bytes]]) -> Any:
         return {key: _skeleton(item, arrays) for key, item in value.items()}
     if isinstance(value, list):
         if len(value) >= MIN_ARRAY and (found := _numbers(value)) is not None:
-            return _placed(*found, arrays)
+            numbers, nulls, exceptions = found
+            return _placed(numbers, exceptions, arrays, nulls)
         return [_skeleton(item, arrays) for item in value]
     return value
 
 
-def _placed(numbers: array[Any], exceptions: list[Any], arrays: list[tuple[bytes, bytes]]) -> dict[str, Any]:
+def _placed(
+    numbers: array[Any],
+    exceptions: list[Any],
+    arrays: list[tuple[bytes, bytes]],
+    nulls: array[Any] | None = None,
+) -> dict[str, Any]:
+    holder: dict[str, Any] = {MARK: len(arrays), "else": exceptions}
     arrays.append((numbers.typecode.encode(), numbers.tobytes()))
-    return {MARK: len(arrays) - 1, "else": exceptions}
+    if nulls:
+        holder["null"] = len(arrays)
+        arrays.append((nulls.typecode.encode(), nulls.tobytes()))
+    return holder
 
 
-def _numbers(items: list[Any]) -> tuple[array[Any], list[Any]] | None:
-    """Split a list into an array and its few non-numeric items with their positions; None if not possible."""
+def _numbers(items: list[Any]) -> tuple[array[Any], array[Any], list[Any]] | None:
+    """A list as an array, the places of its nulls, and the few items that are neither with their places.
+
+    None when it is no such list.
+    """
     kinds = set(map(type, items))
+    nulls = array("q")
     if kinds == {float}:
-        return array("d", items), []
+        return array("d", items), nulls, []
     exceptions: list[Any] = []
     numbers = array("d" if float in kinds else "q")
     for position, item in enumerate(items):
         number = type(item) is float or (type(item) is int and abs(item) <= MAX_EXACT)
-        if not number:
+        if item is None:
+            nulls.append(position)
+        elif not number:
             if len(exceptions) == MAX_EXCEPTIONS or isinstance(item, (dict, list)):
                 return None
             exceptions.append([position, item])
         numbers.append(item if number else 0)
-    return numbers, exceptions
+    return numbers, nulls, exceptions

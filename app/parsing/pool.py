@@ -63,7 +63,7 @@ class ParserPool:
         return answer["document"]
 
     async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> FlightColumns:
-        """Read the columns of a flight and those that could be drives, SI units, by their standard names.
+        """Read the columns of a flight, its channels and what could be drives, SI units, by standard names.
 
         Parameters
         ----------
@@ -84,7 +84,12 @@ class ParserPool:
         if "fault" in answer:
             raise refusal(FileFault(*answer["fault"]), pointer)
         unreadable = {name: FileFault(*words) for name, words in answer["unreadable"].items()}
-        return FlightColumns(answer["columns"], candidates=answer["candidates"], unreadable=unreadable)
+        return FlightColumns(
+            answer["columns"],
+            candidates=answer["candidates"],
+            unreadable=unreadable,
+            channels=answer["channels"],
+        )
 
     async def _read(self, owner: str, kind: str, file: BinaryIO) -> dict[str, Any]:
         try:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -39,6 +40,7 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
+from morphcore.export.uncertainty_plots import uncertainty_plots
 from morphcore.frames import wrap_angle
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -57,6 +59,7 @@ PHASES = {"swarm": ORANGE, "polish": BLUE}
 OTHER_PHASE = SKY
 ROLES = {"train": "fitted", "held_out": "held out"}
 
+BAND = "#BBD9EE"  # of probable attitudes
 SILENT_SPAN_MRAD = 0.01  # half the height of the axis of an error within round-off
 
 
@@ -69,18 +72,22 @@ def identification_plots(document: Document, curves: Document) -> dict[str, byte
     curves : ``{"samples": [{"name", "role", "time_s", "drives": ["sweep_left", "sweep_right"],
         "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...},
         "initial": {...}, "identified": {...}}]}``; the drives' columns bear their names; a value that a
-        diverged flight never reached is None.
+        diverged flight never reached is None. ``"band": {"phi_rad": {"low": [...], "high": [...]}, ...}`` of
+        a sample, where it is there, is drawn as a band of probable attitudes.
 
     Returns
     -------
-    File name -> content: ``attitude_<sample>``, ``residuals_<sample>`` and ``convergence``, each as ``.svg``
-    and ``.png``. The same input gives the same bytes.
+    File name -> content: ``attitude_<sample>``, ``residuals_<sample>``, ``autocorrelation_<sample>``,
+    ``intervals`` (where there are any) and ``convergence``, each as ``.svg`` and ``.png``. The same input
+    gives the same bytes.
     """
     samples = curves["samples"]
+    named = dict(zip(file_stems(str(s["name"]) for s in samples), samples, strict=True))
     files: dict[str, bytes] = {}
-    for stem, sample in zip(file_stems(str(s["name"]) for s in samples), samples, strict=True):
+    for stem, sample in named.items():
         files |= rendered(f"attitude_{stem}", attitude_figure(sample))
         files |= rendered(f"residuals_{stem}", residual_figure(sample))
+    files |= uncertainty_plots(document, named)
     return files | rendered("convergence", convergence_figure(document))
 
 
@@ -102,6 +109,7 @@ def attitude_figure(sample: Document) -> Figure:
         label_axis(axes, f"{label}, deg")
         for model, values in (("measured", measured), *flown.items()):
             draw(axes, time_s, np.degrees(values[key]), **_line(model))
+        _draw_band(axes, time_s, measured[key], (sample.get("band") or {}).get(key))
         if silent[key]:
             quiet(axes, SILENT_SPAN_DEG)
     for axes, panel in zip(rows[len(ANGLES) :], drives, strict=True):
@@ -185,6 +193,16 @@ def convergence_figure(document: Document) -> Figure:
 
 
 # pieces of figures
+
+
+def _draw_band(axes: Axes, time_s: Array, measured: Array, band: Document | None) -> None:
+    """The band in which a predictive distribution sees an angle, on the branch of the measured one."""
+    if band is None:
+        return
+    low, high = (
+        np.degrees(measured + wrap_angle(series(band[end]) - wrap_angle(measured))) for end in ("low", "high")
+    )
+    axes.fill_between(time_s, low, high, color=BAND, linewidth=0, zorder=1.5, label="band")
 
 
 def _line(model: str) -> dict[str, Any]:

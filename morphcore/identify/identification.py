@@ -15,6 +15,7 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
@@ -256,6 +257,7 @@ class Identification:
     def prepare(self, deadline: Deadline) -> float:
         """Choose the time step of all flights, s; the default where the time is up before it is chosen."""
         compile_flights()
+        require_seconds(self)
         if self._step_s is None:
             self._step_s = deadline.before_it(self._chosen_step, STEP_S)
         say("flying the first guess")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -41,6 +42,7 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
 from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
@@ -263,6 +265,17 @@ def _warnings(
     )
 
 
+def _is_one_of(channels: Mapping[str, Array], title: str) -> bool:
+    """Whether a further column gives one of some channels, in whatever unit."""
+    meant = channel_meant(title)
+    return meant is not None and meant[0] in channels
+
+
+def _cell(value: float) -> str:
+    """Nine digits, or nothing for a gap of a measured channel."""
+    return "" if math.isnan(value) else f"{value:.9g}"
+
+
 def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
     """By side, z of the tip of its first hinged surface at the start, m below its root."""
     tips: dict[str, float] = {}
@@ -275,19 +288,21 @@ def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
     """Write a trajectory with the columns of the example flights, SI units and radians.
 
-    `load_trajectory` reads it back.
+    Cells are empty where a measured channel has a gap. `load_trajectory` reads it back.
     """
+    measured = trajectory.channels
     columns = {
         "t": trajectory.time_s,
         **{name: trajectory.drives[name] for name in trajectory.drive_order},
         "phi": trajectory.phi,
         "theta": trajectory.theta,
         "psi": trajectory.psi,
-        **trajectory.extra,
+        **measured,
+        **{title: values for title, values in trajectory.extra.items() if not _is_one_of(measured, title)},
     }
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
-        # nine digits: one nanoradian for an attitude of one radian
-        rows = ([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
+        # nine digits: a nanoradian of an attitude of one radian
+        rows = (list(map(_cell, row)) for row in zip(*columns.values(), strict=True))
         write_table(stream, columns, rows)
 
 

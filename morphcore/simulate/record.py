@@ -92,6 +92,7 @@ def recorded_trajectory(
         theta=theta,
         psi=psi,
         extra=extra,
+        channels=extra,
     )
     for values in (times, phi, theta, psi, *drives.values()):
         values.setflags(write=False)

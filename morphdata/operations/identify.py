@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from morphdata.aircraft import Surface
-from morphdata.drives import SIDES, Hinge, drive_name
+from morphdata.drives import SIDES, Hinge, drive_name, resolved, shown_drives
 from morphdata.identifiable import corrections
 from morphdata.identify import (
     CostEstimate,
@@ -141,9 +141,12 @@ def _parameter_sets(search: Search, parameters: int) -> int:
 
 def samples_summary(request: SamplesRequest) -> dict[str, Any]:
     """Return the summary of a request with samples for lists."""
+    drives = request.aircraft.drives
+    measured = (resolved(sample.drives, drives)[0] for sample in request.inline_samples().values())
     return {
         "aircraft": request.aircraft.name,
         "method": request.search.method,
+        "drives": shown_drives(name for moved in measured for name in moved),
         "samples": [
             {"name": sample.name, "role": sample.role, "rows": len(sample.time_s)}
             for sample in request.inline_samples().values()
@@ -170,7 +173,15 @@ IDENTIFY = Operation(
     cost=cost,
     summary=_summary,
     begin="worker.operations.identification:begin",
-    files=("result.json", "convergence.*", "attitude_*", "residuals_*", "curves_*.csv"),
+    files=(
+        "result.json",
+        "convergence.*",
+        "attitude_*",
+        "residuals_*",
+        "autocorrelation_*",
+        "intervals.*",
+        "curves_*.csv",
+    ),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from morphdata.drives import shown_drives
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.operations.simulate import STEP_CORE_S
 from morphdata.optimize import OptimizeRequest, OptimizeResult, ScheduleCost
@@ -33,6 +34,7 @@ def _summary(request: OptimizeRequest) -> dict[str, Any]:
         "method": request.search.method,
         "duration_s": request.morph.duration_s,
         "final_rad": request.morph.final_rad,
+        "drives": shown_drives(request.morph.moved(request.aircraft.drives)),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from morphdata.drives import shown_drives
 from morphdata.operations.descriptor import Operation
 from morphdata.simulate import EquivalentFlightModel, FlightCost, SimulateRequest, SimulateResult
 
@@ -29,6 +30,7 @@ def _summary(request: SimulateRequest) -> dict[str, Any]:
         "model": model.kind,
         "links_per_wing": None if known is None else known.links_per_wing,
         "duration_s": request.duration_s,
+        "drives": shown_drives(request.schedules.keys_by_drive(request.aircraft.drives)),
     }
 
 

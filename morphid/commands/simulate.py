@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from morphdata.drives import BOTH
+from morphdata.drives import BOTH, shown_names
 from morphdata.faults import InvalidInput
 from morphdata.options import SCHEDULE
 from morphdata.schedules import load_schedules
@@ -109,10 +109,18 @@ def _put_rate(request: Request, rate: float, final: float, drive: str | None) ->
             code=Exit.INVALID_INPUT,
             hint="give a positive rate in rad/s, and a final angle in rad other than 0",
         )
+    drives = aircraft_drives(request) or {}
+    words = list(dict.fromkeys(each.word for each in drives.values()))
+    if drive is None and len(words) > 1:
+        raise CommandError(
+            f"--rate does not say which drive moves, and the aircraft has {', '.join(words)}",
+            code=Exit.INVALID_INPUT,
+            hint=f"name it: --drive {words[0]}; to choose from: {shown_names(drives)}",
+        )
     document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
-    words = f"--rate {rate:g} --final {final:g}"
+    given = f"--rate {rate:g} --final {final:g}"
     request.put(
-        f"/schedules/{drive or BOTH}", document, words if drive is None else f"{words} --drive {drive}"
+        f"/schedules/{drive or BOTH}", document, given if drive is None else f"{given} --drive {drive}"
     )
     return abs(final) / rate
 
