@@ -257,7 +257,10 @@ class Stepper:
         return 0.25 * (self.gamma + 0.5) ** 2
 
     def coefficients(self, lag_time: Array, still: float = STILL) -> Rule:
-        """As the kernels take them; lag_time (2, r), s; still : of induced velocities."""
+        """As the kernels take them.
+
+        lag_time : (2, r) s. still : tolerance of the induced velocities, 0 for exact.
+        """
         h = self.step_s
         share = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         z = h / lag_time
