@@ -34,6 +34,7 @@ UNCERTAINTY = {
         "damping_nms_rad.joint_1.edgewise": [None, None],
         "lag_s": [None, 0.005],
     },
+    "cramer_rao_percent": {"division.1": 1.234, "damping_nms_rad.joint_1.edgewise": 4e5, "lag_s": None},
     "undetermined": ["damping_nms_rad.joint_1.edgewise"],
     "at_bound": ["stiffness_nm_rad.joint_1.flap"],
 }
@@ -87,6 +88,8 @@ def test_rows_have_intervals_and_marks() -> None:
     assert lines["stiffness_nm_rad.joint_1.flap"].rstrip().endswith("bound")
     assert "up to 0.005" in lines["lag_s"]
     assert "fixed" in lines["profile_drag"]
+    assert lines["division.1"].split()[:3] == ["division.1", "0.45", "1.2"]  # the Cramer-Rao bound
+    assert ">1e3" in lines["damping_nms_rad.joint_1.edgewise"]
     grey = [
         line for line in shown({"model": MODEL, "uncertainty": UNCERTAINTY}).splitlines() if "unseen" in line
     ]

@@ -184,3 +184,15 @@ def test_the_service_flies_the_same(live_service: LiveService, tmp_path: Path) -
         ended = RUNNER.invoke(app, command("simulate", *words, *more, "--out", tmp_path / f"{name}.csv"))
         assert ended.exit_code == Exit.OK, ended.output
     assert (tmp_path / "here.csv").read_bytes() == (tmp_path / "there.csv").read_bytes()
+
+
+def test_a_rate_on_an_aircraft_with_several_drives_asks_for_the_drive() -> None:
+    """The hint names the option and the drives to choose from, and the command that it gives is accepted."""
+    aircraft = EXAMPLES / "two_hinges" / "aircraft.json"
+    line = command("simulate", "--rate", "1", "--final", "0.2", "--duration", "0.1")
+    line[line.index("--aircraft") + 1] = str(aircraft)
+    ended = RUNNER.invoke(app, line)
+    assert ended.exit_code == Exit.INVALID_INPUT
+    said = " ".join(ended.stderr.split())
+    assert "--drive sweep" in said
+    assert "fold" in said
