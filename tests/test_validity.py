@@ -82,7 +82,7 @@ def test_a_hinge_of_incidence_counts() -> None:
 
 
 def test_steep_pitch() -> None:
-    """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be told apart."""
+    """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be distinguished."""
     assert steep_warning("x", "", np.array([0.0, 1.4])) == []
     assert "nearly" in steep_warning("x", "", np.array([0.0, -1.55]))[0].message
     assert "degrees" in steep_warning("x", "", np.array([0.0, 4.0]))[0].hint

@@ -201,7 +201,7 @@ def test_one_chart_of_the_convergence(service: RunningService, page: Page) -> No
 
 @pytest.mark.parametrize("operation", ["identify", "simulate"])
 def test_a_failed_job_says_where_and_what_to_do(service: RunningService, page: Page, operation: str) -> None:
-    """The error of a job is shown with its code, hint and JSON pointer, and the page asks for no result."""
+    """The error of a job is shown with its code, hint and JSON pointer, and the page requests no result."""
     document = identify_document() if operation == "identify" else simulate_document()
     error = {"code": "trim_not_found", "detail": "no level flight", "pointer": "/flight/airspeed_m_s"}
     job_id = failed(service, operation, document, hint="raise the airspeed", **error)

@@ -56,7 +56,7 @@ def shown(result: dict[str, Any], width: int = 80) -> str:
 
 @pytest.mark.parametrize("separate", [False, True])
 def test_names_are_those_of_the_uncertainty(separate: bool) -> None:  # noqa: FBT001
-    """Names and values are the library's, in its order: no interval stands beside another parameter."""
+    """Names and values are the library's, in its order: no interval is shown for another parameter."""
     model = chain_model(reference_aircraft(), reference_flight(), 3)
     space = search_space(model, separate_wings=separate)
     batch = physical_guess(model, separate_wings=separate)

@@ -46,7 +46,7 @@ def test_a_flight_is_the_librarys_and_a_sample_again(tmp_path: Path) -> None:
         dict.fromkeys(("left", "right"), ConstantRate(0.0, 0.6, 0.3)),
         model=parameters_from_document(PARAMETERS),
         duration_s=0.5,
-        lattice=Lattice(chordwise=1, spanwise=4),  # the one that stands beside the parameters
+        lattice=Lattice(chordwise=1, spanwise=4),  # the one given with the parameters
     ).trajectory
     # nine digits are written
     np.testing.assert_allclose(written.euler, flown.euler, rtol=0.0, atol=1e-9)
