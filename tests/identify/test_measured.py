@@ -99,7 +99,7 @@ def test_gaps_do_not_matter() -> None:
 
 @pytest.mark.parametrize("sigma", [3e-5, 1e-3])
 def test_white_noise_is_seen_in_a_smooth_signal(sigma: float) -> None:
-    """Third differences tell the noise within a fifth at uneven times, outliers or not; of none there is 0."""
+    """Third differences tell it within a fifth at uneven times, outliers or not; where there is none, 0."""
     rng = np.random.default_rng(3)
     time_s = np.sort(rng.uniform(0.0, 3.0, 400))
     smooth = 0.1 * np.sin(3.0 * time_s) + 0.05 * np.exp(-((time_s - 1.0) ** 2) / 0.1)
