@@ -22,6 +22,7 @@ from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
+from morphdata.verdict import ChannelStatistics, Verdict
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
@@ -384,6 +385,9 @@ class SampleFit(Result):
     J_identified: float | None
     rms_rad: Angles
     max_abs_rad: Angles
+    statistics: dict[str, ChannelStatistics] = Field(
+        default={}, description="Of the identified model's errors, by channel (`phi`, `theta`, `psi`)."
+    )
 
 
 class AeroCorrections(Result):
@@ -452,6 +456,16 @@ class Uncertainty(Result):
         description="[low, high] of each parameter that was searched, SI units; null on a side where the "
         "samples do not bound it within the range of the search. Empty in a partial result.",
     )
+    value: dict[str, float] = Field(
+        default={},
+        description="The identified values by the same names, fixed parameters included; SI units.",
+    )
+    cramer_rao_percent: dict[str, float | None] = Field(
+        default={},
+        description="Cramer-Rao bound of each searched parameter, per cent of its value: the standard error "
+        "if residuals were white noise. null where the samples do not see it, or the value is 0. The "
+        "interval knows that residuals are correlated and is the one to rely on.",
+    )
     undetermined: list[str] = Field(
         default=[], description="Parameters whose standard deviation exceeds a factor of e."
     )
@@ -471,6 +485,9 @@ class IdentifyResult(Result):
     fit: list[SampleFit]
     search: SearchReport
     uncertainty: Uncertainty | None = None
+    verdict: Verdict | None = Field(
+        default=None, description="Whether the model may be believed; null in results of earlier versions."
+    )
     measurement: dict[str, SampleMeasurement] = Field(
         default={}, description="By sample: biases, delay and heading that were found, and what was free."
     )

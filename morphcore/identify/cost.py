@@ -92,10 +92,12 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
             angle = schedule.motion(sample.time_s).angle
             bad = hinge.beyond_range(angle)
             if bad.size:
+                unit = f"; are they degrees? Then name the column {key}_deg"
                 raise InvalidInput(
                     f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
                     pointer=f"{pointer}/{key}_rad/{bad[0]}",
-                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad"
+                    + unit * bool(np.abs(angle).max() > np.pi),
                 )
     return hinge_schedules(aircraft, followed)
 

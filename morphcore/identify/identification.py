@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.drive_histories import smoothed_drives
+from morphcore.identify.first_angles import with_first_angles
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
+from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
@@ -106,8 +109,10 @@ class Identification:
         for number, sample in enumerate(samples):
             require_flight(sample, f"/samples/{number}")
         samples = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
-        self.samples = tuple(samples)
         self.measurement = measurement or Measurement()
+        smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
+        self.samples = tuple(sample for sample, _ in smoothed)
+        self.histories = tuple(histories for _, histories in smoothed)
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
         self.openness: tuple[Openness, ...] = self._first_openness
@@ -173,12 +178,16 @@ class Identification:
                 whole=whole,
             )
         cases = []
-        for case, each in zip(self._plans[whole], openness, strict=True):
+        for case, each, histories in zip(self._plans[whole], openness, self.histories, strict=True):
             setup = measured(case.sample, self.measurement, each)
             if each.start:
                 point = each.reference if each.reference.size else self.known[0]
                 with one_blas_thread():
                     setup = with_start(self, case, setup, self.space.decode(point))
+            opened = replace(case, given=setup)
+            with one_blas_thread():
+                guess = self.space.decode(self.known[0])
+                setup = with_first_angles(self.model, guess, opened, histories, self.settings.start)
             cases.append(replace(case, given=setup))
         return tuple(cases)
 
@@ -351,6 +360,7 @@ class Identification:
     def prepare(self, deadline: Deadline) -> Prepared:
         """Choose the time step of all flights; the default where the time is up before it is chosen."""
         compile_flights()
+        require_seconds(self)
         if self._step_s is None:
             self._step_s = deadline.before_it(self._chosen_step, STEP_S)
         say("flying the first guess")

@@ -93,6 +93,10 @@ class Measured:
         Derivatives of the readings by the start; n = 0 where it is not free.
     start_spread : ndarray, shape (n,)
         Standard deviations of the start.
+    angle_columns : ndarray, shape (k, c, n)
+        Derivatives of the readings by errors of the first angles of noisy drives.
+    angle_spread : ndarray, shape (n,)
+        Standard deviations of these.
     """
 
     channels: tuple[str, ...]
@@ -102,6 +106,8 @@ class Measured:
     loss: str = "linear"
     start_columns: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     start_spread: Array = field(default_factory=lambda: np.zeros(0))
+    angle_columns: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    angle_spread: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def plain(self) -> bool:

@@ -37,8 +37,8 @@ class Reduced:
     error : ndarray, shape (p, k, c)
         Reading of the flight less measured one, in the channels' units; NaN where the flight diverged.
     nuisance : ndarray, shape (p, n)
-        Offsets of the channels that have one, then the start's n, then the delay, s. Of readings: a bias adds
-        to the truth.
+        Offsets of the channels that have one, the start's n, errors of first angles, then the delay, s. Of
+        readings: a bias adds to the truth.
     slope : ndarray, shape (p, k, c)
         Derivative of the error by the delay; empty where that is not free.
     """
@@ -85,15 +85,14 @@ def reduced(setup: Measured, time_s: Array, flown: Array | Readings) -> Reduced:
 
 
 def linear_columns(setup: Measured) -> tuple[Array, Array]:
-    """Columns (k, c, n) of the offsets and of the start, and their spreads (n,): infinite of offsets."""
+    """Columns (k, c, n) of offsets, start and first angles, and their spreads (n,): infinite of offsets."""
     rows, count = setup.values.shape
     offsets = np.zeros((rows, count, int(setup.offset.sum())))
     for number, channel in enumerate(np.flatnonzero(setup.offset)):
         offsets[:, channel, number] = 1.0
-    if not setup.start_columns.shape[2]:
-        return offsets, np.full(offsets.shape[2], np.inf)
-    columns = np.concatenate([offsets, setup.start_columns], axis=2)
-    return columns, np.concatenate([np.full(offsets.shape[2], np.inf), setup.start_spread])
+    columns = [offsets, *(c for c in (setup.start_columns, setup.angle_columns) if c.shape[2])]
+    free = np.full(offsets.shape[2], np.inf)
+    return np.concatenate(columns, axis=2), np.concatenate([free, setup.start_spread, setup.angle_spread])
 
 
 def pseudo_residual(setup: Measured, error: Array) -> Array:

@@ -44,8 +44,8 @@ class Study:
     ----------
     links : numbers of links, all different; they are worked off in this order.
     model, search, measurement : as of one identification; ``links_per_wing`` is not looked at.
-        ``max_seconds`` is the time for all, divided by the number of unknowns; what one leaves over the next
-        ones have.
+        ``max_seconds`` is the time for all, divided by the number of unknowns; what one leaves over is for
+        the next ones.
 
     Raises
     ------

@@ -157,7 +157,7 @@ def no_child_left() -> bool:
 def test_whatever_a_parser_does_it_is_ended_and_reaped(
     monkeypatch: pytest.MonkeyPatch, code: str, words: str, file_of: FileOf
 ) -> None:
-    """Sleeping, spinning, babbling, dying: told in a sentence within the limit, and no process is left."""
+    """Sleeping, spinning, babbling, dying: reported in a sentence in time, and no process is left."""
     played(monkeypatch, code)
     start = time.monotonic()
     with pytest.raises(InvalidRequest, match=words):
@@ -174,7 +174,8 @@ def test_no_secret_reaches_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: Fi
         monkeypatch,
         "import os, sys; from app.parsing.frame import pack\n"
         "seen = [*os.environ, *os.environ.values(), *os.listdir('/proc/self/fd')]\n"
-        "sys.stdout.buffer.write(pack({'columns': {'seen': seen}, 'candidates': {}, 'unreadable': {}}))",
+        "found = {'columns': {'seen': seen}, 'candidates': {}, 'channels': {}, 'unreadable': {}}\n"
+        "sys.stdout.buffer.write(pack(found))",
     )
     answer: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
     seen = answer.values["seen"]
@@ -193,7 +194,8 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
         " ('DATA', 'AS', 'CPU', 'FSIZE', 'NOFILE', 'NPROC', 'CORE')}\n"
         "try: bytearray(2**30); found['got'] = True\n"
         "except MemoryError: found['got'] = False\n"
-        "sys.stdout.buffer.write(pack({'columns': found, 'candidates': {}, 'unreadable': {}}))",
+        "read = {'columns': found, 'candidates': {}, 'channels': {}, 'unreadable': {}}\n"
+        "sys.stdout.buffer.write(pack(read))",
     )
     answer: Any = asyncio.run(reader().flight("alpha", "csv", file_of(FLIGHT), "/file"))
     found = answer.values
@@ -205,7 +207,7 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
 
 
 def test_too_many_wait_in_vain(monkeypatch: pytest.MonkeyPatch, file_of: FileOf) -> None:
-    """One at a time; who waits too long is told to come again, and the turn is given back."""
+    """One at a time; a request that waits too long is refused as busy, and its turn is given back."""
     played(monkeypatch, "import time; time.sleep(60)")
     parsers = ParserPool(OwnerTurns(1, 1), Limits(wall_s=1), queue_s=0.2)
 
@@ -221,3 +223,9 @@ def test_too_many_wait_in_vain(monkeypatch: pytest.MonkeyPatch, file_of: FileOf)
     kinds = [type(item) for item in asyncio.run(crowd())]
     assert kinds.count(ServiceBusy) == 3
     assert kinds.count(InvalidRequest) == 2
+
+
+def test_gaps_take_no_text() -> None:
+    """A million nulls among numbers come back in their places."""
+    column = [None if row % 3 else 0.5 * row for row in range(1_500_000)]
+    assert unpack(pack({"p_rad_s": column})) == {"p_rad_s": column}
