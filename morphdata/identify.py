@@ -15,6 +15,7 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
+from morphdata.measurement import Measurement, SampleMeasurement, absent_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name, under_both_spellings
@@ -239,6 +240,11 @@ class SamplesRequest(Request):
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SearchedModel
     search: Search = Search()
+    measurement: Measurement | None = Field(
+        default=None,
+        description="How the samples were measured: channels, noise, biases, delays. Left out: the three "
+        "angles, and what else is free is decided from the data.",
+    )
 
     def inline_samples(self) -> dict[int, InlineSample]:
         """Collect the samples whose rows are here, by their place in the list."""
@@ -256,6 +262,13 @@ class SamplesRequest(Request):
         drives = self.aircraft.drives
         for number, sample in samples.items():
             yield from (fault.under(f"/samples/{number}") for fault in sample.drive_faults(drives))
+        yield from absent_channels(
+            self.measurement,
+            [
+                (f"/samples/{n}", sample.role, tuple(getattr(sample, "channels", ())))
+                for n, sample in samples.items()
+            ],
+        )
 
 
 def total_rows_faults(total: int) -> Iterator[Fault]:
@@ -458,6 +471,9 @@ class IdentifyResult(Result):
     fit: list[SampleFit]
     search: SearchReport
     uncertainty: Uncertainty | None = None
+    measurement: dict[str, SampleMeasurement] = Field(
+        default={}, description="By sample: biases, delay and heading that were found, and what was free."
+    )
     warnings: Warnings = Field(default=[])
     cost: dict[str, Any] | None = None
     partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

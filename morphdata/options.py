@@ -10,6 +10,7 @@ SCHEDULE = "Schedule and air"
 MORPH = "Morph"
 LIMITS = "Limits"
 MODEL = "Model"
+MEASUREMENT = "Measurement"
 SEARCH = "Search"
 OUTPUT = "Execution and output"
 

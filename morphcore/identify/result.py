@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.coloured import ColouredNoise, records
-from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
+from morphcore.identify.coloured import ColouredNoise
+from morphcore.identify.cost import SampleCase, fly_measured, shared_trims
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_measurement import fit_records, fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
-from morphcore.search.least_squares import differences
 from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
@@ -53,6 +54,8 @@ class IdentifyResult(Shown):
         What the method does not answer for.
     at_bound : tuple of str
         Parameters that ended at a bound of the search.
+    measurement : mapping of str to dict
+        Biases, delay and heading that were found, by the name of the sample; empty where nobody has looked.
     """
 
     model: ChainModel
@@ -64,6 +67,7 @@ class IdentifyResult(Shown):
     settings: EquivalentModel
     warnings: tuple[ResultWarning, ...] = ()
     at_bound: tuple[str, ...] = ()
+    measurement: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def lost(self) -> tuple[SampleFit, ...]:
@@ -84,6 +88,7 @@ class IdentifyResult(Shown):
             "uncertainty": no_uncertainty(self.at_bound)
             if self.uncertainty is None
             else self.uncertainty.to_document(),
+            "measurement": dict(self.measurement),
             "search": self.search,
             "cost": self.cost,
             "warnings": documents(self.warnings),
@@ -136,24 +141,14 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
     )
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
-    certainty = None
+    certainty = noise = None
+    nuisances = fitted_nuisances(run, state.best) if judged and flies else ()
     if judged and space.dimension and flies:
-
-        def errors(points: Array) -> Array:
-            return residuals(run.model, space.decode(points), run.training, start)
-
-        residual, jacobian = differences(state.best[None, :], space.upper, errors)
+        residual, jacobian = run.linearised(state.best)
         trained = [fit for fit in fits if fit.case.sample.role == "train"]
-        noise = ColouredNoise(
-            records(
-                [fit.case.sample.time_s for fit in trained],
-                residual[0],
-                jacobian[0],
-                [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained],
-            ),
-            run.prior_weight,
-        )
-        certainty = uncertainty(space, state.best, residual[0], jacobian[0], noise)
+        motions = [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained]
+        noise = ColouredNoise(fit_records(run, residual, jacobian, motions, nuisances), run.prior_weight)
+        certainty = uncertainty(space, state.best, residual, jacobian, noise)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
@@ -190,6 +185,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             run, best, fits, at_bound, certainty.undetermined if certainty is not None else ()
         ),
         at_bound=tuple(at_bound),
+        measurement=measurement_documents(run, nuisances, noise) if nuisances else {},
     )
 
 
@@ -197,7 +193,7 @@ def _attitudes(
     model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any
 ) -> list[Array]:
     return [
-        fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
+        fly_measured(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
     ]
 
 

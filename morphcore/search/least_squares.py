@@ -119,7 +119,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
     def ask(self, state: LeastSquaresState) -> Batch:
         """Return the starts and their probes, then three rounds of trial steps."""
         if state.trials is None:
-            probed, _ = _probes(state.point[_moving(state)], self._upper)
+            probed, _ = probes(state.point[_moving(state)], self._upper)
             return Batch(probed, residuals=True)
         return Batch(state.trials.tried.reshape(-1, self._lower.size), residuals=True)
 
@@ -169,7 +169,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         """Return damped steps from the residuals of the starts and their probes."""
         starts = _moving(state)
         points = state.point[starts]
-        error, jacobian = _differences(residuals, _probes(points, self._upper)[1])
+        error, jacobian = _differences(residuals, probes(points, self._upper)[1])
         dampings = np.clip(state.damping[starts, None] * DAMPING_TRIALS, MIN_DAMPING, MAX_DAMPING)
         # as if there were no curvature
         assumed = np.repeat(error[:, None, :], dampings.shape[1], axis=1)
@@ -256,11 +256,11 @@ def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState
 
 def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
     """Return residuals (s, m) and forward-difference Jacobians (s, m, d) at points (s, d), in one batch."""
-    probed, steps = _probes(points, upper)
+    probed, steps = probes(points, upper)
     return _differences(residuals(probed), steps)
 
 
-def _probes(points: Array, upper: Array) -> tuple[Array, Array]:
+def probes(points: Array, upper: Array) -> tuple[Array, Array]:
     """Return points (s (1 + d), d), each of (s, d) followed by its probes, and the probes' steps (s, d)."""
     count, d = points.shape
     # step inward at an upper bound

@@ -50,6 +50,9 @@ class Trajectory(Shown):
         aircraft does not have are left out.
     unreadable : mapping of str to str
         What is wrong with further columns, by their names.
+    channels : mapping of str to ndarray, shape (k,)
+        Measured channels by their names (``q``, ``nz``, ``tip_left_z``), SI units and rad; NaN where a value
+        is missing.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Trajectory(Shown):
     extra: dict[str, Array] = field(default_factory=dict)
     of_file: bool = False
     unreadable: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sample: InlineSample) -> Trajectory:
