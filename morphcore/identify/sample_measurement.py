@@ -67,6 +67,7 @@ def _nuisances(
     if setup.start_columns.shape[2]:
         parts = LONGITUDINAL if case.plan.halved else range(len(START))
         names += [f"start.{START[part]}" for part in parts]
+    names += [f"first_angle.{number}" for number in range(setup.angle_columns.shape[2])]
     if setup.openness.delay:
         names.append("delay")
         columns = np.concatenate([columns, left.slope[0][..., None]], axis=2)
