@@ -14,6 +14,10 @@ from morphid.screen import new_table, short, stdout
 def show_study(result: Mapping[str, Any]) -> None:
     """Print the result in readable form."""
     stdout().print(study_table(result))
+    grades = [(row["links_per_wing"], (row.get("verdict") or {}).get("grade")) for row in result["rows"]]
+    if any(grade for _, grade in grades):
+        shown = ", ".join(f"{links}: {grade}" for links, grade in grades if grade)
+        stdout().print(f"Verdict by number of links: {shown}", markup=False, soft_wrap=True)
     recommended = result.get("recommended") or {}
     if recommended.get("reason"):
         stdout().print(f"Recommended: {recommended['reason']}", markup=False)
@@ -22,7 +26,7 @@ def show_study(result: Mapping[str, Any]) -> None:
 def study_table(result: Mapping[str, Any]) -> Table:
     """Show accuracy and cost per number of links, below those of the rigid model."""
     table = new_table(
-        *("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search", "verdict"),
+        *("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search"),
         title="Study: J in rad², fitted and held out; RMS of φ, θ, ψ in mrad; flight in ms",
         caption="* recommended; flight: wall time of one of 2 s on one core",
         left=0,
@@ -41,7 +45,6 @@ def study_table(result: Mapping[str, Any]) -> Table:
             *("" if rms.get(a) is None else f"{1e3 * rms[a]:.2f}" for a in ("phi", "theta", "psi")),
             "" if row.get("flight_s") is None else f"{1e3 * row['flight_s']:.3g}",
             "" if row.get("identify_s") is None else f"{row['identify_s']:.1f} s",
-            (row.get("verdict") or {}).get("grade", ""),
         )
     return table
 

@@ -38,6 +38,7 @@ def test_a_study_ends_in_a_table_and_a_recommendation(tmp_path: Path) -> None:
     assert f"* {result['recommended']['links_per_wing']}" in ended.stdout
     assert "Recommended: " in ended.stdout
     assert (tmp_path / "plots" / "study.csv").is_file()
+    assert "Verdict by number of links: 1: " in ended.stdout
 
 
 def test_the_choices_reach_the_service(play: Play) -> None:
