@@ -1,6 +1,6 @@
-"""The output channels of a flight as documents know them: names, units, what they mean.
+"""The output channels of a flight for documents: names, units and meanings.
 
-How a channel is computed stands under the same name in ``morphcore/simulate/channels.py``.
+The computation of a channel is under the same name in ``morphcore/simulate/channels.py``.
 """
 
 from __future__ import annotations
@@ -18,25 +18,26 @@ CHAINS = ("rigid", "equivalent")  # models of rigid links
 
 @dataclass(frozen=True)
 class ChannelFacts:
-    """What documents hold of one channel.
+    """Facts about one channel.
 
     Attributes
     ----------
     name : str
-        In requests, and of its column; where there are several columns, each is ``name_part``.
+        Name in requests, and of its column; if there are several columns, each is ``name_part``.
     unit : str
-        Of its values, "1" if they have none. Names in JSON documents end in it: ``alpha_rad``, ``nz``.
+        Unit of its values, "1" if dimensionless; the suffix of names in JSON documents: ``alpha_rad``,
+        ``nz``.
     description : str
-        What it is, with frame and sign, a line.
+        One-line description, with frame and sign.
     per : {"", "surface", "drive"}
-        It has one column, or one for each surface or drive. The column of the surface "right wing" is
+        Whether it has one column, or one for each surface or drive. The column of the surface "right wing" is
         ``tip_z_right_wing``: its name in small letters and digits, underscores between (see `column_parts`).
     default : bool
-        Whether a flight has it where no channels are requested.
+        Whether a flight has it if no channels are requested.
     models : tuple of str
-        Kinds of models that give it.
+        Kinds of models that provide it.
     needs_gravity : bool
-        It is a multiple of the weight and has no meaning without.
+        Whether it is a multiple of the weight and so undefined without gravity.
     """
 
     name: str
@@ -110,7 +111,7 @@ def channel_facts(name: str) -> ChannelFacts:
 
 
 def default_channels() -> list[str]:
-    """Names of the channels that a flight has where none are requested."""
+    """Names of the default channels of a flight."""
     return [each.name for each in CHANNELS if each.default]
 
 
@@ -133,7 +134,7 @@ def column_parts(names: Iterable[str]) -> list[str]:
 
 
 def document_name(column: str) -> str:
-    """Name of a column in JSON documents, its unit at the end; other columns than channels keep their names.
+    """Name of a column in JSON documents, with its unit as suffix; columns of no channel keep their names.
 
     Examples
     --------
@@ -158,7 +159,7 @@ def channel_of(column: str) -> ChannelFacts | None:
 
 
 def is_channel(column: str) -> bool:
-    """Whether a column is one of a channel.
+    """Whether a column belongs to a channel.
 
     Examples
     --------
@@ -194,7 +195,7 @@ def _is_of(channel: ChannelFacts, column: str) -> bool:
 
 
 def unit_words(unit: str) -> list[str]:
-    """How names end in a unit.
+    """Words by which names end in a unit.
 
     Examples
     --------

@@ -265,7 +265,8 @@ def _range_fault(drive: Drive, angles: Sequence[float], pointer: str) -> Fault |
     """Return the first angle that is out of a drive's range as a fault; None where all are in it."""
     if drive.fault(min(angles), "") is None and drive.fault(max(angles), "") is None:
         return None
-    faults = (drive.fault(angle, f"{pointer}/{row}") for row, angle in enumerate(angles))
+    furthest = max(angles, key=abs)
+    faults = (drive.fault(angle, f"{pointer}/{row}", furthest) for row, angle in enumerate(angles))
     return next(fault for fault in faults if fault is not None)
 
 

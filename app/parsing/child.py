@@ -1,6 +1,6 @@
 """The parser process: ``python -m app.parsing.child KIND MEMORY CPU WALL ROWS SAID``, a file on its stdin.
 
-It reads one file, writes one frame (`app.parsing.frame`) and ends. Its parent is `app.parsing.pool`.
+It reads one file, writes one frame (`app.parsing.frame`) and exits. Its parent is `app.parsing.pool`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LOADED_BEFORE = {
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
-    """Return a file's document or columns, or what is wrong with it."""
+    """Return a file's document or columns, or its fault."""
     try:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
@@ -62,7 +62,7 @@ def main(arguments: list[str]) -> None:
         try:
             importlib.import_module(module)
         except ImportError:
-            break  # the reader says what to install
+            break  # the reader's message says what to install
     confine(limits)
     try:
         wanted = Wanted(max_rows=int(rows), declared=declared(**json.loads(said)))

@@ -253,6 +253,11 @@ class SearchSpace:
             if end
         }
 
+    def bound_coordinates(self, x: Array) -> NDArray[np.int64]:
+        """Indices of the coordinates of x (d,) that lie at their bounds."""
+        near = BOUND_TOLERANCE * (self.upper - self.lower)
+        return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
+
     def parameter(self, name: str) -> Parameter:
         """The kind of a named parameter; its former name is accepted, too."""
         name = current_name(name)

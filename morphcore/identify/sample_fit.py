@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
 from morphcore.identify.cost import SampleCase
+from morphcore.identify.statistics import ChannelStatistics, channel_statistics
 from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
@@ -34,6 +35,18 @@ class SampleFit(Shown):
         """(k, 3) wrapped angle differences, rad."""
         return wrap_angle(getattr(self, model) - self.case.sample.euler)
 
+    def error_share(self, model: str = "identified") -> float:
+        """Error of a model as a part of the motion, both rms, without white noise; inf if it diverged.
+
+        White noise is what neighbouring rows do not share: the mean product of neighbours is free of it.
+        """
+        errors, motion = self.errors(model), wrap_angle(self.case.sample.euler - self.case.sample.euler[0])
+        if not np.all(np.isfinite(errors)):
+            return float("inf")
+        structured = float(np.sum(errors[1:] * errors[:-1])) / (errors.shape[0] - 1)
+        size = float(np.sum(motion**2)) / motion.shape[0]
+        return float(np.sqrt(max(structured, 0.0) / size)) if size > 0.0 else float("inf")
+
     def ending(self, model: str) -> str:
         """How a model's flight failed, as words; "" where it reached its end."""
         known = np.all(np.isfinite(getattr(self, model)), axis=1)
@@ -41,6 +54,16 @@ class SampleFit(Shown):
             return ""
         time_s = self.case.sample.time_s
         return f"diverged at t = {time_s[np.argmin(known)]:.2f} s" if known[0] else "could not be trimmed"
+
+    def statistics(self) -> dict[str, ChannelStatistics]:
+        """Statistics of the identified model's errors, by angle."""
+        sample = self.case.sample
+        measured = np.unwrap(sample.euler, axis=0)
+        modelled = measured + self.errors("identified")
+        return {
+            angle: channel_statistics(sample.time_s, measured[:, k], modelled[:, k], sample.drives)
+            for k, angle in enumerate(ANGLES)
+        }
 
     def to_document(self) -> dict[str, Any]:
         """JSON form with the names that the API fixes, and the rigid model's errors beside."""
@@ -59,6 +82,7 @@ class SampleFit(Shown):
             "max_abs_rad": per_angle(np.abs(identified).max(axis=0)),
             "rms_rigid_rad": per_angle(np.sqrt(np.mean(rigid**2, axis=0))),
             "range_rad": per_angle(np.ptp(self.case.sample.euler, axis=0)),
+            "statistics": {angle: found.to_document() for angle, found in self.statistics().items()},
         }
 
     def to_curves(self) -> dict[str, Any]:

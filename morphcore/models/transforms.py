@@ -1,7 +1,7 @@
-"""Search coordinates of a parameter: of order one, so that one difference step and one spread fit all.
+"""Search coordinates of a parameter: of order one, so that one difference step and one spread suit all.
 
-A transform leads from the values of a parameter, in SI units, to its search coordinates and back. It also
-says what an interval around a value looks like: of a shape that fits the parameter, in its own unit.
+A transform maps the values of a parameter, in SI units, to its search coordinates and back. It also defines
+the shape of an interval around a value, such as a symmetric difference or a factor.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from morphcore.errors import InvalidInput
 
 Array = NDArray[np.float64]
 
-RATIO_RANGE = 1.5  # of the log-ratios: a share over the last one may be 4.5 times smaller or larger
-HALVINGS = 50  # of an interval of RATIO_RANGE, down to rounding
+RATIO_RANGE = (
+    1.5  # range of the log-ratios: the ratio of a share to the last one may be 4.5 times smaller or larger
+)
+HALVINGS = 50  # bisections of an interval of RATIO_RANGE, down to rounding
 
 
 class Transform(Protocol):
-    """The way from m values, the last axis of an array, to d search coordinates and back."""
+    """Map from m values, the last axis of an array, to d search coordinates and back."""
 
     def forward(self, values: Array) -> Array:
         """Search coordinates (..., d) of values (..., m)."""
@@ -38,16 +40,16 @@ class Transform(Protocol):
         Raises
         ------
         InvalidInput
-            There is no room for them.
+            The bounds leave no room for the values.
         """
         ...
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Smallest and largest of each value, (m,), in a box of coordinates (d,)."""
+        """Smallest and largest value of each, (m,), in a box of coordinates (d,)."""
         ...
 
     def derivative(self, values: Array) -> Array:
-        """Derivative (m,) of the coordinate in which a value's interval is even, per unit of the value."""
+        """Derivative (m,), by the value, of the coordinate in which its interval is symmetric."""
         ...
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
@@ -57,11 +59,11 @@ class Transform(Protocol):
 
 @dataclass(frozen=True)
 class Log:
-    """A positive value, searched as its logarithm: intervals are even in factors."""
+    """A positive value, searched as its logarithm; intervals are symmetric as factors."""
 
     def forward(self, values: Array) -> Array:
         """Logarithms."""
-        with np.errstate(divide="ignore"):  # nothing at all is the lower bound of any box
+        with np.errstate(divide="ignore"):  # zero becomes the lower bound of any box
             return np.log(values)
 
     def inverse(self, x: Array) -> Array:
@@ -81,7 +83,7 @@ class Log:
         return 1.0 / values
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """One factor both ways."""
+        """The same factor in both directions."""
         with np.errstate(over="ignore"):
             return values * np.exp(-half), values * np.exp(half)
 
@@ -114,7 +116,7 @@ class Linear:
         return np.full(values.shape, 1.0 / self.unit)
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """The same difference both ways."""
+        """The same difference in both directions."""
         width = half / self.derivative(values)
         return values - width, values + width
 
@@ -129,12 +131,12 @@ class Shares:
     """Positive shares that sum to one, searched as log-ratios to the last one: d = m - 1.
 
     The additive log-ratio (Aitchison 1982): a box of the coordinates lies inside the simplex. Intervals are
-    even in the odds of a share.
+    symmetric in the log-odds of a share.
 
     Attributes
     ----------
     nominal : callable, int -> ndarray, shape (m,)
-        The shares in the middle of a box, by their number.
+        The shares at the centre of a box, as a function of their number.
     """
 
     nominal: Callable[[int], Array] = equal_shares
@@ -150,9 +152,9 @@ class Shares:
         return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
-        """Log-ratios of at most RATIO_RANGE off the nominal ones for which all shares are inside the bounds.
+        """Log-ratios within RATIO_RANGE of the nominal ones for which all shares stay within the bounds.
 
-        Bounds that the nominal shares break are centred on equal shares.
+        If the nominal shares violate the bounds, the box is centred on equal shares.
         """
         if count == 1:
             return np.zeros(0), np.zeros(0)
@@ -178,7 +180,7 @@ class Shares:
         return centre - half, centre + half
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Of each share with all others at their other ends; the last one's ratio to itself is one."""
+        """Limits of each share with all others at their opposite ends; the last share's own ratio is one."""
         low, high = np.exp(np.append(lower, 0.0)), np.exp(np.append(upper, 0.0))
         return low / (low + high.sum() - high), high / (high + low.sum() - low)
 
@@ -187,7 +189,7 @@ class Shares:
         return np.asarray(1.0 / (values * (1.0 - values)))
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """One factor of the odds both ways."""
+        """The same factor of the odds in both directions."""
         odds = values / (1.0 - values)
         with np.errstate(over="ignore"):
             low, high = (1.0 / (1.0 + np.exp(-sign * half) / odds) for sign in (-1.0, 1.0))

@@ -2,16 +2,16 @@
 
 Levenberg (1944), Marquardt (1963): J(x) is lowered by the step s that minimises |r + D s|^2 + mu |s|^2. Few
 directions of such a problem are stiff and many are loose ("sloppy": Transtrum, Machta & Sethna 2011), and its
-valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: by
-what its residuals differ from the linear forecast, c = r(x + s) - r - D s, the same least-squares problem is
-amended, solved and flown again. The first correction is the geodesic acceleration of Transtrum & Sethna
-(2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the multi-step method of
-Fan (2012) does. A correction costs one flight, a Jacobian d.
+valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: the
+difference of its residuals from the linear forecast, c = r(x + s) - r - D s, is added to the same
+least-squares problem, which is solved and flown again. The first correction is the geodesic acceleration of
+Transtrum & Sethna (2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the
+multi-step method of Fan (2012) does. A correction costs one flight, a Jacobian d.
 
 The damping is Levenberg's (equal in all coordinates, which are of order one), not Marquardt's: scaled by the
-Jacobian's columns it would let a coordinate that the samples hardly see run far off. Several damping values
-are tried at once, since a wider batch costs hardly more than a narrow one. Bounds by the active set (a
-coordinate at its bound whose descent leads outward is held).
+Jacobian's columns it would let a coordinate that the samples hardly determine run far off. Several damping
+values are tried at once, since a wider batch costs hardly more than a narrow one. Bounds are handled by an
+active set (a coordinate at its bound whose descent leads outward is held).
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from morphcore.search.solver import Batch, Outcome, Problem, Solver
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
 
-# forward-difference step in coordinates of order one: residuals are good to 1e-12, and a slope is off by half
-# a step times their second derivative
+# forward-difference step in coordinates of order one: residuals are accurate to 1e-12, and the error of a
+# slope is half a step times the second derivative
 PROBE = 1e-5
-DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # times the present one
-CORRECTIONS = 2  # of each trial step, by what its flight differs from the forecast
-FIRST_DAMPING = 1e-3  # in units of the sum of the squares of the Jacobian
+DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # of the present one
+CORRECTIONS = 2  # corrections of each trial step by the difference of its flight from the forecast
+FIRST_DAMPING = 1e-3  # in units of the sum of squares of the Jacobian
 MIN_DAMPING, MAX_DAMPING = 1e-14, 1e6
-STALLED = 0.01  # relative decrease of the cost that counts as none: past it, only unseen directions drift
+STALLED = 0.01  # a smaller relative decrease counts as none: only undetermined directions still drift
 PATIENCE = 3  # iterations without decrease before a start has converged
-EXACT_RMS = 1e-8  # residuals below it are those of the arithmetic: nothing is left to fit
-# hopeless starts are dropped as the descent goes on: iteration -> starts kept (as a share of the first field)
+EXACT_RMS = 1e-8  # smaller residuals are round-off: nothing is left to fit
+# hopeless starts are dropped during the descent: iteration -> starts kept (as a share of the first field)
 NARROWING = ((3, 1.0), (6, 0.5))
 
 
@@ -50,11 +50,11 @@ class TrialSteps:
 
     Attributes
     ----------
-    starts : (s,) which starts move.
+    starts : (s,) indices of the starts that move.
     error, jacobian : (s, m) and (s, m, d) residuals at the starts, and their derivatives.
     dampings : (s, t)
-    tried : (s, t, d) the points that come next.
-    correction : number of corrections that have been made.
+    tried : (s, t, d) the points to be flown next.
+    correction : number of corrections made.
     best, cost, winner : (s, d), (s,), (s,) the best trial so far, and the damping that led to it.
     """
 
@@ -88,19 +88,19 @@ class LeastSquaresState:
 
 
 class LeastSquares(Solver[LeastSquaresState, Outcome]):
-    """Descents from all points that are known.
+    """Descents from all known points.
 
     Parameters
     ----------
-    problem : gives the box.
+    problem : provides the box.
     iterations : int
         at most.
-    prior : being off ``prior_point`` by one unit costs as much as one residual of this size. A weak prior
-        settles the directions that the residuals cannot see.
+    prior : a deviation of one unit from ``prior_point`` costs as much as one residual of this size. A weak
+    prior settles the directions that the residuals do not determine.
     prior_point : (d,)
     """
 
-    name = "polish"  # as the history of a result calls it
+    name = "polish"  # its name in the history of a result
 
     def __init__(
         self, problem: Problem[Any], iterations: int, prior: float = 0.0, prior_point: Array | None = None
@@ -119,12 +119,12 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
     def ask(self, state: LeastSquaresState) -> Batch:
         """Return the starts and their probes, then three rounds of trial steps."""
         if state.trials is None:
-            probed, _ = _probes(state.point[_moving(state)], self._upper)
+            probed, _ = probes(state.point[_moving(state)], self._upper)
             return Batch(probed, residuals=True)
         return Batch(state.trials.tried.reshape(-1, self._lower.size), residuals=True)
 
     def tell(self, state: LeastSquaresState, outcome: Outcome) -> LeastSquaresState:
-        """Take the first trial steps, correct them, or accept the best of them."""
+        """Compute the first trial steps, correct them, or accept the best of them."""
         residuals = self._with_prior(outcome)
         if state.trials is None:
             return replace(state, trials=self._first_trials(state, residuals))
@@ -134,13 +134,13 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         return _accepted(state, trials)
 
     def done(self, state: LeastSquaresState) -> bool:
-        """Return whether none of the starts in the field moves any more, or the iterations are used up."""
+        """Return True when no remaining start moves any more or the iterations are used up."""
         if state.trials is not None:
             return False
         return state.iteration >= self._iterations or _moving(state).size == 0
 
     def best(self, state: LeastSquaresState, outcome: Outcome) -> tuple[Array, float]:
-        """Return the best start after an iteration, its cost without the prior."""
+        """Return the best start after an iteration, with its cost without the prior."""
         if state.trials is None and state.iteration == 0:
             return super().best(state, outcome)
         leader = int(np.argmin(state.cost))
@@ -154,12 +154,12 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         return state.trials is None
 
     def share(self, state: LeastSquaresState) -> float:
-        """Return the share of the iterations that have been made."""
+        """Return the completed share of the iterations."""
         return state.iteration / self._iterations
 
     def _with_prior(self, outcome: Outcome) -> Array:
         if outcome.residuals is None:
-            raise TypeError("the batch asked for residuals")
+            raise TypeError("the batch requested residuals")
         if self._prior == 0.0:
             return outcome.residuals
         off = self._prior * (outcome.points - self._prior_point)
@@ -169,7 +169,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         """Return damped steps from the residuals of the starts and their probes."""
         starts = _moving(state)
         points = state.point[starts]
-        error, jacobian = _differences(residuals, _probes(points, self._upper)[1])
+        error, jacobian = _differences(residuals, probes(points, self._upper)[1])
         dampings = np.clip(state.damping[starts, None] * DAMPING_TRIALS, MIN_DAMPING, MAX_DAMPING)
         # as if there were no curvature
         assumed = np.repeat(error[:, None, :], dampings.shape[1], axis=1)
@@ -186,7 +186,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         )
 
     def _judged(self, state: LeastSquaresState, trials: TrialSteps, residuals: Array) -> TrialSteps:
-        """Return the trials with the best of the flown ones, and with corrected steps to be flown next."""
+        """Return the trials updated with the best flown ones, and with corrected steps to be flown next."""
         points, tried = state.point[trials.starts], trials.tried
         count, tests = trials.dampings.shape
         rows = np.arange(count)
@@ -210,10 +210,10 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
     def _steps(self, points: Array, jacobian: Array, dampings: Array, assumed: Array) -> Array:
         """Return where steps of all dampings (s, t) lead from points (s, d), (s, t, d).
 
-        ``assumed`` : (s, t, m) residuals that the linear model has where no step is made.
+        ``assumed`` : (s, t, m) residuals of the linear model at zero step.
         """
         squares = jacobian.transpose(0, 2, 1) @ jacobian
-        # the floor is for samples that see nothing at all
+        # the floor covers samples that determine nothing at all
         scale = np.maximum(np.trace(squares, axis1=1, axis2=2), np.finfo(float).tiny / MIN_DAMPING)
         gradients = assumed @ jacobian
         return np.array(
@@ -230,7 +230,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
 
 
 def _moving(state: LeastSquaresState) -> NDArray[np.int64]:
-    """Return the starts (s,) in the field that still move, the best first."""
+    """Return the remaining starts (s,) that still move, best first."""
     share = next((share for limit, share in NARROWING if state.iteration < limit), 0.0)
     keep = max(1, round(share * state.cost.size))
     order = np.argsort(state.cost, kind="stable")[:keep]
@@ -238,7 +238,7 @@ def _moving(state: LeastSquaresState) -> NDArray[np.int64]:
 
 
 def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState:
-    """Return the state after an iteration: each start at its best trial where that is better."""
+    """Return the state after an iteration; each start moves to its best trial if that is an improvement."""
     chosen, dampings = trials.starts, trials.dampings
     before = np.einsum("sm,sm->s", trials.error, trials.error)
     improved = trials.cost < before
@@ -256,11 +256,11 @@ def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState
 
 def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
     """Return residuals (s, m) and forward-difference Jacobians (s, m, d) at points (s, d), in one batch."""
-    probed, steps = _probes(points, upper)
+    probed, steps = probes(points, upper)
     return _differences(residuals(probed), steps)
 
 
-def _probes(points: Array, upper: Array) -> tuple[Array, Array]:
+def probes(points: Array, upper: Array) -> tuple[Array, Array]:
     """Return points (s (1 + d), d), each of (s, d) followed by its probes, and the probes' steps (s, d)."""
     count, d = points.shape
     # step inward at an upper bound

@@ -33,25 +33,25 @@ class Trajectory(Shown):
     Attributes
     ----------
     name : str
-        Its name, unique among the samples of an identification.
+        Name, unique among the samples of an identification.
     time_s : ndarray, shape (k,)
-        Rising times, s.
+        Increasing times, s.
     drives : mapping of str to ndarray, shape (k,)
-        Angle of each drive that moves, rad, by its name (``sweep_left``), or by its word where both sides
-        move alike (``sweep``).
+        Angle of each moving drive, rad, by its name (``sweep_left``), or by its word if both sides move
+        together (``sweep``).
     phi, theta, psi : ndarray, shape (k,)
         Euler angles from N to B (z-y-x), rad.
     role : {"train", "held_out"}
-        Whether an identification fits it, or only reports it.
+        Whether an identification fits the flight or only reports it.
     weight : float
         Weight of its errors in a fit.
     extra : dict of str to ndarray, shape (k,)
         Other columns.
     of_file : bool
-        Whether ``drives`` are all columns of a file that could be drives, in which case those that the
-        aircraft does not have are left out.
+        Whether ``drives`` holds all columns of a file that could be drives; those that the aircraft does not
+        have are then ignored.
     unreadable : mapping of str to str
-        What is wrong with further columns, by their names.
+        What is wrong with further columns, by name.
     channels : mapping of str to ndarray, shape (k,)
         Measured channels by their columns (``p``, ``nz``, ``tip_z_right_wing``, as in
         ``morphdata.channels``), SI units; NaN where a value is missing.
@@ -97,12 +97,12 @@ class Trajectory(Shown):
 
     @property
     def sweep_left(self) -> Array:
-        """Angle (k,) of the first drive of the left side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the left side, rad; zeros if there is none."""
         return self._side("left")
 
     @property
     def sweep_right(self) -> Array:
-        """Angle (k,) of the first drive of the right side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the right side, rad; zeros if there is none."""
         return self._side("right")
 
     def _side(self, side: str) -> Array:
@@ -113,7 +113,7 @@ class Trajectory(Shown):
 
     @property
     def drive_order(self) -> tuple[str, ...]:
-        """Names of the drives as tables and pictures have them: left before right of each word."""
+        """Names of the drives in the order of tables and figures: left before right for each word."""
         names = list(self.drives)
         words = list(dict.fromkeys(without_side(name) for name in names))
         return tuple(sorted(names, key=lambda name: (words.index(without_side(name)), name)))
@@ -192,7 +192,7 @@ def load_trajectory(
 
 
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
-    """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
+    """Raise InvalidInput if a sample violates the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in ANGLES}}
     columns |= trajectory.drives
     called = {name: INLINE.get(name, f"{name}_rad") for name in columns}

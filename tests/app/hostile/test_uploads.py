@@ -86,7 +86,7 @@ def test_a_bomb_harms_nobody(api: ApiProcess, name: str) -> None:
 
 @pytest.mark.slow
 def test_many_bombs_at_once_wait_in_line(api: ApiProcess) -> None:
-    """Two are read at once, the others wait or are told to come again; the API stays calm."""
+    """Two are read at once, the others wait or get a retry response; the API stays responsive."""
     _, made = BOMBS["mat_of_many_objects.mat"]
     content = made()
 
@@ -109,7 +109,7 @@ def test_many_bombs_at_once_wait_in_line(api: ApiProcess) -> None:
 
 
 def test_columns_nobody_asked_for_are_not_read(api: ApiProcess) -> None:
-    """A column of enormous texts beside an honest flight costs nothing: it is never decoded."""
+    """A column of enormous texts in a valid flight costs nothing: it is never decoded."""
     time_s = 0.01 * np.arange(10)
     texts = pa.array(["x" * MIB] * 10, pa.large_string())
     content = parquet(pa.table({**dict.fromkeys(NAMES, time_s), "note": texts}), compression="zstd")
