@@ -16,6 +16,7 @@ from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, 
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
 from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
 from morphcore.identify.settings import SearchSettings
@@ -36,6 +37,7 @@ from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel, samples_faults
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
@@ -74,6 +76,8 @@ class Identification:
         Method and effort of the search.
     measurement : Measurement, optional
         How the samples were measured; what is left out is decided from the data.
+    uncertainty : UncertaintySettings, optional
+        What is computed beside standard errors and intervals.
     clock : callable
         Wall time, s.
 
@@ -92,6 +96,7 @@ class Identification:
         search: SearchSettings | None = None,
         *,
         measurement: Measurement | None = None,
+        uncertainty: UncertaintySettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.settings = model or EquivalentModel()
@@ -108,6 +113,7 @@ class Identification:
         samples = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
         self.samples = tuple(samples)
         self.measurement = measurement or Measurement()
+        self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
         self.openness: tuple[Openness, ...] = self._first_openness
@@ -126,6 +132,7 @@ class Identification:
             aero_coefficients=free,
             bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
         )
+        require_names(self.space, self.uncertainty.profile)
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack(

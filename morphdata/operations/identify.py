@@ -169,7 +169,7 @@ IDENTIFY = Operation(
     cost=cost,
     summary=_summary,
     begin="worker.operations.identification:begin",
-    files=("result.json", "convergence.*", "attitude_*", "residuals_*", "curves_*.csv"),
+    files=("result.json", "convergence.*", "attitude_*", "residuals_*", "curves_*.csv", "posterior.npz"),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,
 )
