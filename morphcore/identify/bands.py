@@ -77,6 +77,11 @@ class Band:
             "measured_upper": columns(self.measured_upper),
         }
 
+    def to_curves(self) -> dict[str, dict[str, list[float]]]:
+        """Band of measured angles as a picture takes it: the low and high ends by angle."""
+        ends = zip(ANGLES, self.measured_lower.T, self.measured_upper.T, strict=True)
+        return {f"{name}_rad": {"low": low.tolist(), "high": high.tolist()} for name, low, high in ends}
+
 
 def predict_bands(
     result: IdentifyResult, samples: Sequence[Trajectory], *, draws: int = DRAWS, seed: int = 1

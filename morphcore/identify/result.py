@@ -173,7 +173,7 @@ class IdentifyResult(Shown):
         bands = {band.sample: band for band in self.bands}
         return {
             "samples": [
-                fit.to_curves() | {"band": bands[fit.case.sample.name].to_document()}
+                fit.to_curves() | {"band": bands[fit.case.sample.name].to_curves()}
                 if fit.case.sample.name in bands
                 else fit.to_curves()
                 for fit in self.fits
