@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.bands import Band, predict_bands
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import SearchSettings, search_settings
@@ -17,8 +18,10 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 __all__ = [
+    "Band",
     "Identification",
     "IdentifyResult",
     "Interrupted",
@@ -26,6 +29,7 @@ __all__ = [
     "Step",
     "identification_from_request",
     "identify",
+    "predict_bands",
 ]
 
 
@@ -39,6 +43,7 @@ def identify(
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
     measurement: Measurement | None = None,
+    uncertainty: UncertaintySettings | None = None,
 ) -> IdentifyResult:
     """Identify an equivalent model from sample flights, from start to end.
 
@@ -61,6 +66,8 @@ def identify(
     measurement : Measurement, optional
         How the samples were measured: channels, noise, biases, delays. What is left out is decided from the
         data.
+    uncertainty : UncertaintySettings, optional
+        Posterior draws and profile likelihoods to compute beside standard errors and intervals.
 
     Returns
     -------
@@ -95,6 +102,7 @@ def identify(
         model or EquivalentModel(links_per_wing=links_per_wing),
         search_settings(search or IdentifySearch(seed=seed)),
         measurement=measurement,
+        uncertainty=uncertainty,
     )
     checkpoint = b""
     for step in run.steps():
@@ -137,6 +145,7 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
         request.model,
         search_settings(request.search),
         measurement=request.measurement,
+        uncertainty=request.uncertainty,
     )
 
 

@@ -19,6 +19,7 @@ from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
 from morphcore.identify.settings import SearchSettings
@@ -39,6 +40,7 @@ from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel, samples_faults
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
@@ -77,6 +79,8 @@ class Identification:
         Method and effort of the search.
     measurement : Measurement, optional
         How the samples were measured; what is left out is decided from the data.
+    uncertainty : UncertaintySettings, optional
+        What is computed beside standard errors and intervals.
     clock : callable
         Wall time, s.
 
@@ -95,6 +99,7 @@ class Identification:
         search: SearchSettings | None = None,
         *,
         measurement: Measurement | None = None,
+        uncertainty: UncertaintySettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.settings = model or EquivalentModel()
@@ -113,6 +118,7 @@ class Identification:
         smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
         self.samples = tuple(sample for sample, _ in smoothed)
         self.histories = tuple(histories for _, histories in smoothed)
+        self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
         self.openness: tuple[Openness, ...] = self._first_openness
@@ -131,6 +137,7 @@ class Identification:
             aero_coefficients=free,
             bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
         )
+        require_names(self.space, self.uncertainty.profile)
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack(
