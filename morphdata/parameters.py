@@ -195,6 +195,8 @@ class WholeResult(Document):
     model: Parameters
     fit: Unread = None
     uncertainty: Unread = None
+    verdict: Unread = None
+    measurement: Unread = None
     search: Unread = None
     cost: Unread = None
     partial: Unread = None
