@@ -145,7 +145,7 @@ class SampleMeasurement(Result):
     )
     first_angle_rad: dict[str, Estimate] = Field(
         default={},
-        description="Of each noisy drive, what the angle for which the flight is trimmed is off the first of its "
+        description="Of each noisy drive, what the angle for which a flight is trimmed is off the first of its "
         "smoothed angles.",
     )
     sigma: dict[str, float] = Field(
