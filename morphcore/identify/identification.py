@@ -13,6 +13,7 @@ from morphcore.errors import InvalidInput
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.evidence import ChosenPrior
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.result import IdentifyResult, identify_result
@@ -244,6 +245,11 @@ class Identification:
         """What one unit off the physical guess costs in a descent, rad^2."""
         return PRIOR_RAD**2
 
+    def prior(self) -> ChosenPrior:
+        """What is known before any flight, and how it is weighed against them."""
+        rows = tuple(sample.time_s.size for sample in self.samples if sample.role == "train")
+        return ChosenPrior(self.space.guess, np.full(self.space.dimension, PRIOR_RAD**2), rows)
+
     @property
     def flights_each(self) -> int:
         """Flights of one parameter set: one for each sample to fit."""
@@ -301,7 +307,7 @@ class Identification:
 
 
 def _descent(run: Identification, settings: SearchSettings) -> LeastSquares:
-    return LeastSquares(run, settings.iterations, PRIOR_RAD, run.space.guess)
+    return LeastSquares(run, settings.iterations, run.prior(), run.space.limits)
 
 
 def _hybrid(run: Identification, settings: SearchSettings) -> Hybrid:

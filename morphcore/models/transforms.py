@@ -18,7 +18,7 @@ from morphcore.errors import InvalidInput
 Array = NDArray[np.float64]
 
 RATIO_RANGE = 1.5  # of the log-ratios: a share over the last one may be 4.5 times smaller or larger
-HALVINGS = 50  # of an interval of RATIO_RANGE, down to rounding
+HALVINGS = 50  # of the range of the log-ratios, down to rounding
 
 
 class Transform(Protocol):
@@ -135,9 +135,12 @@ class Shares:
     ----------
     nominal : callable, int -> ndarray, shape (m,)
         The shares in the middle of a box, by their number.
+    ratio_range : float
+        Of the log-ratios around them, in a box.
     """
 
     nominal: Callable[[int], Array] = equal_shares
+    ratio_range: float = RATIO_RANGE
 
     def forward(self, values: Array) -> Array:
         """Log-ratios to the last share."""
@@ -150,7 +153,7 @@ class Shares:
         return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
-        """Log-ratios of at most RATIO_RANGE off the nominal ones for which all shares are inside the bounds.
+        """Log-ratios of at most ``ratio_range`` off the nominal ones for which all shares are inside the bounds.
 
         Bounds that the nominal shares break are centred on equal shares.
         """
@@ -171,7 +174,8 @@ class Shares:
             smallest, largest = self.limits(centre - half, centre + half)
             return bool(smallest.min() >= low and largest.max() <= high)
 
-        half, beyond = (RATIO_RANGE, RATIO_RANGE) if fits(RATIO_RANGE) else (0.0, RATIO_RANGE)
+        widest = self.ratio_range
+        half, beyond = (widest, widest) if fits(widest) else (0.0, widest)
         for _ in range(HALVINGS):
             middle = 0.5 * (half + beyond)
             half, beyond = (middle, beyond) if fits(middle) else (half, middle)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
 from morphcore.search.least_squares import LeastSquares, LeastSquaresState
-from morphcore.search.solver import Batch, Outcome, Problem, Solver
+from morphcore.search.solver import Batch, Box, Outcome, Problem, Solver
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Hybrid(Solver[HybridState, Outcome]):
         good_cost: float,
         seed: int,
     ) -> None:
-        self._box, self._descent = problem.box, descent
+        self._descent = descent
         self._candidates, self._starts, self._spread = candidates, starts, spread
         self._good_cost, self._seed = good_cost, seed
 
@@ -76,14 +76,16 @@ class Hybrid(Solver[HybridState, Outcome]):
         if state.stage != "screening":
             return self._descent.ask(state.descent)
         drawn = self._spread * even_normals(self._candidates, state.centre.size, self._seed)
-        return Batch(np.clip(state.centre + drawn, self._box.lower, self._box.upper))
+        return Batch(np.clip(state.centre + drawn, state.descent.lower, state.descent.upper))
 
     def tell(self, state: HybridState, outcome: Outcome) -> HybridState:
         """Go on with the descent; begin the second one from the best candidates."""
         if state.stage == "screening":
             chosen = np.argsort(outcome.cost, kind="stable")[: self._starts]
             starts = Outcome(outcome.points[chosen], outcome.cost[chosen])
-            return replace(state, stage="second", descent=self._descent.init(starts))
+            begun = self._descent.init(starts)
+            box = {"lower": state.descent.lower, "upper": state.descent.upper}
+            return replace(state, stage="second", descent=replace(begun, **box))
         descent = self._descent.tell(state.descent, outcome)
         best = min(state.best_cost, self._descent.best(descent, outcome)[1])
         poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost
@@ -96,6 +98,18 @@ class Hybrid(Solver[HybridState, Outcome]):
     def best(self, state: HybridState, outcome: Outcome) -> tuple[Array, float]:
         """Return the descent's best start, or the best candidate."""
         return self._descent.best(state.descent, outcome)
+
+    def replaces(self, state: HybridState) -> bool:
+        """Return what the first descent says; the second has to find something better."""
+        return state.stage == "first" and self._descent.replaces(state.descent)
+
+    def box(self, state: HybridState) -> Box:
+        """Return the descent's box."""
+        return self._descent.box(state.descent)
+
+    def weight(self, state: HybridState) -> Array:
+        """Return the weights (d,) of the prior in the descent."""
+        return self._descent.weight(state.descent)
 
     def between_steps(self, state: HybridState) -> bool:
         """Return whether an iteration of the descent, or the screening, has ended."""
