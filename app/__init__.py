@@ -1,1 +1,1 @@
-"""The HTTP service of MorphID: validation, rows and events; it never computes a flight."""
+"""The HTTP service of MorphID: validation, database rows and events; it never computes flights."""

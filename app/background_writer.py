@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.database import Database, Session
 
-MAX_WAITING = 1000  # more are dropped: what goes through here is worth less than memory
+MAX_WAITING = 1000  # further ones are dropped: these writes are worth less than memory
 STOP_S = 2.0
 
 Write = Callable[[Session], object]
@@ -28,11 +28,11 @@ class BackgroundWriter:
         self._thread = threading.Thread(target=self._run, name="background-writer", daemon=True)
 
     def start(self) -> None:
-        """Begin to write."""
+        """Start writing."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Write what waits, for `STOP_S` at most, and end."""
+        """Write what is waiting, for `STOP_S` at most, and stop."""
         try:
             self._waiting.put(None, timeout=STOP_S)
         except queue.Full:
@@ -40,7 +40,7 @@ class BackgroundWriter:
         self._thread.join(STOP_S)
 
     def put(self, write: Write) -> None:
-        """Have `write` called soon with a session of its own; never waits."""
+        """Schedule `write` to be called soon with its own session; never blocks."""
         try:
             self._waiting.put_nowait(write)
         except queue.Full:

@@ -1,8 +1,9 @@
-"""The broker's address: every spelling in use becomes the one that all of our clients read alike.
+"""The broker's address, normalised to one spelling that all our clients interpret alike.
 
-Celery's own reader and redis-py's differ: in Celery a bare ``rediss://`` checks no certificate, and neither
-knows the other's words for the same option. So we write an address once in redis-py's spelling, with
-defaults put in, and both the health check and Celery's transport (`app.jobs.transport`) hand it to redis-py.
+Celery's own parser and redis-py's differ: in Celery a bare ``rediss://`` does not check certificates, and the
+two use different names for the same options. So an address is written once in redis-py's spelling, with
+defaults filled in, and both the health check and Celery's transport (`app.jobs.transport`) pass it to
+redis-py.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ SCHEMES = {
 }
 CERTIFICATE_CHECKS = ("required", "optional", "none")  # in Celery's spelling with `cert_` before them
 OPTIONS = frozenset({"client_name", "db", "password", "protocol", "username"})
-HOST_OPTIONS = frozenset({"socket_keepalive"})  # a socket file knows no such thing
+HOST_OPTIONS = frozenset({"socket_keepalive"})  # not applicable to a socket file
 TLS_OPTIONS = frozenset(
     f"ssl_{name}"
     for name in (
@@ -40,14 +41,14 @@ def is_redis(url: str) -> bool:
 
 
 def canonical(url: str) -> str:
-    """Write an address in the spelling of redis-py, with the check of certificates spelled out.
+    """Write an address in the spelling of redis-py, with the certificate check made explicit.
 
     An address of another kind of broker is returned as it is.
 
     Raises
     ------
     ValueError
-        With a sentence for the operator, without the password.
+        The message is for the operator and does not contain the password.
 
     Examples
     --------
@@ -67,17 +68,15 @@ def canonical(url: str) -> str:
     path = parts.path
     number = "" if scheme == "unix" else options.get("db", path.strip("/"))
     if scheme == "unix" and (parts.hostname or not path.strip("/")):
-        raise ValueError(
-            "MORPHID_BROKER_URL: a socket file is named by its full path: unix:///run/valkey.sock"
-        )
+        raise ValueError("MORPHID_BROKER_URL: give the full path of a socket file: unix:///run/valkey.sock")
     if number and not number.isdecimal():
         raise ValueError(
-            "MORPHID_BROKER_URL: what follows the broker's host is no number of a database; "
-            "a slash in the password is written %2F"
+            "MORPHID_BROKER_URL: the part after the broker's host is not a database number; "
+            "write a slash in the password as %2F"
         )
     if scheme == "rediss":
         options["ssl_cert_reqs"] = _certificate_check(options.get("ssl_cert_reqs", "required"))
-    # Celery takes what stands behind a semicolon for another address
+    # Celery treats the part after a semicolon as another address
     place, path = (quote(text, safe="%/:@[]!$&'()*+,=~") for text in (parts.netloc, path))
     return f"{scheme}://{place}{path}" + (f"?{urlencode(options)}" if options else "")
 

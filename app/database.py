@@ -1,4 +1,4 @@
-"""Engines and transactions: SQLite (WAL, one writer at a time) and Postgres behind one small shell."""
+"""Engines and transactions: SQLite (WAL, one writer at a time) and Postgres behind one small interface."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from app.database_errors import DatabaseTrouble, trouble_of
 from app.private_files import close_to_others, make_private_folder, touch_private
 from app.reserve import Reserve
 
-# What store and repository functions work in: a Core connection inside a transaction. Not the ORM's session:
-# nothing here maps classes to tables, and importing the ORM costs 0.3 s at every start.
+# The session of store and repository functions: a Core connection inside a transaction. Not the ORM's
+# session: nothing here maps classes to tables, and importing the ORM costs 0.3 s at every start.
 Session = Connection
 Answer = TypeVar("Answer")
 
 BUSY_TIMEOUT_MS = 15_000  # a writer waits this long for another's commit; ours last milliseconds
-JOURNAL_LIMIT_BYTES = 4 * 2**20  # SQLite: a longer journal is cut when it is begun anew
+JOURNAL_LIMIT_BYTES = 4 * 2**20  # SQLite: a longer journal is truncated when it is restarted
 LENDINGS = 16  # tries of a write that must fit
 BEGIN_OPTION = "morphid_begin"  # execution option: how SQLite opens the transaction
 CONNECT_TIMEOUT_S = 5
 POSTGRES_PATIENCE = {
-    # another process may be stopped amid a transaction, or its host be gone: nobody waits for it forever
+    # another process may be stopped in a transaction, or its host lost: do not wait for it forever
     "lock_timeout": "10s",
     "statement_timeout": "60s",
     "idle_in_transaction_session_timeout": "30s",
 }
 POSTGRES_LINK = {
-    # a host that vanished without a word is noticed within half a minute
+    # a host that vanished silently is noticed within half a minute
     "connect_timeout": CONNECT_TIMEOUT_S,
     "keepalives_idle": 10,
     "keepalives_interval": 5,
@@ -44,8 +44,8 @@ POSTGRES_LINK = {
 }
 
 
-class database_time(FunctionElement[float]):  # noqa: N801 - reads as the SQL function it is
-    """The database's clock as SQL: seconds since 1970 UTC (double). No process's own clock rules leases.
+class database_time(FunctionElement[float]):  # noqa: N801 - named like the SQL function it is
+    """The database's clock as SQL: seconds since 1970 UTC (double). Leases never depend on local clocks.
 
     Postgres uses ``clock_timestamp()``, not ``now()``: a transaction that waited for a lock must not act in
     the past.
@@ -84,7 +84,7 @@ def insert_new(session: Session, table: Table) -> Any:
 
 
 def make_engine(url: str) -> Engine:
-    """Open an engine for `url`; an SQLite file and its folder are made, for this user alone, when missing."""
+    """Open an engine for `url`; a missing SQLite file and its folder are made, private to this user."""
     parsed = make_url(normal_url(url))
     if parsed.get_backend_name() != "sqlite":
         return create_engine(
@@ -102,12 +102,12 @@ def make_engine(url: str) -> Engine:
 
     @event.listens_for(engine, "connect")
     def _on_connect(connection: Any, _record: Any) -> None:
-        # the driver must not open transactions by itself, or BEGIN IMMEDIATE comes too late
+        # the driver must not open transactions itself, or BEGIN IMMEDIATE comes too late
         connection.isolation_level = None
         cursor = connection.cursor()
         cursor.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
         if file is not None and file.stat().st_size == 0:
-            # so that free pages can be given back; it must be said before anything is in the file
+            # so that free pages can be released; must be set before anything is in the file
             cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")
         cursor.execute("PRAGMA journal_mode = WAL")
         cursor.execute(f"PRAGMA journal_size_limit = {JOURNAL_LIMIT_BYTES}")
@@ -129,8 +129,8 @@ def _sqlite_file(url: URL) -> Path | None:
 
 
 def _keep_private(file: Path) -> None:
-    """Make the database's file before SQLite does: its journals get the same mode, from their first byte."""
-    with suppress(OSError):  # SQLite then says itself what is wrong
+    """Make the database's file before SQLite does, so that its journals get the same mode from the start."""
+    with suppress(OSError):  # SQLite then reports the error itself
         touch_private(file)
         for suffix in ("-wal", "-shm"):
             journal = file.with_name(file.name + suffix)
@@ -159,7 +159,7 @@ class Database:
         self.engine = make_engine(url)
         parsed = make_url(self.url)
         file = _sqlite_file(parsed) if parsed.get_backend_name() == "sqlite" else None
-        self.reserve = None if file is None else Reserve(file)  # room for `write_even_if_full`
+        self.reserve = None if file is None else Reserve(file)  # space for `write_even_if_full`
         # SQLite: a transaction that will write takes the write lock at once; upgrading later may fail
         self._writer = self.engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"})
 
@@ -170,10 +170,10 @@ class Database:
             yield session
 
     def write_even_if_full(self, write: Callable[[Session], Answer]) -> Answer:
-        """Run a small write in a transaction of its own, on a full disk with room from the reserve.
+        """Run a small write in its own transaction; on a full disk it uses space from the reserve.
 
-        For what people need most when the disk is full: to cancel, to delete, to have a job end. `write` is
-        called again when it did not fit.
+        For the operations needed most when the disk is full: cancelling, deleting, ending a job. `write` is
+        called again if it did not fit.
         """
         try:
             with self.write() as session:
@@ -184,12 +184,12 @@ class Database:
             return self._write_with(self.reserve, write, error)
 
     def _write_with(self, reserve: Reserve, write: Callable[[Session], Answer], why: DBAPIError) -> Answer:
-        """Repeat a write that did not fit; somebody else's may take what is lent before ours is on disk."""
+        """Repeat a write that did not fit; another write may take the lent space before ours is on disk."""
         for _ in range(LENDINGS):
             try:
                 with self.write() as session:
                     answer = write(session)
-                    # at the last moment, while nobody else can write here: the commit finds the room
+                    # at the last moment, while no one else can write: the commit finds the space
                     if not reserve.lend():
                         raise why
                 reserve.take_back()
@@ -202,7 +202,7 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A transaction for reading; whatever it wrote is rolled back."""
+        """A transaction for reading; any writes are rolled back."""
         with self.engine.connect() as session:
             yield session
 
@@ -219,13 +219,15 @@ def migration_config(url: str) -> Any:
 
     config = Config()
     folder = str(Path(migrations.__file__).parent)
-    config.set_main_option("script_location", folder.replace("%", "%%"))  # else taken for an interpolation
+    config.set_main_option(
+        "script_location", folder.replace("%", "%%")
+    )  # otherwise treated as an interpolation
     config.attributes["url"] = url
     return config
 
 
 def schema_revision(session: Session) -> str | None:
-    """Name the migration that the database is at; None for one that was never migrated."""
+    """Return the revision of the database; None if it was never migrated."""
     if not inspect(session).has_table("alembic_version"):
         return None
     revision: str | None = session.scalar(text("SELECT version_num FROM alembic_version"))
@@ -234,7 +236,7 @@ def schema_revision(session: Session) -> str | None:
 
 def upgrade(url: str, revision: str = "head") -> None:
     """Migrate the database at `url` up to `revision`; safe when several processes start at once."""
-    from app.disk_space import make_shrinkable  # lazy: it stands on this module
+    from app.disk_space import make_shrinkable  # lazy: it imports this module
     from migrations import HEAD
 
     database = Database(url)

@@ -1,4 +1,4 @@
-"""The address of a database as text: written so that the file lies where it should, or refused."""
+"""Database addresses: normalised so that the file is where it should be, or refused."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-# what the statements and the connection's options are written for, and the package of each driver
+# the supported databases, and the package of each driver
 DRIVERS = {
     "sqlite": {"pysqlite": "sqlite3"},
     "postgresql": {"psycopg": "psycopg", "psycopg2": "psycopg2"},
@@ -16,18 +16,18 @@ EXAMPLES = "postgresql://user:password@host:5432/name, or sqlite:////folder/file
 
 
 class UnusableAddress(ValueError):
-    """The address names no database that this installation can open; the message holds no password."""
+    """This installation cannot open a database at the address; the message contains no password."""
 
 
 def sqlite_url(file: Path) -> str:
-    """Give the URL of an SQLite file, whatever characters its folders have in their names.
+    """Return the URL of an SQLite file, for any characters in the names of its folders.
 
     Raises
     ------
     UnusableAddress
-        SQLite would look for another file: it reads names as UTF-8, and this process encodes them otherwise.
+        SQLite would open another file: it reads names as UTF-8, and this process encodes them differently.
     """
-    from sqlalchemy import URL  # lazy, here and below: settings are read where no database is
+    from sqlalchemy import URL  # lazy, here and below: settings are also read where there is no database
 
     if os.fsencode(file) != str(file).encode("utf-8", "replace"):
         shown = os.fsencode(file).decode("utf-8", "replace")
@@ -39,7 +39,7 @@ def sqlite_url(file: Path) -> str:
 
 
 def normal_url(url: str) -> str:
-    """Name the driver that is installed: ``postgres://`` and ``postgresql://`` mean psycopg 3."""
+    """Add the installed driver: ``postgres://`` and ``postgresql://`` mean psycopg 3."""
     for prefix in ("postgres://", "postgresql://"):
         if url.startswith(prefix):
             return "postgresql+psycopg://" + url.removeprefix(prefix)
@@ -47,19 +47,19 @@ def normal_url(url: str) -> str:
 
 
 def require_usable(url: str) -> None:
-    """Look at an address without opening it.
+    """Check an address without opening it.
 
     Raises
     ------
     UnusableAddress
-        It is no URL, or is of a database or a driver that is not known or not installed.
+        It is not a URL, or its database or driver is unknown or not installed.
     """
     from sqlalchemy import make_url
     from sqlalchemy.exc import ArgumentError
 
     try:
         parsed = make_url(normal_url(url))
-    except (ArgumentError, ValueError):  # the second: of a port that is no number
+    except (ArgumentError, ValueError):  # the second: the port is not a number
         raise UnusableAddress(f"this is not a database URL. Write {EXAMPLES}.") from None
     backend, _, driver = parsed.drivername.partition("+")
     known = DRIVERS.get(backend)

@@ -1,4 +1,4 @@
-"""Why a transaction failed: the database is away or full, or the statement was wrong."""
+"""Why a transaction failed: the database is unavailable or full, or the statement was wrong."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 POSTGRES_DISK_FULL = "53100"
 POSTGRES_PASSING = ("08", "40", "53", "55", "57", "58")
 # of these classes: connection, rollback, resources, locks, operator, system
-POSTGRES_STANDBY = "25006"  # writes are refused: the former primary answers after a switch-over
+POSTGRES_STANDBY = "25006"  # writes are refused: a former primary answers after a switch-over
 # https://www.sqlite.org/rescode.html, primary codes
 SQLITE_PASSING = frozenset(
     {
@@ -28,14 +28,14 @@ PRIMARY_CODE = 0xFF  # SQLite's extended codes keep the primary one in the low b
 
 
 class DatabaseTrouble(Enum):
-    """Why a transaction failed though its statements are right."""
+    """Why a transaction failed although its statements are correct."""
 
-    AWAY = "away"  # it restarts, cannot be reached, or was too busy: the same transaction may pass later
-    FULL = "full"  # there is no room for what should be written
+    AWAY = "away"  # it restarts, is unreachable, or was too busy: the same transaction may succeed later
+    FULL = "full"  # there is no space for the write
 
 
 def trouble_of(error: BaseException) -> DatabaseTrouble | None:
-    """Classify the trouble that the database has; None when the fault is in the statement itself."""
+    """Classify the database's trouble; None if the statement itself is at fault."""
     if isinstance(error, PoolTimeout):
         return DatabaseTrouble.AWAY
     if not isinstance(error, DBAPIError):
@@ -47,7 +47,7 @@ def trouble_of(error: BaseException) -> DatabaseTrouble | None:
         return DatabaseTrouble.FULL
     if state.startswith(POSTGRES_PASSING) or state == POSTGRES_STANDBY or error.connection_invalidated:
         return DatabaseTrouble.AWAY
-    # the driver itself gives no code: no connection, or one that broke
+    # no code from the driver: no connection, or a broken one
     broken = isinstance(error, (OperationalError, InterfaceError))
     return DatabaseTrouble.AWAY if broken and not state else None
 

@@ -1,6 +1,6 @@
-"""Disk space that deleted rows leave in an SQLite file, given back a little at a time.
+"""Releases disk space that deleted rows leave in an SQLite file, a little at a time.
 
-Postgres does this by itself (autovacuum): the room is used again, and files shrink at their ends.
+Postgres does this itself (autovacuum): the space is reused, and files shrink at their ends.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from sqlalchemy import text
 
 from app.database import Database
 
-INCREMENTAL = 2  # what PRAGMA auto_vacuum answers where pages can be given back
-SLICE_PAGES = 500  # 2 MB moved in one transaction, while which other writers wait
-KEPT_PAGES = 250  # 1 MB stays for the next rows
+INCREMENTAL = 2  # value of PRAGMA auto_vacuum if pages can be released
+SLICE_PAGES = 500  # 2 MB moved in one transaction, during which other writers wait
+KEPT_PAGES = 250  # 1 MB is kept for the next rows
 
 log = logging.getLogger(__name__)
 
 
 def give_back(database: Database) -> bool:
-    """Give one slice of free pages back to the disk; return whether more are left."""
+    """Return one slice of free pages to the disk; return whether more are left."""
     if database.engine.dialect.name != "sqlite":
         return False
     with database.read() as session:
@@ -30,19 +30,20 @@ def give_back(database: Database) -> bool:
             return False
     more = free > SLICE_PAGES
     with closing(database.engine.raw_connection()) as connection:
-        # a script, for this is a step a page, and of a statement without rows the driver makes one step
+        # a script, because this takes one step per page and the driver makes only one for a statement without
+        # rows
         connection.cursor().executescript(f"PRAGMA incremental_vacuum({min(free, SLICE_PAGES)})")
         if not more:
-            # the journal goes into the file, which is cut then, as far as nobody reads what is older
+            # moves the journal into the file, which is then truncated, as far as no reader needs older pages
             connection.cursor().execute("PRAGMA wal_checkpoint(PASSIVE)")
     return more
 
 
 def make_shrinkable(database: Database) -> None:
-    """Write a file of an earlier version anew, once, so that its pages can be given back.
+    """Rewrite a file of an earlier version, once, so that its pages can be released.
 
-    Needs as much room again as the file takes. Where there is too little, or another process holds on to the
-    database, the file stays as it is until the next start.
+    This needs as much free space as the file takes. If there is too little, or another process keeps the
+    database open, the file stays as it is until the next start.
     """
     if database.engine.dialect.name != "sqlite":
         return

@@ -1,6 +1,6 @@
-"""The one error tree of the service: an error knows its status, its stable code, the field, the way out.
+"""The error classes of the service: each has a status, a stable code, the field at fault and a hint.
 
-What is the same for every error of a kind stands in its class; whoever raises one adds what is not.
+Values common to all errors of a kind are in the class; the raising code adds the specific ones.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from morphdata.faults import Fault, Pickled
 
 
 class ServiceError(Pickled, Exception):
-    """Root of the tree; carries what a problem document says."""
+    """Base class; carries the contents of a problem document."""
 
     status = 500
     code = "internal_error"
@@ -40,7 +40,7 @@ class ServiceError(Pickled, Exception):
 
     @property
     def headers(self) -> dict[str, str]:
-        """Headers that the answer must carry (RFC 9110, sections 10.2.3 and 11.6.1)."""
+        """Headers required in the response (RFC 9110, sections 10.2.3 and 11.6.1)."""
         headers = {"Retry-After": self.retry_after_s, "WWW-Authenticate": self.challenge}
         return {name: str(value) for name, value in headers.items() if value is not None}
 
@@ -51,22 +51,22 @@ class ServiceError(Pickled, Exception):
 
 
 class InvalidRequest(ServiceError, status=422, code="invalid_request", title="The request is not valid"):
-    """The body, a header or a parameter does not say something that can be done."""
+    """The body, a header or a parameter is invalid."""
 
     @classmethod
     def of(cls, faults: Sequence[Fault]) -> InvalidRequest:
-        """Bundle one or more faults; the first stands at the top."""
+        """Combine one or more faults; the first is the main one."""
         first = faults[0]
         more = f" ({len(faults) - 1} more below)" if len(faults) > 1 else ""
         return cls(first.detail + more, first.pointer, first.hint, tuple(faults))
 
 
 class MalformedBody(ServiceError, status=400, code="malformed_body", title="The body cannot be read"):
-    """The body is not the JSON text that was announced."""
+    """The body is not valid JSON text."""
 
 
 class BodyTooLarge(ServiceError, status=413, code="body_too_large", title="The body is too large"):
-    """More bytes than the service takes."""
+    """The body has more bytes than the service accepts."""
 
     hint = "Send fewer rows (10 ms steps are enough), or upload each flight with POST /trajectories."
 
@@ -77,11 +77,11 @@ class UnsupportedMediaType(
     code="unsupported_media_type",
     title="This kind of content is not supported",
 ):
-    """A body or file of a kind that is not read here."""
+    """A body or file of an unsupported type."""
 
 
 class NotFound(ServiceError, status=404, code="not_found", title="Not found"):
-    """Nothing of the caller's has this name."""
+    """The caller has nothing of this name."""
 
     thing: ClassVar[str] = "resource"
 
@@ -126,7 +126,7 @@ class ArtifactNotFound(ServiceError, status=404, code="artifact_not_found", titl
 
 
 class Conflict(ServiceError, status=409, code="conflict", title="Not possible in this state"):
-    """The thing is not in a state in which this can be done."""
+    """The object's present state does not allow this."""
 
 
 class IdempotencyConflict(
@@ -154,24 +154,24 @@ class JobNotFinished(Conflict, code="job_not_finished", title="The job has not e
 
 
 class ExportFailed(Conflict, code="export_failed", title="The model was not exported"):
-    """The job that writes an exported file has ended without it; reports what the job reports."""
+    """The job that writes an exported file ended without it; passes on the job's error."""
 
     def __init__(self, job_id: str, job_code: str, detail: str, pointer: str, hint: str) -> None:
-        again = f"DELETE /jobs/{job_id} to have it tried again."
+        again = f"DELETE /jobs/{job_id} to let it be tried again."
         super().__init__(detail, pointer, f"{hint} {again}".strip())
         self.code = job_code
         self.job_id = job_id
 
     @property
     def members(self) -> dict[str, Any]:
-        """Where the job is."""
+        """Links of the job."""
         return {"job": f"/jobs/{self.job_id}"}
 
 
 class TooManyWebhooks(Conflict, code="too_many_webhooks", title="There are too many webhooks"):
-    """The owner has as many webhooks as one may have."""
+    """The owner has reached the limit of webhooks."""
 
-    hint = "Delete one that is not needed any more."
+    hint = "Delete one that is no longer needed."
 
 
 class WebhookDisabled(Conflict, code="webhook_disabled", title="The webhook is disabled"):
@@ -212,7 +212,7 @@ class MissingScope(ServiceError, status=403, code="missing_scope", title="The AP
 
 
 class TooManyRequests(ServiceError, status=429, code="too_many_requests", title="Too many requests"):
-    """Too much, too fast; ask again later."""
+    """Too many requests; retry later."""
 
 
 class TooManyRefusals(
@@ -231,19 +231,19 @@ class TooManyRefusals(
 class TooManyStreams(
     TooManyRequests, code="too_many_streams", title="Too many event streams or waiting requests at once"
 ):
-    """The owner follows as many jobs at once as one may."""
+    """The owner has reached the limit of jobs followed at once."""
 
     retry_after_s = 5  # other requests of the owner may have ended by then
 
     @classmethod
     def of_streams(cls, limit: int) -> TooManyStreams:
-        """The owner has as many open event streams as one may have."""
+        """The owner has reached the limit of open event streams."""
         hint = "Close one that is not needed, or read the events a page at a time: Accept: application/json."
         return cls(f"You have {limit} open event streams, which is the limit.", hint=hint)
 
     @classmethod
     def of_waits(cls, limit: int) -> TooManyStreams:
-        """As many of the owner's requests wait for jobs as may."""
+        """The owner has reached the limit of requests waiting for jobs."""
         detail = f"{limit} of your requests are waiting for jobs (Prefer: wait), which is the limit."
         hint = "Send the request without Prefer: wait, or retry when one of them has been answered."
         return cls(detail, hint=hint)
@@ -252,12 +252,12 @@ class TooManyStreams(
 QUOTA_HINTS = {
     "jobs_in_flight": "Wait until a job has ended, or cancel one.",
     "flights_per_day": "Wait until midnight UTC, or use fewer particles, generations or samples.",
-    "stored_bytes": "Delete jobs and flights that are not needed any more.",
+    "stored_bytes": "Delete jobs and flights that are no longer needed.",
 }
 
 
 class QuotaExceeded(TooManyRequests, code="quota_exceeded", title="The API key's quota is used up"):
-    """The key's quota has no room for this."""
+    """The request would exceed the key's quota."""
 
     def __init__(self, quota: str, *, limit: int, used: int, requested: int, retry_after_s: int) -> None:
         self.quota = {"name": quota, "limit": limit, "used": used, "asked": requested}
@@ -280,7 +280,7 @@ class CrossSiteRequest(
     code="cross_site_request",
     title="Requests from pages of other sites are refused",
 ):
-    """A web page of another site made the browser send this."""
+    """A web page of another site made the browser send this request."""
 
     detail = "The request comes from a web page of another site."
     pointer = "#header/Origin"
@@ -290,11 +290,11 @@ class CrossSiteRequest(
 class WrongHost(
     ServiceError, status=421, code="wrong_host", title="The service does not accept this host name"
 ):
-    """The request names a host that this service does not answer for."""
+    """The Host header is not a name of this service."""
 
 
 class HttpError(ServiceError):
-    """Refused by the server or the framework, before any code of this service has seen the request."""
+    """Refused by the server or the framework, before any code of this service saw the request."""
 
     def __init__(self, status: int, code: str, title: str, detail: str = "", hint: str = "") -> None:
         super().__init__(detail or f"{title}.", hint=hint)
@@ -304,7 +304,7 @@ class HttpError(ServiceError):
 class DatabaseAway(
     ServiceError, status=503, code="database_unavailable", title="The database does not answer"
 ):
-    """The database restarts, cannot be reached or is too busy; nothing was promised to the client."""
+    """The database restarts, is unreachable or is too busy; no change was confirmed to the client."""
 
     detail = "The database does not answer at the moment."
     hint = "Repeat the request in a few seconds; with an Idempotency-Key it makes one job at most."
@@ -312,11 +312,11 @@ class DatabaseAway(
 
 
 class StorageFull(ServiceError, status=503, code="storage_full", title="The service's storage is full"):
-    """The database has no room for what the request would store."""
+    """The database has no space for the data of the request."""
 
     detail = "The database is out of disk space; nothing was stored."
     hint = "Delete finished jobs that are not needed, or ask the operator for more disk space."
-    retry_after_s = 60  # people have to make room
+    retry_after_s = 60  # somebody has to free space
 
 
 class SlowBody(ServiceError, status=408, code="slow_body", title="The body did not arrive in time"):
@@ -327,7 +327,7 @@ class SlowBody(ServiceError, status=408, code="slow_body", title="The body did n
 
 
 class ServiceBusy(ServiceError, status=503, code="service_busy", title="The service is busy"):
-    """As many bodies or files are being read as this process can bear."""
+    """This process is already reading as many bodies or files as it can handle."""
 
     hint = "Send the request again in a few seconds."
     retry_after_s = 5

@@ -1,4 +1,4 @@
-"""Identifiers that sort by the time of their making and cannot be guessed."""
+"""Identifiers that sort by creation time and cannot be guessed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RANDOM_CHARACTERS = 16  # 80 bits
 
 
 def base32(number: int, characters: int) -> str:
-    """Write a number in so many characters of Crockford's alphabet, leading zeros included."""
+    """Write a number in a fixed number of characters of Crockford's alphabet, with leading zeros."""
     digits = []
     for _ in range(characters):
         number, digit = divmod(number, 32)
@@ -22,7 +22,7 @@ def base32(number: int, characters: int) -> str:
 def new_identifier(kind: str) -> str:
     """Return ``kind_`` and 26 characters: milliseconds since 1970, then randomness (the layout of ULID).
 
-    The order is for listing only; nothing depends on two clocks agreeing.
+    The order is only used for listing; nothing depends on synchronised clocks.
     """
     milliseconds = time.time_ns() // 1_000_000
     return f"{kind}_{base32(milliseconds, TIME_CHARACTERS)}{base32(secrets.randbits(80), RANDOM_CHARACTERS)}"

@@ -1,11 +1,12 @@
-"""Leased work: a row that one holder may change, for as long as its lease lasts.
+"""Leased work: rows that one holder may change while its lease lasts.
 
 Jobs, chunks of spread jobs and webhook deliveries are each a `LeasedTable`. A claim is a compare-and-set that
-raises the row's fence and sets the end of its lease by the database's clock. Whatever a holder writes is
-conditional on its fence, so one that was asleep, cut off or declared dead changes nothing. Every method takes
-a `Session`, leaves the commit to its caller, and returns None when the row was not as the caller believed.
+raises the row's fence and sets the end of its lease by the database's clock. All writes of a holder are
+conditional on its fence, so a holder that was asleep, cut off or declared dead changes nothing. Every method
+takes a `Session`, leaves the commit to its caller, and returns None when the row was not as the caller
+believed.
 
-What else has to happen when a row changes or ends subscribes here and runs in the same transaction.
+Further actions on a change or end of a row subscribe here and run in the same transaction.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Held(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """What a change means, for its subscribers."""
+    """The meaning of a change, for its subscribers."""
 
     event: str  # type of the event in the row's history
     payload: Mapping[str, Any] | None = None  # content of the event
@@ -57,8 +58,8 @@ class LeasedTable:
     waiting: str  # status of a row that may be claimed
     held: Sequence[str]  # statuses while a claim holds; a claim sets the first
     ends: Collection[str]  # statuses that a row never leaves
-    returning: Sequence[Column[Any]]  # what the methods return of a row
-    unheld: Mapping[str, Any] = field(default_factory=dict)  # columns and values while nobody holds the row
+    returning: Sequence[Column[Any]]  # columns that the methods return
+    unheld: Mapping[str, Any] = field(default_factory=dict)  # columns and values while the row has no holder
     dated: Mapping[str, Any] = field(default_factory=dict)  # columns that every change sets
     noted: Mapping[str, Any] = field(default_factory=dict)  # columns that every change with a `Note` sets
     on_change: list[Subscriber] = field(default_factory=list)  # called after every change with a note
@@ -80,7 +81,7 @@ class LeasedTable:
         return (*self.at(claim.key), *holds)
 
     def lost(self, now: ColumnElement[float]) -> ColumnElement[bool]:
-        """Whether a row's lease ran out before its holder gave it up."""
+        """Whether a row's lease ran out before its holder released it."""
         return self.table.c.status.in_(self.held) & (self.lease < now)
 
     def change(
@@ -126,16 +127,16 @@ class LeasedTable:
         )
 
     def renew(self, session: Session, claim: Held, lease_s: float) -> None:
-        """Let the lease of a claim end `lease_s` from now; one that does not hold any more is left alone."""
+        """Extend the lease of a claim to `lease_s` from now, unless the claim is stale."""
         lease = {self.lease.name: database_time() + lease_s}
         session.execute(update(self.table).where(*self.held_by(claim)).values(lease))
 
     def settle(self, session: Session, claim: Held, *statuses: str, **values: Any) -> LeasedRow | None:
-        """Change the row of a claim that holds, see `held_by`."""
+        """Change the row of a valid claim, see `held_by`."""
         return self.change(session, *self.held_by(claim, *statuses), **values)
 
     def give_back(self, session: Session, claim: Held, **values: Any) -> LeasedRow | None:
-        """Let somebody else claim the row; the attempt is not counted."""
+        """Release the row for other claims; the attempt is not counted."""
         freed = {"status": self.waiting, "attempt": self.table.c.attempt - 1, **self.unheld}
         return self.settle(session, claim, **{**freed, **values})
 
@@ -144,7 +145,7 @@ class LeasedTable:
     ) -> LeasedRow | None:
         """Take a row from a lost holder, with the fence as the reaper saw it.
 
-        The holder writes in vain if it wakes up; any number of reapers may run at once.
+        Later writes of the holder have no effect; any number of reapers may run at once.
         """
         columns = self.table.c
         freed = {"fence": columns.fence + 1, **self.unheld}

@@ -1,4 +1,4 @@
-"""Which hosts are this machine, reached by nobody else."""
+"""Host names and addresses that only this machine can reach."""
 
 from __future__ import annotations
 

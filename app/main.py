@@ -13,7 +13,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app import on_end  # noqa: F401 - the API ends jobs: it cancels them, and its reaper ends some
+from app import on_end  # noqa: F401 - the API ends jobs: by cancelling, and by its reaper
 from app.background_writer import BackgroundWriter
 from app.database import Database, upgrade
 from app.errors import TooManyStreams
@@ -50,7 +50,7 @@ from app.webhooks.endpoints import router as webhooks
 from app.webhooks.sender import SenderSettings, WebhookSender
 from morphdata.version import VERSION
 
-READS_AT_ONCE = 4  # of the event loop's threads, which are five or more; the watchers need some too
+READS_AT_ONCE = 4  # of the event loop's threads, of which there are five or more; the watchers need some too
 
 
 def routed_app() -> FastAPI:
@@ -67,10 +67,10 @@ def routed_app() -> FastAPI:
 def create_app(settings: Settings | None = None, *, sending: SenderSettings | None = None) -> FastAPI:
     """Build the service; database and messages are opened when it starts.
 
-    Settings come from the environment when they are left out, and webhooks are sent as the settings say.
+    Without `settings` they are read from the environment; they also determine whether webhooks are sent.
     """
     chosen = settings or load_settings()
-    if settings is None:  # a process of its own, not a guest in another's
+    if settings is None:  # in its own process, not embedded in another application
         configure_logging(chosen.log_format, chosen.log_level)
     app = routed_app()
     app.router.lifespan_context = partial(
@@ -79,8 +79,9 @@ def create_app(settings: Settings | None = None, *, sending: SenderSettings | No
     install_problem_handlers(app)
     app.add_middleware(HeadAsGet)
     app.add_middleware(BodyLimit, settings=chosen)
-    app.add_middleware(Gate, settings=chosen)  # added last, it stands first: no body is read for a stranger
-    # these see every answer, also of unforeseen errors, which the framework answers outside of its middleware
+    app.add_middleware(Gate, settings=chosen)  # added last, it runs first: no body is read for strangers
+    # these see every response, including those to unexpected errors, which the framework sends outside its
+    # middleware
     inner = app.build_middleware_stack
     app.build_middleware_stack = lambda: RequestId(Observed(SecurityHeaders(inner())))  # type: ignore[method-assign]
     return app
@@ -93,7 +94,7 @@ def _sender_settings(settings: Settings) -> SenderSettings:
 
 
 def _turns(settings: Settings, at_once: int) -> OwnerTurns:
-    """Slots of which one owner leaves one to the others; where everyone is one owner, there are no others."""
+    """Slots of which each owner leaves one to the others, unless there is only one owner."""
     return OwnerTurns(at_once, max(1, at_once - 1) if settings.demands_keys else at_once)
 
 
@@ -147,7 +148,7 @@ async def _running(app: FastAPI, settings: Settings, sending: SenderSettings) ->
 
 @contextmanager
 def _streams_end_with_the_process(watcher: JobWatcher) -> Iterator[None]:
-    """End event streams on SIGTERM and SIGINT: the server waits for open answers before it stops."""
+    """End event streams on SIGTERM and SIGINT: the server waits for open responses before it stops."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,7 +1,7 @@
-"""What else happens in the transaction in which a job changes or ends.
+"""Further actions in the transaction in which a job changes or ends.
 
-The job store knows nothing of counters, quotas, models or webhooks: they subscribe here. A process that
-changes jobs imports this module. The order is one of locks, the same in every process.
+The job store does not depend on counters, quotas, models or webhooks: they subscribe here. Every process that
+changes jobs imports this module. The order determines the order of locks, the same in every process.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The OpenAPI document: what FastAPI makes of the routes, made exact. ``python -m app.openapi`` writes it."""
+"""The OpenAPI document: FastAPI's, with corrections and additions. ``python -m app.openapi`` writes it."""
 
 from __future__ import annotations
 
@@ -46,13 +46,12 @@ HEADERS: dict[int | str, dict[str, Any]] = {
 WITHOUT_DATABASE = frozenset({"/livez"})
 DESCRIPTION = """Fast equivalent models of sweep-morphing flexible aircraft, identified from sample flights.
 
-Long work is a job: the POST answers `202` with a job at once; follow it by `GET /jobs/{id}`
-(`Prefer: wait=30`), by its events, or on the page at `/`. Units are SI and radians, and stand in the names of
-the fields. Every error is a problem document (RFC 9457) with a stable `code`, a `pointer` to the field and a
-`hint`.
+Long work is a job: the POST answers `202` with a job at once; follow it by `GET /jobs/{id}` (`Prefer:
+wait=30`), by its events, or on the page at `/`. Units are SI and radians, and are part of the field names.
+Every error is a problem document (RFC 9457) with a stable `code`, a `pointer` to the field and a `hint`.
 
-A service beyond its own machine demands an API key: `Authorization: Bearer mid_...`. Each operation names the
-scope that the key must have; `GET /me` shows what yours has.
+A service reachable from other machines requires an API key: `Authorization: Bearer mid_...`. Each operation
+names the scope that the key must have; `GET /me` shows the scopes of yours.
 """
 TAGS = [
     *({"name": operation.name, "description": operation.subject} for operation in OPERATIONS),
@@ -85,7 +84,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
 
 
 def _add_shared_errors(document: dict[str, Any]) -> None:
-    """Document what the gate answers before a route is reached, and a database that is away or full."""
+    """Document the gate's responses, and those for a database that is unavailable or full."""
     for path, operations in document["paths"].items():
         outages = () if path in WITHOUT_DATABASE else (DatabaseAway, StorageFull)
         for operation in operations.values():
@@ -110,11 +109,11 @@ def _add_schemas(document: dict[str, Any]) -> None:
 
 
 def document_text() -> str:
-    """Return the document as it is committed."""
+    """Return the document in its committed form."""
     from app.main import routed_app
 
     document = openapi_document(routed_app())
-    # the version comes from the installation; the committed document must not change by it
+    # the version comes from the installation and must not change the committed document
     document["info"]["version"] = "1"
     return json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True) + "\n"
 

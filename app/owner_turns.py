@@ -1,4 +1,4 @@
-"""Shares of owners: how many of something one may have at once, and slots that owners take by turns."""
+"""Fairness between owners: limits per owner, and slots that owners take in turn."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from app.errors import ServiceError
 
 
 class OwnerLimit:
-    """Counts what each owner has; used from one thread (the event loop's).
+    """Counts the use of each owner; called from one thread only (the event loop's).
 
     Parameters
     ----------
     limit : int
         Maximum for one owner.
     refusal
-        Makes the error that says so to an owner.
+        Makes the error raised at the limit.
     """
 
     def __init__(self, limit: int, refusal: Callable[[int], ServiceError]) -> None:
@@ -32,7 +32,7 @@ class OwnerLimit:
 
     @contextmanager
     def place(self, owner: str) -> Iterator[None]:
-        """Have one while the block lasts, or raise the refusal."""
+        """Use one while the block lasts, or raise the refusal."""
         if not self.has_room(owner):
             raise self._refusal(self._limit)
         self._held[owner] += 1
@@ -46,26 +46,26 @@ class OwnerTurns:
     """A semaphore that is fair to owners; used from one thread (the event loop's).
 
     When a slot becomes free, the owner with the fewest slots is next, then the one that was served least
-    recently; inside an owner it is first come, first served.
+    recently; for each owner it is first come, first served.
 
     Parameters
     ----------
     at_once : int
         Slots.
     per_owner : int
-        Slots that one owner may have at once. Below `at_once` some are always free for the others.
+        Maximum number of slots per owner. If below `at_once`, some are always free for others.
     """
 
     def __init__(self, at_once: int, per_owner: int) -> None:
         self._free = at_once
         self._per_owner = per_owner
         self._held: Counter[str] = Counter()
-        # in the order of turns: who was served goes to the end
+        # in the order of turns: an owner that was served moves to the end
         self._waiting: dict[str, deque[asyncio.Future[None]]] = {}
 
     @asynccontextmanager
     async def turn(self, owner: str) -> AsyncIterator[None]:
-        """Wait for a slot and have it while the block lasts."""
+        """Wait for a slot and hold it while the block lasts."""
         await self.take(owner)
         try:
             yield
@@ -73,7 +73,7 @@ class OwnerTurns:
             self.give_back(owner)
 
     async def take(self, owner: str) -> None:
-        """Wait for a slot; whoever got it gives it back."""
+        """Wait for a slot; the caller must give it back."""
         waiter = asyncio.get_running_loop().create_future()
         self._waiting.setdefault(owner, deque()).append(waiter)
         self._serve()
@@ -82,7 +82,7 @@ class OwnerTurns:
         except asyncio.CancelledError:
             if waiter.cancelled():
                 self._forget(owner, waiter)
-            else:  # served at the very moment
+            else:  # served at this very moment
                 self.give_back(owner)
             raise
 

@@ -1,4 +1,4 @@
-"""Pages of a list: newest first, each page's cursor is the id of the last row that was shown."""
+"""Pages of a list, newest first; the cursor is the id of the last row shown."""
 
 from __future__ import annotations
 

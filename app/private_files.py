@@ -1,4 +1,4 @@
-"""Files that hold secrets, readable by nobody else from their first byte: 0600 in folders of 0700."""
+"""Files with secrets, private from their first byte: mode 0600 in folders of mode 0700."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import IO
 
 PRIVATE_FILE = 0o600
 PRIVATE_FOLDER = 0o700
-PRIVATE_UMASK = 0o077  # of processes that write such files by means of their own
+PRIVATE_UMASK = 0o077  # umask of processes that write such files by other means
 OTHERS = 0o077
 
 
 def make_private_folder(path: Path) -> None:
-    """Make a folder, and those above it that are missing, for this user only."""
+    """Make a folder and its missing parents, for this user only."""
     if not path.is_dir():
         make_private_folder(path.parent)
         path.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
 
 
 def touch_private(path: Path) -> None:
-    """Make an empty file for this user only, or close one that exists to other users.
+    """Make an empty file for this user only, or remove other users' access to an existing one.
 
-    One that exists is not opened: closing an SQLite file drops all locks that this process has on it, and
-    another process would take itself for the last one and delete the journal (sqlite.org/howtocorrupt.html).
+    An existing file is not opened: closing an SQLite file drops all locks that this process has on it, and
+    another process would consider itself the last one and delete the journal (sqlite.org/howtocorrupt.html).
     """
     try:
         os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, PRIVATE_FILE))
@@ -38,7 +38,7 @@ def open_private(path: Path, mode: str) -> IO[str]:
 
 
 def close_to_others(path: Path) -> bool:
-    """Close a file or folder of ours to other users; return whether it was open to them."""
+    """Remove other users' access to a file or folder; return whether they had any."""
     found = path.stat()
     if not found.st_mode & OTHERS or found.st_uid != os.geteuid():
         return False

@@ -1,7 +1,7 @@
-"""Settings of the service: options, then ``MORPHID_*`` variables, then defaults; unsafe ones are refused.
+"""Settings of the service: options, then ``MORPHID_*`` variables, then defaults; unsafe settings are refused.
 
-Every process and every command reads them here, so that an option, a variable or a default means the same in
-all of them.
+Every process and every command reads them here, so that options, variables and defaults have the same meaning
+everywhere.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from app.database_address import UnusableAddress, require_usable, sqlite_url
 from app.loopback import is_loopback
 
 PREFIX = "MORPHID_"
-# variables that others read: the command line (where the service is), the examples
+# variables read elsewhere: by the command line (address of the service) and the examples
 NO_SETTINGS = frozenset({"url", "api_key", "search"})
-CLOSE = 0.75  # likeness of a name to a setting's that calls for a question
-# what examples, images and tutorials come with, and what is tried first
+CLOSE = 0.75  # similarity of a name to a setting above which a typing error is suspected
+# passwords of examples, images and tutorials, which attackers try first
 DEFAULT_PASSWORDS = frozenset(
     {"morphid", "postgres", "password", "passwort", "changeme", "secret", "admin", "root", "test"}
 )
 
 
 class UnsafeSettings(ValueError):
-    """The settings contradict one another or would expose the service; the message says what to change."""
+    """The settings are contradictory or would expose the service; the message says what to change."""
 
 
 class Settings(BaseSettings):
-    """Everything that an operator may set; defaults serve one user on one machine."""
+    """Everything that an operator may set; the defaults suit one user on one machine."""
 
     model_config = SettingsConfigDict(
         env_prefix=PREFIX,
-        env_ignore_empty=True,  # `VARIABLE=` in a shell or a compose file means: not set
+        env_ignore_empty=True,  # `VARIABLE=` in a shell or a compose file counts as not set
         extra="forbid",
         frozen=True,
     )
@@ -95,7 +95,7 @@ class Settings(BaseSettings):
         default=2,
         ge=1,
         le=64,
-        description="Uploads and large bodies that are read at once, each by a process.",
+        description="Uploads and large bodies read at once, each by its own process.",
     )
     parser_memory_bytes: int = Field(
         default=512 * 2**20, ge=128 * 2**20, description="Memory of each of these processes."
@@ -218,7 +218,7 @@ class Settings(BaseSettings):
 
     @property
     def names_broker(self) -> bool:
-        """Whether the operator said where the broker is; `morphid serve` brings one otherwise."""
+        """Whether the operator configured a broker; otherwise `morphid serve` starts one."""
         return "broker_url" in self.model_fields_set
 
     @property
@@ -238,13 +238,13 @@ class Settings(BaseSettings):
 
 
 def _listed(text: str) -> frozenset[str]:
-    """Names that stand in `text` with commas between."""
+    """Names in a comma-separated text."""
     names = (name.strip().lower() for name in text.split(","))
     return frozenset(name for name in names if name)
 
 
 def _found_from_everywhere(folder: Path) -> Path:
-    """Give a folder in full: ``~`` is the home folder, and ``~name`` a folder where nobody has that name."""
+    """Expand a folder: ``~`` is the home folder; ``~name`` is a plain folder if no user has that name."""
     try:
         return folder.expanduser().resolve()
     except RuntimeError:
@@ -256,7 +256,7 @@ def _found_from_everywhere(folder: Path) -> Path:
 
 
 def doubtful_variables(environment: Mapping[str, str] = os.environ) -> Iterator[str]:
-    """Give a sentence for each ``MORPHID_...`` variable that is no setting but is nearly called like one."""
+    """Return a message for each ``MORPHID_...`` variable that is not a setting but resembles one."""
     known = Settings.model_fields.keys() | NO_SETTINGS
     for name in sorted(environment):
         bare = name.lower().removeprefix(PREFIX.lower())
@@ -268,12 +268,12 @@ def doubtful_variables(environment: Mapping[str, str] = os.environ) -> Iterator[
 
 
 def load_settings(**overrides: object) -> Settings:
-    """Read the environment, with `overrides` on top; one that is None was not given.
+    """Read the environment, overridden by `overrides` that are not None.
 
     Raises
     ------
     UnsafeSettings
-        With one sentence per problem, fit to be printed to the operator.
+        With one sentence per problem, suitable for the operator.
     """
     try:
         given = {name: value for name, value in overrides.items() if value is not None}
@@ -288,7 +288,7 @@ def load_settings(**overrides: object) -> Settings:
 
 
 def settings_or_exit(**overrides: object) -> Settings:
-    """Read the settings of a process that an operator started; refused ones end it with a sentence."""
+    """Read the settings of a process started by an operator; exit with a message if they are refused."""
     try:
         return load_settings(**overrides)
     except UnsafeSettings as error:

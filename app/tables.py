@@ -32,7 +32,7 @@ metadata = MetaData(
 
 STATUSES = ("queued", "running", "cancelling", "succeeded", "failed", "cancelled", "expired")
 CHUNK_STATUSES = ("open", "running", "done")
-ZERO = text("0")  # what rows that are older than a column count as
+ZERO = text("0")  # default for rows older than a column
 
 
 def _one_of(statuses: tuple[str, ...]) -> CheckConstraint:
@@ -49,55 +49,55 @@ jobs = Table(
     Column("operation", String(32), nullable=False),
     Column("status", String(16), nullable=False),
     Column("priority", Integer, nullable=False),
-    Column("summary", JSON, nullable=False),  # small: what the listing shows of the request
+    Column("summary", JSON, nullable=False),  # small: the part of the request shown in lists
     Column("progress", JSON),
     Column("error", JSON),
     Column("attempt", Integer, nullable=False),
     Column("max_attempts", Integer, nullable=False),
-    # rises with every claim; a write with an old one changes nothing
+    # rises with every claim; writes with an old one have no effect
     Column("fence", Integer, nullable=False),
     Column("worker", String(128)),
     Column("lease_until", Double),
-    Column("event_seq", Integer, nullable=False),  # the last event's number
+    Column("event_seq", Integer, nullable=False),  # number of the last event
     Column("model_id", String(64)),
-    Column("partial", Boolean, nullable=False),  # the stored result is the best so far, not the end
+    Column("partial", Boolean, nullable=False),  # the stored result is the best so far, not the final one
     Column("max_seconds", Double),
-    Column("deadline_at", Double),  # before the first claim: when it must have begun; then: when it must end
+    Column("deadline_at", Double),  # before the first claim: latest start; afterwards: latest end
     Column("published_at", Double, nullable=False),  # when a wake-up message was last handed out
     Column("created_at", Double, nullable=False),
     Column("started_at", Double),
     Column("updated_at", Double, nullable=False),
     Column("finished_at", Double),
-    Column("key_id", String(64)),  # the API key that posted it; None where keys are off
-    Column("request_id", String(64)),  # of the call that posted it: leads from its logs to the worker's
+    Column("key_id", String(64)),  # the API key that posted it; None if keys are off
+    Column("request_id", String(64)),  # of the call that posted it, to connect its logs with the worker's
     Column("traceparent", String(128)),  # W3C trace context of that call
-    Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work lies in job_chunks
+    Column("spread", Boolean, nullable=False, server_default=text("FALSE")),  # its work is in job_chunks
     Column("flights_estimated", BigInteger, nullable=False, server_default=ZERO),  # charged until it ends
     Column("flights", BigInteger, nullable=False, server_default=ZERO),  # flown so far
     # request, result, files; events too at the end
     Column("size_bytes", BigInteger, nullable=False, server_default=ZERO),
-    Column("label", String(100)),  # the owner's own word, to find the job again
+    Column("label", String(100)),  # chosen by the owner, to find the job again
     _one_of(STATUSES),
     Index("ix_jobs_owner_id", "owner", "id"),
-    # a list is the owner's, newest first: whatever it is filtered by, the rows of a page lie side by side
+    # lists are per owner, newest first: with any filter, the rows of a page are adjacent in the index
     Index("ix_jobs_owner_status_id", "owner", "status", "id"),
     Index("ix_jobs_owner_operation_status_id", "owner", "operation", "status", "id"),
     Index("ix_jobs_owner_label_id", "owner", "label", "id"),
     Index("ix_jobs_owner_created_at_id", "owner", "created_at", "id"),
     Index("ix_jobs_status_published_at", "status", "published_at"),
     Index("ix_jobs_status_lease_until", "status", "lease_until"),
-    Index("ix_jobs_status_finished_at", "status", "finished_at"),  # retention, and how long jobs take
+    Index("ix_jobs_status_finished_at", "status", "finished_at"),  # for retention and for durations of jobs
     Index("ix_jobs_key_id_status", "key_id", "status"),  # what a key has in flight
 )
 
-# whose turn, which job: the most urgent first, then the oldest
+# for turns: the most urgent job first, then the oldest
 Index("ix_jobs_status_owner_priority_id", jobs.c.status, jobs.c.owner, jobs.c.priority.desc(), jobs.c.id)
 
 owners = Table(
     "owners",
     metadata,
     Column("owner", String(64), primary_key=True),
-    # when a worker last took a job of theirs
+    # when a worker last took one of their jobs
     Column("served_at", Double, nullable=False, server_default=ZERO),
 )
 
@@ -151,11 +151,11 @@ job_chunks = Table(
     Column("owner", String(64), nullable=False),
     Column("status", String(16), nullable=False),
     Column("attempt", Integer, nullable=False),
-    Column("fence", Integer, nullable=False),  # of this chunk: rises with every claim
+    Column("fence", Integer, nullable=False),  # of this chunk; rises with every claim
     Column("worker", String(128)),
     Column("lease_until", Double),
     Column("task", LargeBinary, nullable=False),  # what to fly
-    Column("outcome", LargeBinary),  # what came of it; stored once
+    Column("outcome", LargeBinary),  # the outcome; stored once
     Column("at", Double, nullable=False),
     _one_of(CHUNK_STATUSES),
     Index("ix_job_chunks_status_owner_job_id", "status", "owner", "job_id"),
@@ -223,8 +223,10 @@ api_keys = Table(
     Column("id", String(64), primary_key=True),
     Column("owner", String(64), nullable=False, index=True),  # keys of one owner see the same jobs
     Column("name", String(64), nullable=False),
-    Column("prefix", String(16), nullable=False, unique=True),  # the part of the key that may be shown
-    Column("secret_sha256", String(64), nullable=False),  # the rest has 256 random bits: no slow hash needed
+    Column("prefix", String(16), nullable=False, unique=True),  # the public part of the key
+    Column(
+        "secret_sha256", String(64), nullable=False
+    ),  # of the secret, 256 random bits: no slow hash needed
     Column("scopes", JSON, nullable=False),
     Column("max_jobs_in_flight", Integer),  # None: no limit
     Column("max_flights_per_day", BigInteger),
@@ -267,12 +269,12 @@ webhooks = Table(
     Column("url", String(2000), nullable=False),
     Column("destination", String(300), nullable=False, server_default=""),  # scheme, host and port of the url
     Column("events", JSON, nullable=False),  # event types that are sent
-    Column("secret", String(128), nullable=False),  # signing needs it in clear; shown once, when it is made
-    Column("failures", Integer, nullable=False),  # tries that failed, one after the other
-    # of the destination, and so the same in every row of one owner's webhooks to it
-    Column("sending_until", Double, nullable=False, server_default=ZERO),  # lease of the try under way
+    Column("secret", String(128), nullable=False),  # signing needs it in plain text; shown once, on creation
+    Column("failures", Integer, nullable=False),  # consecutive failed tries
+    # of the destination; the same in all rows of one owner's webhooks to it
+    Column("sending_until", Double, nullable=False, server_default=ZERO),  # lease of the try in progress
     Column("paused_until", Double, nullable=False, server_default=ZERO),  # after a failure
-    Column("verified_at", Double),  # when the receiver answered the challenge; None: nothing else is sent
+    Column("verified_at", Double),  # when the receiver answered the challenge; if None, nothing else is sent
     Column("disabled_at", Double),
     Column("disabled_reason", String(200)),
     Column("created_at", Double, nullable=False),
@@ -290,7 +292,7 @@ webhook_deliveries = Table(
     Column("status", String(16), nullable=False),  # waiting, delivered, given_up
     Column("attempt", Integer, nullable=False),
     Column("fence", Integer, nullable=False),  # rises with every claim by a sender
-    Column("next_at", Double),  # when to try, or until when a sender holds it; None at its end
+    Column("next_at", Double),  # time of the next try, or end of a sender's lease; None when finished
     Column("response_status", Integer),
     Column("error", String(300)),
     Column("created_at", Double, nullable=False),
@@ -310,9 +312,9 @@ workers = Table(
     Column("slots", Integer, nullable=False),  # jobs it can run at once
     Column("busy", Integer, nullable=False),
     Column("started_at", Double, nullable=False),
-    Column("seen_at", Double, nullable=False, index=True),  # when it last showed that it takes jobs
-    Column("stopped_at", Double),  # it ended as it should
-    Column("process", String(128)),  # as `app.health.presence` names it
+    Column("seen_at", Double, nullable=False, index=True),  # last sign of life
+    Column("stopped_at", Double),  # it shut down regularly
+    Column("process", String(128)),  # identity from `app.health.presence`
 )
 
 counters = Table(

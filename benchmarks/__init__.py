@@ -1,5 +1,5 @@
-"""Benchmarks of this machine: speed, operations, memory, start, all beside what they must hold.
+"""Benchmarks of this machine: speed, operations, memory and start-up, next to their required bounds.
 
-They stay in a checkout. Everything in one run (run.py), each figure in its own module, interleaved where
-figures are compared.
+They are not part of the installed package. One run (run.py) does everything, each figure has its own module,
+and compared figures are measured in alternation.
 """

@@ -1,4 +1,4 @@
-"""MuJoCo on the same tree without air, at equal error: what one flight costs there and here."""
+"""MuJoCo on the same tree without air, at equal error: cost of one flight in both programs."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ MAX_STEPS = 4000  # in OUTPUT_S; a scheme that needs more is left out
 def against_mujoco(bench: Bench) -> Figures:
     """Time of one flight in MuJoCo's best integrator over ours, alone and in a batch, on one core.
 
-    Each program and integrator flies the longest step that holds its attitude to ERROR_RAD. MuJoCo's model
-    is compiled before and its calls to ``mj_step`` alone are timed; our time includes laying out the
-    parameters. ``agreement_rad`` : between both converged flights.
+    Each program and integrator uses the longest step that keeps its attitude within ERROR_RAD. MuJoCo's model
+    is compiled beforehand and only its calls to ``mj_step`` are timed; our time includes laying out the
+    parameters. ``agreement_rad`` : difference between both converged flights.
     """
     try:
         from benchmarks.mujoco_tree import INTEGRATORS, ForcedMujoco, quiet
@@ -62,7 +62,7 @@ def against_mujoco(bench: Bench) -> Figures:
     alone = min_steps(lambda n: attitude_error(_attitudes(model, guess, n), reference))
     together = min_steps(lambda n: attitude_error(_attitudes(model, judged, n), judged_reference))
     if alone is None or together is None or not able:
-        raise RuntimeError("a scheme does not hold the attitude in any step")
+        raise RuntimeError("a scheme does not meet the tolerance with any step")
     ours = {"single": (guess, OUTPUT_S / alone), "batch": (swarm, OUTPUT_S / together)}
     times: dict[str, list[float]] = {name: [] for name in (*able, *ours)}
     use_threads(1)
@@ -94,7 +94,7 @@ def against_mujoco(bench: Bench) -> Figures:
 
 
 def min_steps(error: Callable[[int], float]) -> int | None:
-    """Least number of steps in OUTPUT_S whose error is below ERROR_RAD; None: none is.
+    """Smallest number of steps in OUTPUT_S whose error is below ERROR_RAD; None if there is none.
 
     Doubles until the error holds and halves the interval then; an error that is no number does not hold.
     """

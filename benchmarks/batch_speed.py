@@ -1,4 +1,4 @@
-"""The swarm through the three flights of constant rate: on one core, and what a second thread brings."""
+"""The swarm through the three flights of constant rate, on one core and with a second thread."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def batch_speed(bench: Bench) -> Figures:
 
     Per core and second means per second that a core computes: other processes on the machine do not count.
     Two threads are judged twice: by the wall, and by their computing times, which stand where the machine is
-    shared. A generation is what a search asks for: trims, flights, errors.
+    shared. A generation is the work that a search requests: trims, flights, errors.
     """
     model = chain_model(bench.aircraft, bench.flight, LINKS)
     cases = bench.cases(model, RATE_SAMPLES)

@@ -19,7 +19,7 @@ COMPARISONS = ("lt", "le", "gt", "ge", "eq", "ne")
 class Counted(float):
     """A float whose arithmetic is counted into the tally that is current, and gives such floats again.
 
-    Negation is not counted: on the machine it changes a sign, mostly as part of the operation beside it.
+    Negation is not counted: on the machine it only changes a sign, mostly as part of another operation.
     """
 
     __slots__ = ()

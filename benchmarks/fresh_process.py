@@ -19,7 +19,7 @@ def in_fresh_process(function: str, *arguments: Any, environment: Mapping[str, s
     Raises
     ------
     RuntimeError : the process failed; with the end of what it said.
-    Interrupted : it failed and the surrounding `stoppable` block asks for the end.
+    Interrupted : it failed and the surrounding `stoppable` block requests a stop.
     """
     module, _, name = function.partition(":")
     program = (

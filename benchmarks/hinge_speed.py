@@ -1,6 +1,6 @@
-"""What the number of hinges costs the batch: the same swarm on wings of one, two and three hinges, in turn.
+"""Cost of the number of hinges: the same swarm on wings of one, two and three hinges, in turn.
 
-A surface's hinges are composed once for all lanes, so that the batch should not notice them.
+A surface's hinges are composed once for all lanes, so they should not slow down the batch.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 
-from benchmarks.doors import KernelClock
+from benchmarks.entry_points import KernelClock
 from benchmarks.operations import flight_operations
 from benchmarks.setting import LINKS, Bench, Figures
 from benchmarks.swarm import flown
@@ -20,9 +20,9 @@ MODELS = {"batch": 8 * TOGETHER, "single": 1}
 def kernel_alone(bench: Bench) -> Figures:
     """Cost of a simulated second of one model inside the kernel; share of the kernel in the whole flight.
 
-    ``lanes_gain`` : one lane's cost over that in company; as many as the lanes of a vector register where
-    lanes are vector instructions, near 1 where the compiler left them scalar. ``operations_per_s`` : of the
-    kernel in company, additions and multiplications.
+    ``lanes_gain`` : cost of a single lane over the cost per lane in a batch; the number of lanes of a vector
+    register if lanes became vector instructions, near 1 if the compiler left them scalar.
+    ``operations_per_s`` : additions and multiplications of the kernel in a batch.
     """
     model = chain_model(bench.aircraft, bench.flight, LINKS)
     prepared, duration_s = {}, bench.samples[SAMPLE].duration_s

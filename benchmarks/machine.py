@@ -1,4 +1,4 @@
-"""The machine that is measured."""
+"""The measured machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from morphcore.paper.provenance import processor_name
 
 
 def machine() -> Figures:
-    """What a figure depends on beside the code."""
+    """What a figure depends on besides the code."""
     return {
         "processor": processor_name(),
         "cores": os.cpu_count(),
@@ -21,6 +21,6 @@ def machine() -> Figures:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "numba": numba.__version__,
-        # unless 1, linear algebra on threads of its own fights with ours for the cores
+        # unless 1, the threads of linear algebra compete with ours for the cores
         "openblas_num_threads": os.environ.get("OPENBLAS_NUM_THREADS"),
     }

@@ -49,14 +49,14 @@ def generation_memory(samples_dir: str, particles: int, longer: int, more_rows: 
     warm_up()
     samples = [stretched(bench.samples[name], longer, more_rows) for name in RATE_SAMPLES]
     costs(model, benchmark_swarm(model, WARM), sample_cases(model, samples[:1]), "trim")
-    FORGET.write_text("5", "ascii")  # the peak begins anew
+    FORGET.write_text("5", "ascii")  # resets the recorded peak
     before = _status("VmRSS")
     costs(model, benchmark_swarm(model, particles), sample_cases(model, samples), "trim")
     return {"before_mb": before, "beyond_mb": _status("VmHWM") - before}
 
 
 def stretched(sample: Trajectory, longer: int, more_rows: int) -> Trajectory:
-    """The same motion so many times slower, in so many times the rows."""
+    """The same motion, slowed down and with more rows by the given factors."""
     rows = more_rows * (sample.time_s.size - 1) + 1
     at = np.linspace(sample.time_s[0], sample.time_s[-1], rows)
     begin = sample.time_s[0]

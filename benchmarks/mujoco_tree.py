@@ -94,13 +94,13 @@ class ForcedMujoco:
             mujoco.mj_step(self.model, self.data, nstep=every)
             kept.append(self.data.qpos[3:7].copy())
         found = np.array(kept)
-        # MuJoCo begins anew where its state has become too large
+        # MuJoCo resets itself when its state has become too large
         return found if not self.data.warning.number.any() else np.full_like(found, np.nan)
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Within, MuJoCo does not write of flights that diverge: they are looked for."""
+    """Suppress MuJoCo's warnings about diverging flights inside the block: they are expected."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(_ignore)
     try:

@@ -1,4 +1,4 @@
-"""How many floating-point operations one step of one flight takes: the same on every machine.
+"""Number of floating-point operations of one step of one flight: the same on every machine.
 
 The kernels run as plain Python on numbers that count (counted.py). Seconds depend on the machine and on who
 else uses it; these figures depend on the source alone, so a change that costs ten per cent shows as just
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.counted import Counted, CountedMath, Tally, counted_array
-from benchmarks.doors import flight_kernels, kernel_modules, python_kernels, replaced
+from benchmarks.entry_points import flight_kernels, kernel_modules, python_kernels, replaced
 from benchmarks.setting import Bench, Figures
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import chain_model, physical_guess
@@ -75,7 +75,7 @@ def operations(bench: Bench, links: tuple[int, ...] = ALL_LINKS) -> Figures:
 
 
 def structural_growth(found: Figures) -> float:
-    """What the dearest further link costs over what the second one costs, of the structural part.
+    """Cost of the most expensive further link over that of the second one, structural part only.
 
     1 where cost grows linearly: a first link, which has no gimbal, is cheaper than the others.
     """
@@ -125,7 +125,7 @@ def counting(meter: Meter) -> Iterator[None]:
     """Within, flights of simulate/batch.py are also flown by plain Python kernels on counting numbers.
 
     Every kernel's name in every module of kernels is given its Python function instead of the compiled one;
-    compiled flights go on beside, so that whoever flies gets real numbers.
+    compiled flights still run as well, so that callers get real numbers.
     """
     kernels = python_kernels()
     changes: list[tuple[ModuleType, str, object]] = []

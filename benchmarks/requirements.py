@@ -1,4 +1,4 @@
-"""What the figures must hold: the project's promises about speed, beside what was measured."""
+"""The requirements on the figures: the project's promises about speed, next to the measured values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.setting import Figures
 class Requirement:
     """A bound on one figure.
 
-    path : where it stands in the figures, keys joined by "/". bound, at_least : least or largest value.
+    path : its keys in the figures, joined by "/". bound, at_least : limit, and whether it is a minimum.
     """
 
     path: str

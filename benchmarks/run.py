@@ -61,7 +61,7 @@ SECTIONS: Mapping[str, Section] = {
     "start_up": lambda bench: {"start_up": {**first_generation(bench.folder), "import": import_times()}},
     "compilation": lambda _: {"compilation": cold_compilation()},
 }
-SLOW_SECTIONS = frozenset({"flexible", "work_precision", "compilation"})  # left out of a quick run
+SLOW_SECTIONS = frozenset({"flexible", "work_precision", "compilation"})  # omitted from a quick run
 
 
 def run_benchmarks(
@@ -91,7 +91,7 @@ def run_benchmarks(
     Raises
     ------
     InvalidInput : the example flights are not there, or there is no such section.
-    Interrupted : the surrounding `stoppable` block says so.
+    Interrupted : the surrounding `stoppable` block requests a stop.
     """
     chosen = (
         tuple(s for s in SECTIONS if not (quick and s in SLOW_SECTIONS)) if sections is None else sections
@@ -101,7 +101,7 @@ def run_benchmarks(
         raise InvalidInput(
             f"there is no benchmark {unknown[0]!r}",
             pointer="/sections",
-            hint=f"choose of {', '.join(SECTIONS)}",
+            hint=f"choose from {', '.join(SECTIONS)}",
         )
     bench = bench_of(effort or (QUICK if quick else FULL), samples_dir, clock=clock, computing=computing)
     try:

@@ -1,4 +1,4 @@
-"""How many flights each search needs: to J within a share of the best known, over many seeds."""
+"""Number of flights that each search needs to bring J within a share of the best known, over many seeds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from morphdata.identify import EquivalentModel, Search
 
 WITHIN = 0.1  # of the best known J: there a search has arrived
 # "scattered" is "least_squares" from points drawn around the physical guess: a descent from the guess itself
-# draws nothing, so its seeds would show nothing
+# draws nothing, so its seeds would have no effect
 METHODS = ("hybrid", "least_squares", "scattered", "cma", "pso", "paper")
 MEASURED = ("hybrid", "scattered")  # of a benchmark: the default, and what depends on where it starts
 
@@ -102,7 +102,7 @@ def search_figures(
 def search_benchmark(bench: Bench) -> Figures:
     """The default search and descents from scattered points on the three flights, on all threads.
 
-    Beside the methods' figures: arrived_share, flight_sets_to_target (the worst of all runs) and
+    In addition to the methods' figures: arrived_share, flight_sets_to_target (the worst of all runs) and
     wall_s_to_target (their median), the latter two of those runs that arrive.
     """
     use_threads(bench.threads)

@@ -1,4 +1,4 @@
-"""The stage of the equivalent model, called from Python and counted: what all candidate steppers share.
+"""The stage of the equivalent model, called from Python and counted, shared by all candidate steppers.
 
 A stage is what costs time: one pass root -> tips, one lattice product, one articulated-body pass.
 """
@@ -45,7 +45,7 @@ SAME_TIME_S = 1e-9  # times closer than that are one
 
 @dataclass(frozen=True)
 class Moment:
-    """What the stage of one time reads: operator, strips, hinges and wind."""
+    """Inputs of the stage at one time: operator, strips, hinges and wind."""
 
     operator: Array
     strips: Array

@@ -1,4 +1,4 @@
-"""The figures as lines to print: what, its value, and what it must be."""
+"""The figures as lines to print: description, value and requirement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from morphcore.lanes import TOGETHER
 
 
 class Line(NamedTuple):
-    """One line; ``must`` is empty where nothing is asked."""
+    """One line; ``must`` is empty if there is no requirement."""
 
     what: str
     value: str
@@ -68,7 +68,7 @@ def _threads(figures: Figures) -> Iterator[Line]:
     if "serial_share" in threads:
         path = "threads/speed_up_by_computing_time"
         value = f"{threads['speed_up_by_computing_time']:.2f} x"
-        yield Line("by computing time, if nobody else used the cores", value, _must(figures, path, unit=" x"))
+        yield Line("by computing time, as on otherwise idle cores", value, _must(figures, path, unit=" x"))
         yield Line("of it on the calling thread alone", f"{100 * threads['serial_share']:.2g} %")
         yield Line("computing on two threads over that on one", f"{threads['work_growth']:.3g} x")
 
@@ -79,7 +79,7 @@ def _kernel(figures: Figures) -> Iterator[Line]:
         cost, share = kernel["s_per_simulated_s"][name], kernel["share_of_flight"][name]
         yield Line(f"the kernel of flight, a simulated second of {text}", f"{1e3 * cost:.3g} ms")
         yield Line("share of the kernel in the flight", f"{100 * share:.3g} %")
-    yield Line(f"alone over in {TOGETHER} lanes", f"{kernel['lanes_gain']:.2g} x")
+    yield Line(f"single lane over {TOGETHER} lanes", f"{kernel['lanes_gain']:.2g} x")
     yield Line("floating-point operations a second in lanes", f"{1e-9 * kernel['operations_per_s']:.3g} G/s")
 
 

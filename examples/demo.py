@@ -1,4 +1,4 @@
-"""The whole way: start the service, post the example flights, watch the job, show, judge and save the result.
+"""The whole workflow: start the service, post the example flights, watch the job, show and save the result.
 
 One flight is held out: the model is judged by how well it predicts that one. Run by ``make demo``.
 Everything it writes is in ``demo-output/``.
@@ -44,7 +44,7 @@ def sample(name: str, role: str) -> dict[str, Any]:
 
 
 def request() -> dict[str, Any]:
-    """Ask for an equivalent model with three links per wing, fitted to two flights and tested on a third."""
+    """Request an equivalent model with three links per wing, fitted to two flights and tested on a third."""
     return {
         "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text("utf-8")),
         "flight": json.loads((EXAMPLES / "flight.json").read_text("utf-8")),
@@ -56,11 +56,14 @@ def request() -> dict[str, Any]:
 
 @contextmanager
 def service() -> Iterator[str]:
-    """Run ``morphid serve`` on a free port while the block runs; give its address."""
+    """Run ``morphid serve`` on a free port while the block runs; yield its address."""
     command = [sys.executable, "-m", "morphid.main", "serve", "--json", "--port", str(free_port(8000))]
     process = subprocess.Popen(
         [*command, "--data-dir", str(OUTPUT / "service")],
-        env={**os.environ, "MORPHID_WEBHOOK_DIAL_ONLY": "127.0.0.1"},  # a demonstration calls nobody
+        env={
+            **os.environ,
+            "MORPHID_WEBHOOK_DIAL_ONLY": "127.0.0.1",
+        },  # a demonstration contacts no other hosts
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -72,14 +75,14 @@ def service() -> Iterator[str]:
                 yield event["url"]
                 break
         else:
-            raise SystemExit("the service did not start; it said above why")
+            raise SystemExit("the service did not start; see its messages above")
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate()
 
 
 def judge(console: Console, result: dict[str, Any]) -> None:
-    """Print warnings, verdict and what to do next."""
+    """Print warnings, verdict and the suggested next step."""
     for warning in result.get("warnings") or ():
         console.print(f"Warning: {warning['message']}; {warning['hint']}.", style="yellow", markup=False)
     use = (
@@ -91,7 +94,7 @@ def judge(console: Console, result: dict[str, Any]) -> None:
 
 
 def shown(path: Path) -> str:
-    """Give a path as it is from where ``make demo`` runs."""
+    """Return a path relative to where ``make demo`` runs."""
     return str(path.relative_to(EXAMPLES.parent))
 
 

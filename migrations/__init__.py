@@ -1,3 +1,3 @@
 """Database migrations (Alembic); `app.database.upgrade` runs them."""
 
-HEAD = "0005"  # the newest revision, told here so that a start can see that there is nothing to do
+HEAD = "0005"  # the newest revision, so that a start can see whether there is anything to do

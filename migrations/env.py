@@ -1,4 +1,4 @@
-"""Run migrations in one transaction, alone: processes that start together wait for one another."""
+"""Run migrations in one transaction under a lock: processes that start together wait for one another."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from sqlalchemy import text
 from app.database import BEGIN_OPTION, make_engine
 from app.tables import metadata
 
-MIGRATION_LOCK = 0x4D4F5250  # "MORP": Postgres advisory lock of whoever migrates
+MIGRATION_LOCK = 0x4D4F5250  # "MORP": Postgres advisory lock held during migrations
 
 
 def database_url() -> str:
-    """The URL handed in by `app.database`, or the settings' when Alembic is called by hand."""
+    """The URL passed by `app.database`, or that of the settings when Alembic is called by hand."""
     url = context.config.attributes.get("url")
     if url is None:
         from app.settings import load_settings
@@ -27,7 +27,7 @@ def run() -> None:
     try:
         with engine.execution_options(**{BEGIN_OPTION: "IMMEDIATE"}).begin() as connection:
             if connection.dialect.name == "postgresql":
-                # who waits for another's migration, or rewrites a large table, may take longer than a request
+                # waiting for another migration, or rewriting a large table, may take longer than a request
                 connection.execute(text("SET LOCAL statement_timeout = 0"))
                 connection.execute(text("SET LOCAL lock_timeout = 0"))
                 connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": MIGRATION_LOCK})

@@ -1,7 +1,7 @@
 """MorphID's numeric library: equivalent models of sweep-morphing aircraft from sample flights.
 
-The functions ``identify``, ``simulate`` and ``export`` share their names with the rooms that hold them, and
-win: import what lies inside a room by ``from morphcore.identify.settings import ...``.
+The functions ``identify``, ``simulate`` and ``export`` share their names with the packages that hold them and
+take precedence: import from inside such a package by ``from morphcore.identify.settings import ...``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 _collecting = gc.isenabled()
-gc.disable()  # the imports leave no garbage, and looking for it takes a twentieth of their time
+gc.disable()  # the imports create no garbage, and collecting it would take a twentieth of their time
 try:
     from morphcore.export.formats import export
     from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
@@ -56,7 +56,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import what not everyone needs when it is first used."""
+    """Import rarely needed names on first use."""
     if name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_LATE[name]), name)

@@ -1,4 +1,4 @@
-"""The errors of the numeric library: each carries data and a sentence that says what to do."""
+"""The errors of the numeric library; each carries data and a hint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["FlightDiverged", "InvalidInput", "MorphError", "NotFlyable", "TrimNo
 
 
 class NotFlyable(MorphError):
-    """There is no answer that flies: the best that was found diverges, or has no trim."""
+    """No flyable answer: the best one found diverges, or has no trim."""
 
     code = "not_flyable"
 
@@ -35,7 +35,7 @@ class TrimNotFound(NotFlyable):
 
 
 class FlightDiverged(NotFlyable):
-    """The integration left the domain in which the model means anything.
+    """The integration left the domain in which the model is valid.
 
     Parameters
     ----------

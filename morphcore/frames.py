@@ -1,6 +1,6 @@
-"""Rotations between frames: quaternions inside, Euler angles (z-y-x) at the doors.
+"""Rotations between frames: quaternions internally, Euler angles (z-y-x) at the API.
 
-``R_NB`` takes components in B (body, forward-right-down) to components in N (north-east-down): ``v_N = R_NB @
+``R_NB`` maps components in B (body, forward-right-down) to components in N (north-east-down): ``v_N = R_NB @
 v_B``. Quaternions are ``(w, x, y, z)`` and describe ``R_NB``. All functions broadcast over leading axes.
 Source: Stevens, Lewis & Johnson (2016), section 1.3 and 1.8.
 """

@@ -2,13 +2,13 @@
 
 - ``error_model="numpy"``: division by zero gives inf instead of raising; the check would keep the compiler
   from turning lane loops into vector instructions.
-- ``fastmath`` holds nothing that changes a rounding. With contraction to fused multiply-add, results depended
-  in their last bits on what had been inlined into what, hence on whether code came from the compiler or its
-  cache; and it gained nothing measurable. ``nnan`` and ``ninf`` are left out too: a diverged flight must stay
-  recognisable as such.
-- ``nogil``: kernels run side by side in plain threads, and heartbeats and cancellation go on beside them.
-- ``cache``, of entries: compiled code is kept in ``NUMBA_CACHE_DIR``, beside the source, or in a home folder.
-- ``boundscheck=False``: shapes are checked once, in the typed shells.
+- ``fastmath`` contains no flag that changes rounding. With contraction to fused multiply-add, the last bits
+  of results depended on inlining, hence on whether code came from the compiler or its cache, without
+measurable gain. ``nnan`` and ``ninf`` are omitted too: a diverged flight must stay recognisable as such.
+- ``nogil``: kernels run in parallel in plain threads, and heartbeats and cancellation continue meanwhile.
+- ``cache``, for entries: compiled code is kept in ``NUMBA_CACHE_DIR``, next to the source, or in a home
+  folder.
+- ``boundscheck=False``: shapes are checked once, in the typed interfaces.
 
 With ``NUMBA_DISABLE_JIT=1`` every kernel runs as plain Python and passes the same tests.
 """
@@ -36,36 +36,36 @@ except ImportError:  # not on Windows
 
 log = logging.getLogger(__name__)
 
-NO_CACHE = "no locator available"  # numba's words where it finds no folder for compiled code
+NO_CACHE = "no locator available"  # numba's message when it finds no folder for compiled code
 FAST_MATH = {"nsz"}
 
 
 class _PartOfEntries(JITCodeLibrary):
-    """The code of a kernel that only kernels call, for the linker: it is optimised with the entries.
+    """Linkable code of a kernel that only kernels call; it is optimised together with the entries.
 
-    Numba would optimise it, with all that it calls, and make machine code of it that nobody runs, at every
-    level of the calls; that is a quarter of the compiler's time.
+    Numba would optimise it, with everything it calls, and generate machine code that is never run, at every
+    level of the calls; that takes a quarter of the compiler's time.
     """
 
     def _optimize_final_module(self) -> None:
         """Leave the optimisation to the entries."""
 
     def _finalize_final_module(self) -> None:
-        """Make no machine code."""
+        """Generate no machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
-    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002 - there are no functions to call
-        """No address, as numba has it for a function without a wrapper for Python."""
+    def get_pointer_to_function(self, name: str) -> int:  # noqa: ARG002 - it contains no callable functions
+        """Return no address, as numba does for a function without a Python wrapper."""
         return 0
 
     @property
     def codegen(self) -> Any:
-        """Itself, for `set_env`, the one thing that numba asks of it here."""
+        """Itself, for `set_env`, the only attribute that numba uses here."""
         return self
 
     def set_env(self, env_name: str, env: object) -> None:
-        """Do nothing: the environment is for errors and objects, which kernels have none of."""
+        """Do nothing: the environment is for exceptions and objects, and kernels have neither."""
 
 
 class _PartCompiler(Compiler):
@@ -77,11 +77,11 @@ class _PartCompiler(Compiler):
 
 
 class _SharedCache(FunctionCache):
-    """Numba's cache, with two faults mended.
+    """Numba's cache with two faults corrected.
 
     Numba reads the index of an entry, adds a line and writes it back: two processes that do so at once give
-    both pieces of code the same file. And it takes the code of an entry for current while the entry's own
-    file has not changed, whatever has become of the kernels that are compiled into it.
+    both pieces of code the same file. And it considers the code of an entry current as long as the entry's
+    own file is unchanged, even if the kernels compiled into it have changed.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -89,13 +89,13 @@ class _SharedCache(FunctionCache):
         self._cache_file._source_stamp = (self._cache_file._source_stamp, kernel_digest())  # noqa: SLF001 - as below
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the code while no other process does."""
+        """Save the code while holding the lock."""
         with _locked(Path(self.cache_path)):
             super().save_overload(sig, data)
 
     @property
     def filled(self) -> bool:
-        """Whether there is code of this version of the source."""
+        """Whether the cache has code for this version of the source."""
         return bool(self._cache_file._load_index())  # noqa: SLF001 - a subclass
 
 
@@ -109,7 +109,7 @@ def kernel_digest() -> str:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold a folder's lock, where the file system has locks."""
+    """Hold a folder's lock, if the file system supports locks."""
     with contextlib.ExitStack() as held:
         if fcntl is not None:
             with contextlib.suppress(OSError):
@@ -120,23 +120,23 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 class WithoutDoor(CPUDispatcher):
-    """A compiled function that compiled functions call. Python has no way in and is told so."""
+    """A compiled function callable only from compiled functions; a call from Python raises an error."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
-        """Refuse."""
+        """Raise TypeError."""
         raise TypeError(f"{self.py_func.__name__} is called by kernels only (see tests/kernels.py)")
 
 
 class Inlined(CPUDispatcher):
-    """A function that is pasted into the kernels that call it. Python runs its Python."""
+    """A function inlined into the kernels that call it; called from Python, it runs as Python."""
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the function that was decorated."""
+        """Call the decorated function."""
         return self.py_func(*arguments)
 
 
 def compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
-    """Compile with the flags above and some more."""
+    """Compile with the flags above and further ones."""
     decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
         error_model="numpy", fastmath=FAST_MATH, nogil=True, **options
     )
@@ -155,26 +155,26 @@ def _part(function: Callable[..., Any], python: type[CPUDispatcher], **options: 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that other kernels call: arrays in, ``out`` last, no allocation, no exceptions.
 
-    It is cached as part of the entries that call it, and has no door for Python: doors would take a seventh
-    of the time to compile them all. Tests make their own (tests/kernels.py).
+    It is cached as part of the entries that call it and has no Python wrapper: wrappers would take a seventh
+    of the total compilation time. Tests make their own (tests/kernels.py).
     """
     return _part(function, WithoutDoor)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function that is pasted into the kernels that call it: short scalar ones, parts of a step.
+    """Compile a function to be inlined into the kernels that call it: short scalar ones, parts of a step.
 
-    LLVM does that. Numba's own ``inline="always"`` would infer the types of its lines anew in every kernel.
+    LLVM does the inlining. Numba's own ``inline="always"`` would repeat type inference in every kernel.
     """
     return _part(function, Inlined, forceinline=True)
 
 
 def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel that Python calls; cached where there is a folder to keep it in."""
+    """Compile a kernel that Python calls; cached if there is a folder for it."""
     found: Any = compiled(function)
     if isinstance(found, CPUDispatcher):
         try:
-            vars(found)["_cache"] = _SharedCache(function)  # as cache=True does, with numba's own
+            vars(found)["_cache"] = _SharedCache(function)  # like cache=True, but with our own cache
         except RuntimeError as error:
             if NO_CACHE not in str(error):
                 raise
@@ -183,7 +183,7 @@ def entry_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def is_kept(entry: Callable[..., Any]) -> bool | None:
-    """Whether the cache holds compiled code of an entry; None where nothing is compiled or kept."""
+    """Whether the cache holds compiled code of an entry; None if nothing is compiled or cached."""
     cache = getattr(entry, "_cache", None)
     return cache.filled if isinstance(cache, _SharedCache) else None
 
@@ -191,6 +191,6 @@ def is_kept(entry: Callable[..., Any]) -> bool | None:
 @functools.cache
 def _warn_of_no_cache() -> None:
     log.warning(
-        "compiled kernels cannot be kept: they fit neither beside morphcore nor in a home folder. Each "
-        "process compiles anew, for minutes; set NUMBA_CACHE_DIR to a folder that this user may write"
+        "compiled kernels cannot be cached, neither next to morphcore nor in a home folder. Each "
+        "process compiles them again, for minutes; set NUMBA_CACHE_DIR to a folder that this user may write"
     )

@@ -1,14 +1,14 @@
 """Lanes: the innermost, contiguous axis of every hot array is the particle index, in blocks of one width.
 
-A kernel's loops ``for l in range(len(lanes))`` become vector instructions when the compiler knows how far
-rows of an array are apart. Numba passes shapes as run-time values, so each kernel starts with ``if
-not_in_lanes(..., lanes): return``: past that line the row length is a known constant. (Without it the same
-loop runs two to three times slower.)
+A kernel's loops ``for l in range(len(lanes))`` become vector instructions if the compiler knows the row
+length of an array. Numba passes shapes as run-time values, so each kernel starts with ``if not_in_lanes(...,
+lanes): return``: after that line the row length is a known constant. (Without it the same loop runs two to
+three times slower.)
 
 The width is a *type*: ``lanes`` is a tuple of as many zeros, and numba compiles a kernel once per length. So
-one source makes the kernels of a batch (``TOGETHER`` lanes) and those of a flight alone (one lane), which
-would else carry fifteen idle ones along. Both make the same roundings: a flight is the same to the bit in any
-company.
+one source yields the kernels of a batch (``TOGETHER`` lanes) and those of a single flight (one lane), which
+would otherwise carry fifteen idle lanes. Both round identically: a flight is bit-identical alone and in any
+batch.
 """
 
 from __future__ import annotations
@@ -84,16 +84,16 @@ def sine_cosine(angle: float) -> tuple[float, float]:
 
 
 def lane_width(particles: int) -> int:
-    """Lanes of the blocks that hold so many particles."""
+    """Number of lanes of the blocks for a number of particles."""
     return ALONE if particles == 1 else TOGETHER
 
 
 def lane_type(width: int) -> tuple[int, ...]:
-    """What tells a kernel its width: a tuple of that length (its elements mean nothing)."""
+    """The argument that sets a kernel's width: a tuple of that length (its elements are ignored)."""
     return (0,) * width
 
 
 @inlined
 def not_in_lanes(a, lanes) -> bool:
-    """Whether the row length differs from the width (never; the test tells the compiler, see the head)."""
+    """Whether the row length differs from the width (never; the test informs the compiler, see above)."""
     return a.shape[1] != len(lanes)

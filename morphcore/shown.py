@@ -1,4 +1,4 @@
-"""How values show themselves at a prompt and in a notebook: a title and facts, a table, never a screenful."""
+"""Display of values at a prompt and in a notebook: a title and facts, and a short table."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-MAX_ROWS = 20  # of a table, and of facts; more are counted
+MAX_ROWS = 20  # rows of a table, and facts; the rest is only counted
 WIDEST = 88  # characters of a fact
-FEW = 4  # numbers that are written out
+FEW = 4  # arrays up to this size are written out
 
 Rows = Sequence[Sequence[Any]]
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What there is to see.
+    """The displayed contents.
 
-    facts : names and values. titles, rows : of a table below. notes : sentences at the end.
+    facts : names and values. titles, rows : of the table below. notes : sentences at the end.
     """
 
     title: str
@@ -31,7 +31,7 @@ class Summary:
     notes: Sequence[str] = ()
 
     def to_text(self) -> str:
-        """A few lines."""
+        """The summary as lines of text."""
         facts = [(name, brief(value)) for name, value in self.facts.items()][:MAX_ROWS]
         width = max((len(name) for name, _ in facts), default=0)
         lines = [self.title, *(f"  {name.ljust(width)}  {value}" for name, value in facts)]
@@ -43,7 +43,7 @@ class Summary:
         return "\n".join([*lines, *self._rest()])
 
     def to_html(self) -> str:
-        """The same as tables."""
+        """The summary as HTML tables."""
 
         def row(cells: Sequence[str], tag: str) -> str:
             return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
@@ -67,10 +67,10 @@ class Summary:
 
 
 class Shown:
-    """A dataclass (with ``repr=False``) that shows a summary in the place of all its numbers."""
+    """A dataclass (with ``repr=False``) that displays a summary instead of all its numbers."""
 
     def summary(self) -> Summary:
-        """What there is to see: each field in one line."""
+        """The displayed contents: each field in one line."""
         fields = [item for item in dataclasses.fields(self) if item.repr]  # type: ignore[arg-type]
         return Summary(type(self).__name__, {item.name: getattr(self, item.name) for item in fields})
 
@@ -82,7 +82,7 @@ class Shown:
 
 
 def brief(value: Any) -> str:
-    """A value in a few words: arrays by shape and range, things by their names.
+    """A value in brief: arrays by shape and range, objects by name.
 
     >>> brief(np.arange(100.0)), brief({"phi": 0.123456, "theta": None}), brief(0.1 + 0.2)
     ('(100,) from 0 to 99', 'phi 0.1235, theta -', '0.3')
@@ -105,7 +105,7 @@ def brief(value: Any) -> str:
 
 
 def shortened(text: str) -> str:
-    """One line that fits."""
+    """Shorten to one line of limited width."""
     line = " ".join(text.split())
     return line if len(line) <= WIDEST else f"{line[: WIDEST - 3]}..."
 

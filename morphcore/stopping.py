@@ -1,4 +1,4 @@
-"""Long work that is asked to stop, by an argument or by whoever runs it, and that says what it is about."""
+"""Stop requests to long work, by an argument or by the surrounding block, and its progress messages."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Value = TypeVar("Value")
 
 
 class Deadline:
-    """A question to stop that answers yes when somebody else does, or when the time is up.
+    """A stop function that returns True when another one does, or when the time is up.
 
     Parameters
     ----------
-    seconds : from now; None: for ever. stop : of somebody else. clock : seconds that only rise.
+    seconds : from now; None: no limit. stop : the other stop function. clock : monotonic, s.
 
     Attributes
     ----------
-    passed : whether it was the time that stopped the work.
+    passed : whether the time limit stopped the work.
     """
 
     def __init__(
@@ -38,18 +38,18 @@ class Deadline:
         self.passed = False
 
     def __call__(self) -> bool:
-        """Ask."""
+        """Return whether to stop."""
         if self._stop is not None and self._stop():
             return True
         self.passed = self.passed or self._clock() >= self._end_s
         return self.passed
 
     def before_it(self, work: Callable[[Stop], Value], otherwise: Value) -> Value:
-        """Return what work gives if it ends in time, else another value.
+        """Return the result of work if it finishes in time, otherwise another value.
 
         Raises
         ------
-        Interrupted : somebody else stopped the work.
+        Interrupted : the other stop function stopped the work.
         """
         try:
             return work(self)
@@ -64,7 +64,7 @@ _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", def
 
 @contextmanager
 def listening(listener: Callable[[str], None]) -> Iterator[None]:
-    """Let `listener` hear what long work of the block is about between its steps, in this thread."""
+    """Pass progress messages of the block's long work to `listener`, in this thread."""
     token = _listener.set(listener)
     try:
         yield
@@ -73,7 +73,7 @@ def listening(listener: Callable[[str], None]) -> Iterator[None]:
 
 
 def say(message: str) -> None:
-    """Tell whoever listens what begins now: a few words for a line of progress."""
+    """Report to the listener what starts now, in a few words for a progress line."""
     listener = _listener.get()
     if listener is not None:
         listener(message)
@@ -84,10 +84,10 @@ _surrounding: ContextVar[Stop | None] = ContextVar("stop", default=None)
 
 @contextmanager
 def stoppable(stop: Stop) -> Iterator[None]:
-    """Let every flight and every picture of the block ask `stop`, in this thread.
+    """Let every flight and every figure of the block check `stop`, in this thread.
 
-    Results and plots are made by plain functions; made for many samples they take longer than somebody who
-    cancels should wait.
+    Results and plots are made by plain functions; for many samples they take longer than a user who cancels
+    should wait.
     """
     token = _surrounding.set(stop)
     try:
@@ -97,11 +97,11 @@ def stoppable(stop: Stop) -> Iterator[None]:
 
 
 def check_stop(stop: Stop | None = None) -> None:
-    """Ask whether to go on.
+    """Check whether to continue.
 
     Raises
     ------
-    Interrupted : `stop` or the surrounding block says no.
+    Interrupted : `stop` or the surrounding block requests a stop.
     """
     surrounding = _surrounding.get()
     if (stop is not None and stop()) or (surrounding is not None and surrounding()):
@@ -109,7 +109,7 @@ def check_stop(stop: Stop | None = None) -> None:
 
 
 def one_at_a_time(stop: Stop | None = None) -> Stop:
-    """What `check_stop` asks here, as one question for several threads, which ask it in turn."""
+    """Return the stop functions that apply here as one, which several threads may call, one at a time."""
     lock, surrounding = threading.Lock(), _surrounding.get()
 
     def ask() -> bool:

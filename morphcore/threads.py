@@ -1,6 +1,6 @@
-"""Threads: a pool for the kernels, and one thread only for the linear algebra beside them.
+"""Threads: a pool for the kernels, and a single thread for linear algebra.
 
-Kernels release the interpreter's lock, so plain Python threads run them side by side. Numba's own parallel
+Kernels release the interpreter's lock, so plain Python threads run them in parallel. Numba's own parallel
 loops would need a threading layer that survives forks and tolerates callers in several threads; plain threads
 do both.
 """
@@ -18,13 +18,13 @@ from threadpoolctl import ThreadpoolController
 
 
 class _Setting:
-    """How many threads the kernels of this process use."""
+    """The number of threads that the kernels of this process use."""
 
     threads = 0
 
 
 class _Here(threading.local):
-    """Whether this thread is one of the pool's."""
+    """Whether this thread belongs to the pool."""
 
     pooled = False
 
@@ -33,9 +33,9 @@ _here = _Here()
 
 
 def thread_count() -> int:
-    """Threads that kernels use: as ``use_threads`` said, else NUMBA_NUM_THREADS, else the usable cores.
+    """Threads for kernels: as set by ``use_threads``, else NUMBA_NUM_THREADS, else the usable cores.
 
-    One inside work that runs in threads already: a pool whose threads wait for the pool would wait forever.
+    One inside work that already runs in the pool: threads that wait for their own pool would deadlock.
     """
     if _here.pooled:
         return 1
@@ -48,17 +48,17 @@ def usable_cores() -> int:
     """Cores that this process may run on."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not available on every system
         return os.cpu_count() or 1
 
 
 def use_threads(count: int) -> None:
-    """Let the kernels of this process run on so many threads."""
+    """Set the number of threads for the kernels of this process."""
     _Setting.threads = max(1, count)
 
 
 def in_threads(work: Callable[[int], None], parts: int) -> None:
-    """Do ``work(0)`` .. ``work(parts - 1)``, side by side if there are threads; raise the first error."""
+    """Run ``work(0)`` .. ``work(parts - 1)``, in parallel if there are threads; raise the first error."""
     threads = min(thread_count(), parts)
     if threads <= 1:
         for part in range(parts):
@@ -70,8 +70,8 @@ def in_threads(work: Callable[[int], None], parts: int) -> None:
 def one_blas_thread() -> AbstractContextManager[object]:
     """Keep BLAS to one thread inside the block.
 
-    Its matrices here are small, its threads would fight with the kernels', and its sums would depend on their
-    number in the last bits: the same seed must give the same answer everywhere.
+    The matrices here are small, BLAS threads would compete with the kernels', and sums would depend on the
+    number of threads in the last bits: the same seed must give the same answer everywhere.
     """
     limit: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
     return limit

@@ -1,7 +1,8 @@
-"""Warnings of results: where a number lies outside of what its method is good for, and what to do about it.
+"""Warnings of results: numbers outside the validity of their method, and what to do about them.
 
-Every result carries them as ``warnings``; whoever shows a result shows them too. A warning says what was seen
-and points to the part of the request that it is about. What has no answer at all is an error, not a warning.
+Every result carries them as ``warnings``, and they are displayed with every result. A warning states the
+observation and points to the part of the request that it concerns. If there is no answer at all, that is an
+error, not a warning.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from morphdata.atmosphere import standard_atmosphere
 
 Array = NDArray[np.float64]
 
-# A thin airfoil's lift has left the straight line by then; a lattice knows no stall.
+# The lift of a thin airfoil is no longer linear by then; a lattice does not model stall.
 LARGEST_ALPHA_RAD = np.radians(15.0)
-LARGEST_MACH = 0.3  # below it air is incompressible to 5 per cent of the lift
-# Five degrees from the vertical roll and yaw turn about nearly the same axis and their errors grow tenfold.
+LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
+# Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
-LARGEST_ERROR = 0.05  # of the motion, rms
-MIN_ERROR_RAD = 1e-4  # rms; what the integration resolves (simulate/plan.py)
+LARGEST_ERROR = 0.05  # share of the motion, rms
+MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/plan.py)
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class ResultWarning:
 
 @dataclass(frozen=True)
 class AirMotion:
-    """How an aircraft meets the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
+    """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
     The incidence is the angle of attack of the body, or of the surface whose hinges incline it furthest.
     """
@@ -58,9 +59,9 @@ class AirMotion:
 def air_motion(
     aircraft: Aircraft, time_s: Array, euler: Array, velocity_N: Array, wind_N: Array, angles: Array
 ) -> AirMotion:
-    """The motion through the air from attitudes, velocities and wind (k, 3) and angles (k, h) of all hinges.
+    """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
-    A hinge inclines its surface by as much of its angle as its axis points across the stream.
+    A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
@@ -78,11 +79,11 @@ def air_motion(
 
 
 def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:
-    """Incidence beyond the straight part of the lift, and air that is compressed without ``mach``.
+    """Incidence beyond the linear range of the lift, and compressible flow computed without ``mach``.
 
     Parameters
     ----------
-    motions : of each flight a name for the sentence, the pointer to it in the request, and its motion.
+    motions : for each flight, its name in the message, its pointer in the request, and its motion.
     """
     found = []
     for name, pointer, motion in motions:
@@ -93,9 +94,9 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
                     "large_alpha",
                     f"the angle of attack reaches {np.degrees(motion.incidence[worst]):.1f} degrees at "
                     f"t = {motion.time_s[worst]:.2f} s in {name}",
-                    "the vortex lattice knows no stall, which a real wing meets at about "
+                    "the vortex lattice does not model stall, which a real wing meets at about "
                     f"{np.degrees(LARGEST_ALPHA_RAD):.0f} degrees: fly faster, lighter or a gentler morph, "
-                    "or trust the result only up to there",
+                    "or trust the result only up to that angle",
                     pointer,
                 )
             )
@@ -108,7 +109,7 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
             ResultWarning(
                 "compressible",
                 f"the flight reaches Mach {mach:.2f} and is computed as incompressible{more}",
-                'set flight.mach to "auto" (up to Mach 0.7), or to 0 if incompressible air is what you mean',
+                'set flight.mach to "auto" (up to Mach 0.7), or to 0 if incompressible flow is intended',
                 "/flight/mach",
             )
         )
@@ -116,7 +117,7 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
 
 
 def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
-    """Surfaces that lie in each other at any of some angles (k, h) of all hinges, rad."""
+    """Surfaces that overlap at any of some angles (k, h) of all hinges, rad."""
     found = []
     for first, second, row in overlapping_surfaces(aircraft, angles):
         names = [aircraft.surfaces[number].name for number in (first, second)]
@@ -139,7 +140,7 @@ def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
 
 
 def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
-    """A pitch angle near or beyond the vertical, where Euler angles lose their meaning."""
+    """A pitch angle near or beyond the vertical, where Euler angles become degenerate."""
     steepest = float(np.abs(theta).max())
     if steepest <= STEEPEST_PITCH_RAD:
         return []
@@ -149,37 +150,12 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
             "steep_pitch",
             f"theta reaches {steepest:.3g} rad in {name}"
             + (", beyond the vertical" if beyond else ", nearly the vertical"),
-            "no Euler angle theta lies beyond pi/2: check the unit, which may be degrees"
+            "the Euler angle theta cannot exceed pi/2: check the unit, which may be degrees"
             if beyond
             else "roll and yaw cannot be distinguished there: do not interpret or fit them near that time",
             pointer,
         )
     ]
-
-
-def degrees_warning(name: str, pointer: str, measured: Array, rigid: Array) -> list[ResultWarning]:
-    """Angles that a rigid aircraft flies as well once they are taken for degrees, and not as they are.
-
-    measured, rigid : (k, 3) Euler angles of a sample and of the rigid model along its sweep, rad. The rigid
-    model's motion away from the start is of the right size, if not of the right shape.
-    """
-    moved, expected = measured - measured[0], rigid - rigid[0]
-    if not np.all(np.isfinite(expected)):
-        return []
-    motion = float(np.sqrt(np.mean(expected**2)))
-    as_degrees = float(np.sqrt(np.mean((np.radians(moved) - expected) ** 2)))
-    as_radians = float(np.sqrt(np.mean((moved - expected) ** 2)))
-    if as_degrees < 0.5 * motion and as_radians > 10.0 * max(as_degrees, motion):
-        return [
-            ResultWarning(
-                "looks_like_degrees",
-                f"the angles of {name} are about {as_radians / motion:.0f} times what the aircraft would do, "
-                "and fit if they are read as degrees",
-                "give them in rad, or name the columns phi_deg, theta_deg, psi_deg",
-                pointer,
-            )
-        ]
-    return []
 
 
 def error_warning(name: str, pointer: str, errors: Array, motion: Array) -> list[ResultWarning]:

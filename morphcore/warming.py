@@ -19,7 +19,7 @@ from morphcore.threads import use_threads
 
 
 def warm_up(threads: int | None = None) -> None:
-    """Fly one and two models of two links a wing over tiny flights: what identifications need is compiled.
+    """Fly one and two models of two links per wing over tiny flights, to compile what identifications need.
 
     Call it in the process that computes (never in the parent of forked workers), once. The kernels of hinge
     torques and beams, which few jobs need, are left to `warm_up_further`.
@@ -40,7 +40,7 @@ def warm_up(threads: int | None = None) -> None:
 
 
 def warm_up_further() -> None:
-    """Fly with hinge torques and with beams: the kernels and packages of all other jobs are loaded too."""
+    """Fly with hinge torques and with beams, to load the kernels and packages of all other jobs."""
     aircraft, flight = tiny_aircraft()
     sample = _tiny_sample()
     model = chain_model(aircraft, flight, 2, SMALL)
@@ -50,7 +50,7 @@ def warm_up_further() -> None:
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)
     for _ in flight_steps(aircraft, flight, sample, model="flexible", elements=1, lattice=SMALL, step_s=0.01):
         pass
-    # packages that the searches load when they are first needed
+    # packages that the searches import on first use
     importlib.import_module("scipy.stats")
     evolution.strategies()
     swarm.operators()

@@ -1,1 +1,1 @@
-"""Every document that enters or leaves: fields, limits, checks and readers, for all rooms alike."""
+"""All documents that enter or leave the system: fields, limits, checks and readers, for all packages."""

@@ -47,15 +47,15 @@ Row3 = Annotated[list[Inertia], Field(min_length=3, max_length=3)]
 Matrix3 = list[list[float]]
 Stiffness = Annotated[float, Field(gt=0.0, le=1e15)]
 Chord = Annotated[float, Field(gt=0.0, le=50.0)]
-ROUND_OFF = 1e-9  # relative, of the terms of an inertia
+ROUND_OFF = 1e-9  # relative tolerance of the terms of an inertia
 BOX = ("length_m", "width_m", "height_m", "density_kg_m3")
 
 
 class Fuselage(Document):
-    """A rigid body: a box of uniform density, or mass and inertia given outright."""
+    """A rigid body: a box of uniform density, or explicit mass and inertia."""
 
     shape: Literal["box"] | None = Field(
-        default=None, description="Only a name for the four numbers of a box."
+        default=None, description="Only a name; the shape is given by the four numbers of a box."
     )
     length_m: Length | None = None
     width_m: Length | None = None
@@ -74,7 +74,7 @@ class Fuselage(Document):
     )
 
     def faults(self) -> Iterator[Fault]:
-        """A box is whole, or mass and inertia are both given; the inertia is that of a body."""
+        """Check that a box is complete, or that mass and inertia are both given and physically possible."""
         if self.mass_kg is None:
             for name in BOX:
                 if getattr(self, name) is None:
@@ -102,7 +102,7 @@ class Fuselage(Document):
 
 
 def inertia_matrix(given: Sequence[float | list[float]]) -> Matrix3:
-    """Return the 3 x 3 matrix of an inertia that is given so, or by its diagonal."""
+    """Return the 3 x 3 matrix of an inertia given as a matrix or by its diagonal."""
     return [
         row if isinstance(row, list) else [row if column == number else 0.0 for column in range(3)]
         for number, row in enumerate(given)
@@ -110,7 +110,7 @@ def inertia_matrix(given: Sequence[float | list[float]]) -> Matrix3:
 
 
 def _is_inertia(m: Matrix3) -> bool:
-    """Whether a matrix is symmetric, positive definite and keeps the triangle inequality.
+    """Whether a matrix is symmetric, positive definite and satisfies the triangle inequality.
 
     Moments of inertia are J = tr(P) - P with the second moments P of the mass, which are not negative.
     """
@@ -152,7 +152,7 @@ class Material(Document):
 
 
 class Section(Document):
-    """Section properties given outright, instead of those of a solid box."""
+    """Explicit section properties, instead of those of a solid box."""
 
     ei_flap_n_m2: Stiffness
     ei_edge_n_m2: Stiffness
@@ -163,7 +163,7 @@ class Section(Document):
     )
 
     def faults(self) -> Iterator[Fault]:
-        """A section that twists has a moment of inertia about the span."""
+        """Check that a section that can twist has a moment of inertia about the span."""
         if self.inertia_per_length_kg_m[1] == 0.0:
             yield Fault(
                 "greater_than",
@@ -180,7 +180,7 @@ class Surface(Document):
     side: Side
     span_m: Length
     chord_m: Chord | None = Field(
-        default=None, description="Uniform chord, or the chord where root or tip is not given."
+        default=None, description="Uniform chord, or the default of root and tip chord."
     )
     root_chord_m: Chord | None = None
     tip_chord_m: Chord | None = None
@@ -195,14 +195,14 @@ class Surface(Document):
         description="Line of the sections' centres of mass aft of mid-chord, m; negative: forward of it.",
     )
     profile_drag: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
-    hinge: Hinge | None = Field(default=None, description="The only hinge; `hinges` takes several.")
+    hinge: Hinge | None = Field(default=None, description="A single hinge; use `hinges` for several.")
     hinges: Annotated[list[Hinge], Field(min_length=1, max_length=MAX_HINGES)] | None = Field(
         default=None,
-        description="From the fuselage outward; each carries those after it and the whole surface. What is "
-        "between them has neither mass nor lift.",
+        description="From the fuselage outward; each carries the following ones and the surface. The parts "
+        "between them have neither mass nor lift.",
     )
     position_m: Position | None = Field(
-        default=None, description="Root at mid-chord; at the last hinge where it is left out."
+        default=None, description="Root at mid-chord; default: at the last hinge."
     )
     flexible: bool = True
 
@@ -214,20 +214,20 @@ class Surface(Document):
 
     @property
     def root_m(self) -> list[float]:
-        """Where the root's mid-chord is before any hinge moves, body axes: at the last hinge if not given."""
+        """Mid-chord of the root with all hinges at rest, body axes; default: at the last hinge."""
         return self.position_m or (self.all_hinges[-1].position_m if self.all_hinges else [0.0, 0.0, 0.0])
 
     @property
     def all_hinges(self) -> tuple[Hinge, ...]:
-        """Hinges from the fuselage outward; none of a fixed surface."""
+        """Hinges from the fuselage outward; empty for a fixed surface."""
         return tuple(self.hinges or ()) if self.hinge is None else (self.hinge,)
 
     def hinge_pointer(self, number: int) -> str:
-        """Return where a hinge stands in the document."""
+        """Return the JSON pointer of a hinge."""
         return f"/hinges/{number}" if self.hinge is None else "/hinge"
 
     def faults(self) -> Iterator[Fault]:
-        """The chord is known, the surface is attached, its axes lie within reach of the chord."""
+        """Check that the chord is known, the surface is attached, and its axes are near the chord."""
         root, tip = self.root_and_tip_chord_m
         if not (root and tip):
             yield Fault(
@@ -241,7 +241,7 @@ class Surface(Document):
                     "axis_outside",
                     f"{name} is {offset:g}, more than the chord of {root:g} m at the root.",
                     f"/{name}",
-                    "It is counted from mid-chord, in m, aft positive.",
+                    "It is measured from mid-chord, in m, positive aft.",
                 )
         if self.hinge is not None and self.hinges is not None:
             yield Fault(
@@ -270,7 +270,7 @@ class Aircraft(Document):
 
     @property
     def drives(self) -> dict[str, Drive]:
-        """What can be moved, by name."""
+        """The drives, by name."""
         return drives_of(
             (drive_name(hinge, surface.side), surface, (number, place), hinge)
             for number, surface in enumerate(self.surfaces)
@@ -278,7 +278,7 @@ class Aircraft(Document):
         )
 
     def faults(self) -> Iterator[Fault]:
-        """No two surfaces have one name, and each drive turns like hinges."""
+        """Check that surface names are unique and that each drive turns equal hinges."""
         yield from drive_faults(self.surfaces)
         names: set[str] = set()
         for number, surface in enumerate(self.surfaces):
@@ -308,7 +308,7 @@ def load_aircraft(path: str | Path) -> Aircraft:
     Raises
     ------
     InvalidInput
-        Naming every fault, with pointers that begin with ``/aircraft``.
+        Lists every fault, with pointers that begin with ``/aircraft``.
 
     Examples
     --------

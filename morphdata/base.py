@@ -1,4 +1,4 @@
-"""Base and building blocks of the documents: strict, bounded, no NaN, no unknown field, every fault named."""
+"""Base class and building blocks of the documents: strict, bounded, without NaN or unknown fields."""
 
 from __future__ import annotations
 
@@ -27,27 +27,28 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, faults_of
 from morphdata.renamed import FORMER_NOTE, RENAMED
+from morphdata.samplefiles.channel_columns import LARGEST_VALUE
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS, from_first_row
 
 SAMPLE_NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"  # becomes part of file names
-SHOWN_ITEMS = 4  # of a list, at a prompt
-LATEST_DATE_S = 1e11  # since 1970: clocks of loggers may count from there
+SHOWN_ITEMS = 4  # items of a list shown at a prompt
+LATEST_DATE_S = 1e11  # s since 1970: clocks of loggers may count from there
 
 
 class Result(BaseModel):
-    """Base of what an operation gives: it may hold more than its fields say.
+    """Base of results of operations, which may contain further fields.
 
-    Pydantic makes its validator when it is first used; the library, which makes results, never does.
+    Pydantic makes the validator on first use; the library, which only creates results, never needs it.
     """
 
     model_config = ConfigDict(extra="allow", defer_build=True)
 
 
 class Document(BaseModel):
-    """Base of everything that a client sends: a misspelt field is an error, text is not a number.
+    """Base of all input documents: unknown fields are errors, and text is not accepted as a number.
 
-    A document refuses to be built of what is wrong, with `InvalidInput` that names every fault, whether it
-    is parsed or constructed in Python.
+    Invalid input raises `InvalidInput` with all faults, whether the document is parsed or constructed in
+    Python.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
@@ -58,24 +59,24 @@ class Document(BaseModel):
         except ValidationError as error:
             raise _refused(error, fields, type(self)) from None
 
-    # pydantic would call an __init__ of ours for every nested object, too, and not see where an error is from
+    # pydantic would call our own __init__ for every nested object, too, and lose the location of errors
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
     def parse(cls, value: Any, pointer: str = "") -> Self:
-        """Build the document of parsed JSON.
+        """Build the document from parsed JSON.
 
         Parameters
         ----------
         value : object
-            Parsed JSON; objects in it may be documents already.
+            Parsed JSON; nested objects may already be documents.
         pointer : str
-            Where it stands in a larger document, for errors.
+            Its JSON pointer in a larger document, for errors.
 
         Raises
         ------
         InvalidInput
-            Naming every fault.
+            Lists every fault.
         """
         try:
             return cls.model_validate(value)
@@ -89,7 +90,7 @@ class Document(BaseModel):
         Raises
         ------
         InvalidInput
-            The file cannot be read, or naming every fault of the document.
+            The file cannot be read, or the document is invalid; lists every fault.
         """
         try:
             document = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -97,21 +98,24 @@ class Document(BaseModel):
             raise InvalidInput(f"{path} does not exist", hint="check the path") from None
         except OSError as error:
             raise InvalidInput(f"{path} cannot be read: {error.strerror}", hint="check the path") from None
-        except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of absurd numbers
+        except (
+            ValueError,
+            RecursionError,
+        ) as error:  # also for bytes that are not text, and for huge numbers
             raise InvalidInput(f"{path} is not JSON: {error}", hint="see the examples") from None
         if not isinstance(document, dict):
             raise InvalidInput(f"{path} holds no JSON object", hint="see the examples")
         return cls.parse(document, pointer)
 
     def faults(self) -> Iterator[Fault]:
-        """Yield what is wrong across the fields, with pointers relative to this object.
+        """Yield faults that concern several fields, with pointers relative to this object.
 
-        It is called when each field by itself is right.
+        It is called only if each field is valid by itself.
         """
         return iter(())
 
     def __repr__(self) -> str:
-        """A few lines: names instead of objects, ends instead of long lists."""
+        """A short form: names instead of objects, only the ends of long lists."""
         return "\n  ".join([type(self).__name__, *(f"{name} = {_brief(value)}" for name, value in self)])
 
     def _repr_html_(self) -> str:
@@ -127,7 +131,7 @@ class Document(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _plain_values(cls, given: Any) -> Any:
-        """Take 3.0 where a whole number is wanted, as JSON Schema does; tuples and arrays for lists."""
+        """Accept 3.0 for an integer, as JSON Schema does, and tuples and arrays for lists."""
         if not isinstance(given, dict):
             return given
         whole = _whole_fields(cls)
@@ -140,7 +144,7 @@ class Document(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Describe the old names of renamed fields, too, as deprecated."""
+        """Include the old names of renamed fields, marked as deprecated."""
         schema = handler(core_schema)
         described = handler.resolve_ref_schema(schema)
         if handler.mode == "validation":
@@ -165,19 +169,19 @@ def _refused(error: ValidationError, value: Any, model: type[BaseModel], pointer
 
 @cache
 def _whole_fields(model: type[BaseModel]) -> tuple[str, ...]:
-    """Names of the fields whose only numbers are whole ones."""
+    """Names of the fields whose numbers are all integers."""
     kinds = {name: set(_kinds(field.annotation)) for name, field in model.model_fields.items()}
     return tuple(name for name, found in kinds.items() if int in found and float not in found)
 
 
 @cache
 def _renamed_fields(model: type[BaseModel]) -> dict[str, str]:
-    """Today's names of a model's fields by their old ones."""
+    """Current names of a model's fields by their old names."""
     return {former: name for former, name in RENAMED.items() if name in model.model_fields}
 
 
 def _under_current_names(given: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:
-    """Rename fields that are given by their old names; results, which carry both, may be given unchanged."""
+    """Rename fields given by their old names; results, which contain both, are accepted unchanged."""
     for former, name in renamed.items():
         if former in given and name in given and given[former] != given[name]:
             fault = Fault(
@@ -195,7 +199,7 @@ def _under_current_names(given: dict[str, Any], renamed: dict[str, str]) -> dict
 
 
 def _describe_former(schema: JsonSchemaValue, former: str, name: str) -> None:
-    """Add a field's old name to a model's schema: one of both names is then needed, not the new one."""
+    """Add a field's old name to a model's schema; then either name satisfies the requirement."""
     properties, required = schema["properties"], schema.get("required", [])
     properties[former] = {
         **properties[name],
@@ -215,7 +219,7 @@ def _kinds(annotation: Any) -> Iterator[Any]:
 
 
 def _listed(value: Any) -> Any:
-    """Return what Python code gives for a list, a tuple or an array of numpy, as a list."""
+    """Convert a tuple or a numpy array to a list."""
     return list(value) if isinstance(value, tuple) else value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -235,7 +239,7 @@ SampleName = Annotated[str, Field(pattern=SAMPLE_NAME_PATTERN)]
 Text = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 Identifier = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_]+$")]
 
-# FailFast: one bad row is named, not a hundred thousand
+# FailFast: report one bad row, not a hundred thousand
 TimeSeries = Annotated[
     list[Annotated[float, Field(ge=-LATEST_DATE_S, le=LATEST_DATE_S)]],
     FailFast(),
@@ -243,6 +247,13 @@ TimeSeries = Annotated[
     AfterValidator(from_first_row),
 ]
 AngleSeries = Annotated[
-    list[Annotated[float, Field(ge=-1e6, le=1e6)]],  # what is no angle, `samplefiles.flight` says with a hint
+    list[
+        Annotated[float, Field(ge=-1e6, le=1e6)]
+    ],  # impossible angles are reported by `samplefiles.flight` with a hint
+    Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
+]
+# a measured channel; null is a gap
+ChannelSeries = Annotated[
+    list[Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE)] | None],
     Field(fail_fast=True, min_length=MIN_ROWS, max_length=MAX_ROWS),
 ]

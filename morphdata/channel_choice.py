@@ -1,4 +1,4 @@
-"""Which channels a flight is to have: the choice in requests, and whether a flight can give them."""
+"""The choice of output channels in requests, and whether a flight can provide them."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from morphdata.faults import Fault
 
 if TYPE_CHECKING:
     ChannelName = str
-else:  # type checkers see no choices that come from a list
+else:  # type checkers cannot use choices from a list
     ChannelName = Literal[tuple(each.name for each in CHANNELS)]
 
 RequestedChannels = Annotated[
     list[ChannelName], Field(max_length=100, json_schema_extra={"uniqueItems": True})
 ]
 CHANNELS_TEXT = (
-    "Columns of the trajectory beside time, attitude and hinge angles, in this order; those of the example "
+    "Columns of the trajectory after time, attitude and hinge angles, in this order; those of the example "
     "flights when left out."
 )
 
 
 class ChannelChoice(Document):
-    """The channels that a flight is to have, for callers that have no request document."""
+    """The requested channels, for callers without a request document."""
 
     channels: RequestedChannels
 
 
 def channels_faults(names: Sequence[str], model_kind: str, gravity_m_s2: float) -> Iterator[Fault]:
-    """Check that each channel is requested once and that the flight can give it; pointers are ``/0``."""
+    """Check that each channel is requested once and that the flight can provide it; pointers are ``/0``."""
     for number, name in enumerate(names):
         facts = channel_facts(name)
         if name in names[:number]:
@@ -42,9 +42,9 @@ def channels_faults(names: Sequence[str], model_kind: str, gravity_m_s2: float) 
         elif model_kind not in facts.models:
             yield Fault(
                 "channel_not_available",
-                f"The {model_kind} model does not give the channel {name}.",
+                f"The {model_kind} model does not provide the channel {name}.",
                 f"/{number}",
-                f"Leave it out, or fly one of the models that give it: {', '.join(facts.models)}.",
+                f"Leave it out, or fly one of the models that provide it: {', '.join(facts.models)}.",
             )
         elif facts.needs_gravity and gravity_m_s2 == 0.0:
             yield Fault(

@@ -1,10 +1,11 @@
-"""The output channels of a flight as documents know them: names, units, what they mean.
+"""The output channels of a flight for documents: names, units and meanings.
 
-How a channel is computed stands under the same name in ``morphcore/simulate/channels.py``.
+The computation of a channel is under the same name in ``morphcore/simulate/channels.py``.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,25 +17,26 @@ CHAINS = ("rigid", "equivalent")  # models of rigid links
 
 @dataclass(frozen=True)
 class ChannelFacts:
-    """What documents hold of one channel.
+    """Facts about one channel.
 
     Attributes
     ----------
     name : str
-        In requests, and of its column; where there are several columns, each is ``name_part``.
+        Name in requests, and of its column; if there are several columns, each is ``name_part``.
     unit : str
-        Of its values, "1" if they have none. Names in JSON documents end in it: ``alpha_rad``, ``nz``.
+        Unit of its values, "1" if dimensionless; the suffix of names in JSON documents: ``alpha_rad``,
+        ``nz``.
     description : str
-        What it is, with frame and sign, a line.
+        One-line description, with frame and sign.
     per : {"", "surface", "drive"}
-        It has one column, or one for each surface or drive. The column of the surface "right wing" is
+        Whether it has one column, or one for each surface or drive. The column of the surface "right wing" is
         ``tip_z_right_wing``: its name in small letters and digits, underscores between (see `column_parts`).
     default : bool
-        Whether a flight has it where no channels are requested.
+        Whether a flight has it if no channels are requested.
     models : tuple of str
-        Kinds of models that give it.
+        Kinds of models that provide it.
     needs_gravity : bool
-        It is a multiple of the weight and has no meaning without.
+        Whether it is a multiple of the weight and so undefined without gravity.
     """
 
     name: str
@@ -108,7 +110,7 @@ def channel_facts(name: str) -> ChannelFacts:
 
 
 def default_channels() -> list[str]:
-    """Names of the channels that a flight has where none are requested."""
+    """Names of the default channels of a flight."""
     return [each.name for each in CHANNELS if each.default]
 
 
@@ -131,7 +133,7 @@ def column_parts(names: Iterable[str]) -> list[str]:
 
 
 def document_name(column: str) -> str:
-    """Name of a column in JSON documents, its unit at the end; other columns than channels keep their names.
+    """Name of a column in JSON documents, with its unit as suffix; columns of no channel keep their names.
 
     Examples
     --------
@@ -144,30 +146,45 @@ def document_name(column: str) -> str:
     return column
 
 
+def channel_of(column: str) -> ChannelFacts | None:
+    """Find the channel that a column is of; None for other columns.
+
+    Examples
+    --------
+    >>> channel_of("tip_z_right_wing").unit, channel_of("fold_left")
+    ('m', None)
+    """
+    return next((each for each in CHANNELS if _is_of(each, column)), None)
+
+
 def is_channel(column: str) -> bool:
-    """Whether a column is one of a channel.
+    """Whether a column belongs to a channel.
 
     Examples
     --------
     >>> is_channel("nz"), is_channel("tip_z_right_wing"), is_channel("fold_left")
     (True, True, False)
     """
-    return any(_is_of(each, column) for each in CHANNELS)
+    return channel_of(column) is not None
 
 
-def is_channel_field(field: str) -> bool:
-    """Whether a field of a JSON document is the column of a channel, its unit at the end.
+def channel_field(field: str) -> tuple[str, float] | None:
+    """Column and factor to SI of a channel's field in a JSON document; None for other fields.
+
+    The unit stands at the end of the field's name. Angles and rates may be in degrees.
 
     Examples
     --------
-    >>> is_channel_field("nz"), is_channel_field("p_rad_s"), is_channel_field("p_rad")
-    (True, True, False)
+    >>> channel_field("p_rad_s"), channel_field("nz"), channel_field("p_rad")
+    (('p', 1.0), ('nz', 1.0), None)
     """
-    ends = {each.name: "".join(f"_{word}" for word in unit_words(each.unit)) for each in CHANNELS}
-    return any(
-        field.endswith(ends[each.name]) and _is_of(each, field.removesuffix(ends[each.name]))
-        for each in CHANNELS
-    )
+    for each in CHANNELS:
+        end = "".join(f"_{word}" for word in unit_words(each.unit))
+        ends = {end: 1.0} | ({end.replace("rad", "deg"): math.pi / 180.0} if "rad" in end else {})
+        for spelt, factor in ends.items():
+            if field.endswith(spelt) and _is_of(each, field.removesuffix(spelt)):
+                return field.removesuffix(spelt), factor
+    return None
 
 
 def _is_of(channel: ChannelFacts, column: str) -> bool:
@@ -175,7 +192,7 @@ def _is_of(channel: ChannelFacts, column: str) -> bool:
 
 
 def unit_words(unit: str) -> list[str]:
-    """How names end in a unit.
+    """Words by which names end in a unit.
 
     Examples
     --------

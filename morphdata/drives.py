@@ -1,4 +1,4 @@
-"""Hinges, and the drives that move them: one prescribed history may turn several like hinges."""
+"""Hinges, and the drives that move them: one prescribed history may turn several equal hinges."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from morphdata.faults import Fault
 from morphdata.refusals import MAX_POINTER, escaped
 from morphdata.samplefiles.titles import ATTITUDE
 
-HINGE_RANGE_RAD = 1.3  # either way, where a hinge does not say
+HINGE_RANGE_RAD = 1.3  # rad in either direction, if a hinge has no range
 MAX_HINGES = 4  # of one surface
-WORDS = {"x": "fold", "y": "incidence", "z": "sweep"}  # of a hinge that has no name
+WORDS = {"x": "fold", "y": "incidence", "z": "sweep"}  # words of hinges without a name
 SIDES = ("left", "right")
 BOTH = "both"
 SWEEPS = tuple(f"{WORDS['z']}_{side}" for side in SIDES)
-# columns of samples and keys of schedules that mean something else
+# columns of samples and keys of schedules with another meaning
 RESERVED = frozenset({"time", *ATTITUDE, BOTH, *SIDES})
-SAME_AXIS = 1e-9  # distance of two unit vectors
+SAME_AXIS = 1e-9  # distance between two unit vectors
 ANGLE_TOLERANCE_RAD = 1e-6  # measured angles are not exactly zero
-MAX_LISTED = 20  # columns of a file in an error
-SHOWN_KEY = 60  # characters of a key that a stranger wrote
+MAX_LISTED = 20  # columns of a file shown in an error
+SHOWN_KEY = 60  # characters shown of a key from outside
 
 Side = Literal["right", "left"]
 Vector = tuple[float, float, float]
@@ -35,7 +35,7 @@ Component = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 class Hinge(Document):
-    """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence, a vector does any."""
+    """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence, a vector is free."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")] | None = Field(
         default=None,
@@ -58,15 +58,15 @@ class Hinge(Document):
     max_rad: Angle = Field(
         default=HINGE_RANGE_RAD, description="Largest angle; samples beyond it are refused."
     )
-    angle_rad: Angle = Field(default=0.0, description="Angle that is held where no history is given.")
+    angle_rad: Angle = Field(default=0.0, description="Angle held if no history is given.")
 
     @property
     def word(self) -> str | None:
-        """Name without the side; None of a skew hinge that has none."""
+        """Name without the side; None for an unnamed hinge about a vector."""
         return self.name or (WORDS[self.axis] if isinstance(self.axis, str) else None)
 
     def axis_B(self, side: str) -> Vector:
-        """Unit vector in body axes about which a positive angle turns a surface of a side."""
+        """Unit vector in body axes about which a positive angle turns a surface on a given side."""
         if isinstance(self.axis, str):
             sign = 1.0 if side == "right" else -1.0
             return {"x": (-sign, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, sign)}[self.axis]
@@ -75,7 +75,7 @@ class Hinge(Document):
         return x / length, y / length, z / length
 
     def faults(self) -> Iterator[Fault]:
-        """The axis has a direction, the range a width, and the held angle lies in it."""
+        """Check that the axis has a direction, the range a width, and that it contains the held angle."""
         if not isinstance(self.axis, str):
             if not any(self.axis):
                 yield Fault(
@@ -86,7 +86,7 @@ class Hinge(Document):
                     "missing",
                     "A hinge about a vector needs a name.",
                     "/name",
-                    'Name its drive, for example "cant"; only x, y and z have names of their own.',
+                    'Name its drive, for example "cant"; only x, y and z have default names.',
                 )
         if self.min_rad >= self.max_rad:
             yield Fault(
@@ -106,7 +106,7 @@ class Hinge(Document):
 
 
 class OfSide(Protocol):
-    """A surface, as far as the names of drives need it."""
+    """The part of a surface that determines the names of drives."""
 
     @property
     def name(self) -> str:
@@ -118,7 +118,7 @@ class OfSide(Protocol):
 
 
 class Turned(Protocol):
-    """A hinge, as far as its angle goes: a document, or what the numerics take."""
+    """The angle data of a hinge, from a document or from the numerics."""
 
     @property
     def min_rad(self) -> float:
@@ -130,7 +130,7 @@ class Turned(Protocol):
 
     @property
     def angle_rad(self) -> float:
-        """Held where no history is given."""
+        """Held if no history is given."""
 
 
 class Hinged(OfSide, Protocol):
@@ -141,28 +141,28 @@ class Hinged(OfSide, Protocol):
         """From the fuselage outward."""
 
     def hinge_pointer(self, number: int) -> str:
-        """Where a hinge stands in the surface's document."""
+        """JSON pointer of a hinge in the surface's document."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A prescribed input: the hinges that one history turns.
+    """A prescribed input: the hinges turned by one history.
 
     Attributes
     ----------
     name : str
         Key of its history, `sweep_left`.
     word : str
-        The name without the side, `sweep`: of both sides together.
+        The name without the side, `sweep`, for both sides together.
     side : str
     surfaces : tuple of str
-        Names of the surfaces that it moves, in the aircraft's order.
+        Names of the surfaces it moves, in the aircraft's order.
     hinges : tuple of (int, int)
         Number of the surface and of the hinge on it, each from 0.
     low, high : float
         Range that all its hinges allow, rad.
     held : float
-        Angle of its hinges where no history is given, rad.
+        Angle of its hinges if no history is given, rad.
     """
 
     name: str
@@ -174,17 +174,20 @@ class Drive:
     high: float
     held: float
 
-    def fault(self, angle_rad: float, pointer: str) -> Fault | None:
-        """Return what is wrong with an angle that the drive is moved to; None where it is in range."""
+    def fault(self, angle_rad: float, pointer: str, furthest_rad: float = 0.0) -> Fault | None:
+        """Return the fault of an angle of the drive; None if it is in range.
+
+        ``furthest_rad`` : the largest angle of its column, which may show its unit.
+        """
         if self.low - ANGLE_TOLERANCE_RAD <= angle_rad <= self.high + ANGLE_TOLERANCE_RAD:
             return None
         of = "Its hinge on" if len(self.surfaces) == 1 else "Its hinges on"
         hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
         hint += f"from {self.low:g} to {self.high:g} rad."
-        if abs(angle_rad) > math.pi:
+        if max(abs(angle_rad), abs(furthest_rad)) > math.pi:
             hint += f" Is the angle in degrees? A column may say so in its name: {self.name}_deg."
         return Fault(
-            # the code of old for sweep, of which clients know
+            # the old code for sweep, which clients know
             "sweep_out_of_range" if self.word == WORDS["z"] else "angle_out_of_range",
             f"{self.name} is {angle_rad:g} rad.",
             pointer,
@@ -193,13 +196,13 @@ class Drive:
 
 
 def drive_name(hinge: Hinge, side: str) -> str:
-    """Return the name of the drive that moves a hinge of a surface of a side."""
+    """Return the name of the drive that moves a hinge of a surface on a given side."""
     word = hinge.word or ""
     return word if word.endswith((f"_{SIDES[0]}", f"_{SIDES[1]}")) else f"{word}_{side}"
 
 
 def without_side(name: str) -> str:
-    """Return the word of a drive's name; a name without a side is a word.
+    """Return the word of a drive's name; a name without a side is itself a word.
 
     >>> without_side("fold_left"), without_side("fold")
     ('fold', 'fold')
@@ -208,12 +211,12 @@ def without_side(name: str) -> str:
 
 
 def drives_of(hinges: Iterable[tuple[str, OfSide, tuple[int, int], Turned]]) -> dict[str, Drive]:
-    """Return the drives that hinges make, by name, in the order of the hinges.
+    """Return the drives of hinges, by name, in the order of the hinges.
 
     Parameters
     ----------
     hinges : iterable of tuple
-        Of each the name of its drive, its surface, the numbers of both, and what is known of its angle.
+        For each, the name of its drive, its surface, the numbers of surface and hinge, and its angle data.
     """
     found: dict[str, Drive] = {}
     for name, surface, at, hinge in hinges:
@@ -232,12 +235,12 @@ def drives_of(hinges: Iterable[tuple[str, OfSide, tuple[int, int], Turned]]) -> 
 
 
 def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
-    """Check that names of drives are free and belong to their side, and that one name turns like hinges."""
+    """Check that names of drives are permitted and match their side, and that one name turns equal hinges."""
     first: dict[str, tuple[Hinge, str]] = {}
     for number, surface in enumerate(surfaces):
         for place, hinge in enumerate(surface.all_hinges):
             if hinge.word is None:
-                continue  # its own fault says so
+                continue  # reported as its own fault
             pointer = f"/surfaces/{number}{surface.hinge_pointer(place)}/name"
             name = drive_name(hinge, surface.side)
             if hinge.word in RESERVED or is_channel(hinge.word):
@@ -245,7 +248,7 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                     "name_reserved",
                     f"A drive cannot be called {hinge.word!r}.",
                     pointer,
-                    f"These names mean something else: {', '.join(sorted(RESERVED))}, and those of channels.",
+                    f"These names have other meanings: {', '.join(sorted(RESERVED))}, and those of channels.",
                 )
             elif not name.endswith(f"_{surface.side}"):
                 yield Fault(
@@ -263,16 +266,15 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                     f"The drive {name!r} would turn hinges of {owner!r} and {surface.name!r} that differ in "
                     f"their {what}.",
                     pointer,
-                    "Give one of them another name: a drive turns its hinges alike.",
+                    "Give one of them another name: a drive turns all its hinges alike.",
                 )
 
 
 def resolved(keys: Iterable[str], drives: Mapping[str, Drive]) -> tuple[dict[str, str], list[Fault]]:
-    """Find out which history each drive follows.
+    """Find the history that each drive follows.
 
-    A key is the name of a drive (`sweep_left`), its word for both sides (`sweep`), or, where no other drive
-    could be meant, `both`, `left`, `right` and, as in samples of old, `sweep_left` and `sweep_right` for
-    hinges of another kind.
+    A key is the name of a drive (`sweep_left`), its word for both sides (`sweep`), or, if unambiguous,
+    `both`, `left`, `right` and, as in old samples, `sweep_left` and `sweep_right` for hinges of another kind.
 
     Parameters
     ----------
@@ -284,9 +286,9 @@ def resolved(keys: Iterable[str], drives: Mapping[str, Drive]) -> tuple[dict[str
     Returns
     -------
     keys_of_drives : dict
-        Drive -> key; a drive that no key moves is not in it.
+        Drive -> key; drives that no key moves are left out.
     faults : list of Fault
-        Keys that name no drive, could mean several, or move what another key moves; at ``/key``.
+        Keys that name no drive, are ambiguous, or move a drive that another key moves; at ``/key``.
     """
     followed: dict[str, str] = {}
     faults = []
@@ -312,10 +314,10 @@ def resolved(keys: Iterable[str], drives: Mapping[str, Drive]) -> tuple[dict[str
 def resolved_columns(
     titles: Iterable[str], drives: Mapping[str, Drive]
 ) -> tuple[dict[str, str], list[Fault]]:
-    """Find out which column of a file each drive follows, and leave the other columns alone.
+    """Find the column of a file that each drive follows, and ignore the other columns.
 
-    A column that bears the name of a drive counts before one with the word of both sides, and that before
-    `sweep_left` and `sweep_right` in their old meaning, the hinge of that side whatever its kind.
+    A column named after a drive takes precedence over one with the word of both sides, and that over
+    `sweep_left` and `sweep_right` in their old meaning, the hinge of that side of any kind.
 
     Parameters
     ----------
@@ -327,10 +329,10 @@ def resolved_columns(
     Returns
     -------
     columns_of_drives : dict
-        Drive -> column; a drive that no column moves is not in it.
+        Drive -> column; drives that no column moves are left out.
     faults : list of Fault
-        Columns that could mean several drives, or move what another moves, and a file without any column
-        that moves a drive, at "".
+        Columns that are ambiguous or move a drive that another one moves; and, at "", a file without any
+        column that moves a drive.
     """
     titles = list(titles)
     words = {drive.word for drive in drives.values() if drive.name not in titles}
@@ -351,7 +353,7 @@ def resolved_columns(
                 if titles
                 else "No column moves a drive of the aircraft.",
                 "",
-                f"Call the columns after its drives: {shown_names(drives)}; the unit may follow "
+                f"Name the columns after its drives: {shown_names(drives)}; the unit may follow "
                 f"({next(iter(drives))}_deg).",
             )
         )
@@ -359,7 +361,7 @@ def resolved_columns(
 
 
 def unmeasured_sides(followed: Mapping[str, str], drives: Mapping[str, Drive]) -> Iterator[Fault]:
-    """Check that a word which is measured on one side is measured on the other, too; faults at ``/drive``."""
+    """Check that a word measured on one side is also measured on the other; faults at ``/drive``."""
     for name, drive in drives.items():
         other = next((side for side in SIDES if side != drive.side), "")
         counterpart = f"{drive.word}_{other}"
@@ -369,13 +371,13 @@ def unmeasured_sides(followed: Mapping[str, str], drives: Mapping[str, Drive]) -
                 "missing",
                 f"{key} is given, and {_named_like(key, drive)} is missing.",
                 f"/{escaped(_named_like(key, drive))}",
-                f"Add {_named_like(key, drive)}, or, where both sides moved alike, call the one column "
+                f"Add {_named_like(key, drive)}, or, if both sides moved together, name the single column "
                 f"{drive.word}.",
             )
 
 
 def _named_like(key: str, drive: Drive) -> str:
-    """Return what a drive's column is called beside one of the other side: as that is, the side exchanged."""
+    """Return the expected name of a drive's column, given that of the other side."""
     return f"{WORDS['z']}_{drive.side}" if key in SWEEPS else drive.name
 
 
@@ -417,7 +419,7 @@ def _unknown(key: str, drives: Mapping[str, Drive]) -> Fault:
 
 
 def shown_names(drives: Mapping[str, Drive]) -> str:
-    """Return the names of drives for people, and the words that move both sides."""
+    """Return the names of drives for messages, with the words that move both sides."""
     words = dict.fromkeys(drive.word for drive in drives.values())
     pairs = [word for word in words if all(f"{word}_{side}" in drives for side in SIDES)]
     both = f" (or {', '.join(pairs)} for both sides)" if pairs else ""
@@ -425,5 +427,25 @@ def shown_names(drives: Mapping[str, Drive]) -> str:
 
 
 def label(name: str) -> str:
-    """Return the name of a drive for people: `fold left`."""
+    """Return the display name of a drive: `fold left`."""
     return name.replace("_", " ")
+
+
+def shown_drives(names: Iterable[str]) -> list[str]:
+    """Return what a listing says of the drives that move: nothing where only the sweep of both sides does.
+
+    Both sides of a word are one entry.
+
+    Examples
+    --------
+    >>> shown_drives(["sweep_left", "sweep_right"])
+    []
+    >>> shown_drives(["sweep_left", "sweep_right", "elevator", "fold_left"])
+    ['sweep', 'elevator', 'fold_left']
+    """
+    names = list(dict.fromkeys(names))
+    shown: dict[str, None] = {}
+    for name in names:
+        word = without_side(name)
+        shown[word if all(f"{word}_{side}" in names for side in SIDES) else name] = None
+    return [] if list(shown) == ["sweep"] else list(shown)

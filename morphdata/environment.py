@@ -1,4 +1,4 @@
-"""The air that a flight meets: gust and turbulence."""
+"""Gust and turbulence along a flight."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Gust(Document):
 
     amplitude_m_s: GustSpeed
     gradient_m: Annotated[float, Field(gt=0.0, le=1e4)] = Field(description="From the edge to the peak.")
-    start_s: Moment = Field(default=0.0, description="When the aircraft meets the edge.")
+    start_s: Moment = Field(default=0.0, description="Time at which the aircraft meets the edge.")
     direction_n: Direction = Field(default=[0.0, 0.0, -1.0], description="Earth axes (NED); up by default.")
 
     def faults(self) -> Iterator[Fault]:
-        """The gust blows somewhere."""
+        """Check that the gust has a direction."""
         if not any(self.direction_n):
             yield Fault(
                 "no_direction",
@@ -41,7 +41,8 @@ class Turbulence(Document):
     """Dryden turbulence (MIL-F-8785C)."""
 
     wind_20ft_m_s: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        default=0.0, description="Mean wind at 20 ft, which rules low altitudes: 7.7 is light, 15.4 moderate."
+        default=0.0,
+        description="Mean wind at 20 ft, which governs low altitudes: 7.7 is light, 15.4 moderate.",
     )
     sigma_high_m_s: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
         default=0.0, description="Standard deviation above 2000 ft."

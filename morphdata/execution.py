@@ -1,4 +1,4 @@
-"""How a job is run: what the requests of all operations say alike and no number depends on."""
+"""How a job is run: fields common to all operations that do not affect any results."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Label = Annotated[str, Field(min_length=1, max_length=MAX_LABEL, pattern=r"^[^\x
 
 
 class Execution(Document):
-    """How the job is run; the result is the same whatever stands here."""
+    """How the job is run; this does not affect the result."""
 
     priority: int = Field(
         default=0,
         ge=-MAX_PRIORITY,
         le=MAX_PRIORITY,
-        description="Among your own jobs the highest runs first; other owners take their turns all the same.",
+        description="Among your own jobs the highest runs first; turns between owners are not affected.",
     )
     label: Label | None = Field(
         default=None, description="Free text, to find the job again: `GET /jobs?label=`."
@@ -40,7 +40,7 @@ class Execution(Document):
 
 
 class SpreadExecution(Execution):
-    """How an identification is run: on one worker, or its generations spread over several."""
+    """How an identification is run: on one worker, or with its generations spread over several."""
 
     mode: Literal["single", "distributed"] = Field(
         default="single",
@@ -52,15 +52,15 @@ class SpreadExecution(Execution):
 
 
 class Request(Document):
-    """Base of the requests for long work."""
+    """Base of all requests for jobs."""
 
     execution: Execution = Execution()
 
     def document(self) -> dict[str, Any]:
-        """Build the JSON document of this request; today's defaults are written out.
+        """Build the JSON document of this request, with today's defaults written out.
 
-        Parsed again, by a later version too, it is the same request. Aircraft and flight stand in it as they
-        came: they are documents of the user's own.
+        Parsed again, even by a later version, it gives the same request. Aircraft and flight are included as
+        received, because they are the user's own documents.
         """
         own = {"aircraft", "flight"} & type(self).model_fields.keys()
         return {

@@ -1,4 +1,4 @@
-"""What POST /export takes, what an export results in, and the JSON file of a model."""
+"""Request and result of POST /export, and the JSON file of a model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from morphdata.version import VERSION
 MAX_FITS = 1000
 if TYPE_CHECKING:
     FormatName = str
-else:  # type checkers see no choices that come from a list
+else:  # type checkers cannot use choices from a list
     FormatName = Literal[tuple(each.name for each in FORMATS)]
 
 NOTICE = "Equivalent model of a morphing aircraft, identified and written by MorphID."
@@ -35,7 +35,7 @@ EXAMPLE_EXPORT: dict[str, Any] = {
 
 
 class Origin(Document):
-    """Where a model comes from; the exported file carries it."""
+    """Origin of a model, included in the exported file."""
 
     id: Identifier | None = Field(default=None, description="Of the identified model at its service.")
     fit: Annotated[list[dict[str, Any]], Field(max_length=MAX_FITS)] = Field(
@@ -53,20 +53,20 @@ class ExportRequest(Request):
 
     aircraft: Annotated[Aircraft, Option("--aircraft", VEHICLE)] = Field(description="Aircraft.")
     flight: Annotated[Flight, Option("--flight", VEHICLE)] = Field(
-        description="Flight condition, of the reference trim too."
+        description="Flight condition, also for the reference trim."
     )
     model: KnownModel
     format: Annotated[FormatName, Option("--format", OUTPUT)] = Field(description="Format of the file.")
     origin: Origin | None = None
 
     def faults(self) -> Iterator[Fault]:
-        """The flight has the start that is asked for, and the model is of this aircraft."""
+        """Check that the flight has the requested start, and that the model belongs to this aircraft."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
 
 
 class ExportCost(Result):
-    """What an export would take, to an order of magnitude."""
+    """Estimated cost of an export, to an order of magnitude."""
 
     core_s: float = Field(description="Computing time on one core.")
 
@@ -82,7 +82,7 @@ class ExportResult(Result):
 
 
 class ModelFile(Document):
-    """The export format `json`: all that is needed to fly a model again.
+    """The export format `json`: all data needed to fly a model again.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What is wrong with a document: one value per fault, and the errors that carry faults."""
+"""Faults of documents, and the errors that carry them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any, Self
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong in a document.
+    """One fault of a document.
 
     Attributes
     ----------
     code : str
         Stable and machine-readable, ``sweep_out_of_range``.
     detail : str
-        A sentence for people.
+        A human-readable sentence.
     pointer : str
         JSON pointer (RFC 6901) into the document, or ``#header/Name``, ``#query/name``, ``#path/name``;
-        empty: the whole.
+        empty: the whole document.
     hint : str
         What to do about it.
     """
@@ -30,15 +30,15 @@ class Fault:
     hint: str = ""
 
     def under(self, pointer: str) -> Fault:
-        """Return the same fault of a document that stands at `pointer` in a larger one."""
+        """Return the same fault for a document located at `pointer` in a larger one."""
         return replace(self, pointer=f"{pointer}{self.pointer}") if pointer else self
 
 
 class Pickled:
-    """Makes an exception survive pickling whole, however it is constructed: base of every error of the house.
+    """Base of all our errors: makes an exception survive pickling, however it is constructed.
 
-    Python calls an exception's class with its ``args`` again, which fails for keyword arguments and for
-    constructors that write their own sentence; a process pool then hangs.
+    To unpickle an exception, Python calls its class with its ``args``, which fails for keyword arguments and
+    for constructors that compose their own message; a process pool then hangs.
     """
 
     args: tuple[Any, ...]
@@ -89,7 +89,7 @@ class InvalidInput(MorphError):
     message, pointer, hint : str
         Of the first fault.
     faults : tuple of Fault
-        All of them; left out: one, made of message, pointer and hint.
+        All faults; default: one, made from message, pointer and hint.
     """
 
     code = "invalid_input"
@@ -102,18 +102,18 @@ class InvalidInput(MorphError):
 
     @classmethod
     def of(cls, faults: Iterable[Fault]) -> Self:
-        """Return the error of one or more faults."""
+        """Return the error for one or more faults."""
         every = tuple(faults)
         first = every[0]
         return cls(first.detail, pointer=first.pointer, hint=first.hint, faults=every)
 
 
 class Interrupted(Exception):
-    """Long work was asked to stop, and has ended between two chunks."""
+    """Long work stopped on request, between two chunks."""
 
 
 def refuse(faults: Iterable[Fault]) -> None:
-    """Raise InvalidInput that names all of these faults; return where there is none."""
+    """Raise InvalidInput with all of these faults; return if there are none."""
     found = tuple(faults)
     if found:
         raise InvalidInput.of(found)

@@ -12,8 +12,8 @@ from morphdata.atmosphere import standard_atmosphere
 from morphdata.base import Document, Vector3
 from morphdata.faults import Fault
 
-MACH_LIMIT = 0.7  # Prandtl-Glauert's linear compressibility holds up to here
-# an enumeration of one: generated clients take a constant beside a number for the only choice
+MACH_LIMIT = 0.7  # linear compressibility (Prandtl-Glauert) is valid up to here
+# an enumeration with one value: generated clients treat a constant in a union as the only choice
 Auto = Annotated[Literal["auto"], WithJsonSchema({"type": "string", "enum": ["auto"]})]
 
 EXAMPLE_FLIGHT: dict[str, Any] = {
@@ -31,7 +31,7 @@ EXAMPLE_FLIGHT: dict[str, Any] = {
 
 
 class Start(Document):
-    """A measured start: attitude against the air and the constant force and moment that hold it."""
+    """A measured start: attitude relative to the air, and the constant force and moment that hold it."""
 
     alpha_rad: float = Field(ge=-0.5, le=0.5)
     force_b_n: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Body axes, at the reference point.")
@@ -41,13 +41,13 @@ class Start(Document):
 
 
 class Flight(Document):
-    """Speed, air and start of every sample."""
+    """Airspeed, air and start of every sample."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_FLIGHT]})
 
     airspeed_m_s: float = Field(gt=0.0, le=1000.0)
     air_density_kg_m3: Annotated[float, Field(gt=0.0, le=2.0)] | None = Field(
-        default=None, description="The standard atmosphere's at `altitude_m` when left out."
+        default=None, description="Default: that of the standard atmosphere at `altitude_m`."
     )
     gravity_m_s2: float = Field(default=9.80665, ge=0.0, le=30.0)
     altitude_m: float = Field(default=0.0, ge=-1000.0, le=20_000.0)
@@ -72,7 +72,7 @@ class Flight(Document):
         return standard_atmosphere(self.altitude_m).density_kg_m3
 
     def faults(self) -> Iterator[Fault]:
-        """A Mach number that follows from speed and altitude is one that the method holds for."""
+        """Check that a Mach number from speed and altitude is within the method's validity."""
         mach = self.mach_number
         if mach is not None and mach > MACH_LIMIT:
             yield Fault(
@@ -99,7 +99,7 @@ def load_flight(path: str | Path) -> Flight:
     Raises
     ------
     InvalidInput
-        Naming every fault, with pointers that begin with ``/flight``.
+        Lists every fault, with pointers that begin with ``/flight``.
 
     Examples
     --------

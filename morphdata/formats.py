@@ -1,7 +1,7 @@
-"""The formats in which an identified model leaves the house: to add one, write its module and name it here.
+"""The export formats of identified models: to add one, write its module and list it here.
 
-The module holds one function, ``write(exported) -> bytes``, that the format's ``write`` names; see
-``morphcore/export/formats.py``. OpenAPI document, command, page and artifacts go by this list.
+The module has one function, ``write(exported) -> bytes``, named by the format's ``write``; see
+``morphcore/export/formats.py``. OpenAPI document, command, page and artifacts are built from this list.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ class ExportFormat:
     name : str
         In requests and on the command line.
     title : str
-        What the file is and for whom, a line.
+        One line on the file's contents and use.
     media_type : str
         Of the file.
     ending : str
-        Of the file's name, with its dot.
+        File extension, with its dot.
     write : str
-        Where its function is, ``package.module:function``; imported when it is first used. It takes a
+        Its function, ``package.module:function``, imported on first use. It takes a
         `morphcore.export.formats.ExportedModel` and returns the file's bytes, the same for the same model.
     """
 
@@ -36,7 +36,7 @@ class ExportFormat:
 
     @property
     def file(self) -> str:
-        """Name of the file that a job leaves."""
+        """Name of the job's file."""
         return f"model{self.ending}"
 
 

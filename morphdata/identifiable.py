@@ -1,6 +1,6 @@
-"""The identifiable parameters as documents know them: their names, and what their bounds and values may be.
+"""The identifiable parameters for documents: names, and ranges of bounds and values.
 
-What a parameter means to a model stands under the same name in ``morphcore/models/parameters.py``.
+The implementation of a parameter is under the same name in ``morphcore/models/parameters.py``.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from pydantic import Field
 
 @dataclass(frozen=True)
 class Identifiable:
-    """What documents hold of one parameter.
+    """Facts about one parameter.
 
     Attributes
     ----------
     name : str
-        In bounds, corrections and reports.
+        Name in bounds, corrections and reports.
     low, high : float
         Physical range of its bounds, SI units.
     positive : bool
-        It is searched on a logarithmic scale: zero is no bound.
+        Whether it is searched on a logarithmic scale, so that zero is not a valid bound.
     bounds_description : str, optional
         Of its bounds.
     value : type, optional
-        Of an aerodynamic correction, what a model's ``aero`` object may hold; None: it is no correction.
+        For an aerodynamic correction, its type in a model's ``aero`` object; None: not a correction.
     default : float, optional
-        Of a correction that a document leaves out; None: it must not.
+        Value of a correction that a document omits; None: required.
     value_description : str, optional
         Of a correction's value.
     """

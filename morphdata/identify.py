@@ -15,12 +15,14 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
+from morphdata.measurement import Measurement, SampleMeasurement, absent_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name, under_both_spellings
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
+from morphdata.verdict import ChannelStatistics, Verdict
 from morphdata.warnings import Warnings
 
 MAX_SAMPLES = 64
@@ -239,6 +241,11 @@ class SamplesRequest(Request):
     samples: list[Sample] = Field(min_length=1, max_length=MAX_SAMPLES)
     model: SearchedModel
     search: Search = Search()
+    measurement: Measurement | None = Field(
+        default=None,
+        description="How the samples were measured: channels, noise, biases, delays. Left out: the three "
+        "angles, and what else is free is decided from the data.",
+    )
 
     def inline_samples(self) -> dict[int, InlineSample]:
         """Collect the samples whose rows are here, by their place in the list."""
@@ -256,6 +263,13 @@ class SamplesRequest(Request):
         drives = self.aircraft.drives
         for number, sample in samples.items():
             yield from (fault.under(f"/samples/{number}") for fault in sample.drive_faults(drives))
+        yield from absent_channels(
+            self.measurement,
+            [
+                (f"/samples/{n}", sample.role, tuple(getattr(sample, "channels", ())))
+                for n, sample in samples.items()
+            ],
+        )
 
 
 def total_rows_faults(total: int) -> Iterator[Fault]:
@@ -371,6 +385,9 @@ class SampleFit(Result):
     J_identified: float | None
     rms_rad: Angles
     max_abs_rad: Angles
+    statistics: dict[str, ChannelStatistics] = Field(
+        default={}, description="Of the identified model's errors, by channel (`phi`, `theta`, `psi`)."
+    )
 
 
 class AeroCorrections(Result):
@@ -439,6 +456,16 @@ class Uncertainty(Result):
         description="[low, high] of each parameter that was searched, SI units; null on a side where the "
         "samples do not bound it within the range of the search. Empty in a partial result.",
     )
+    value: dict[str, float] = Field(
+        default={},
+        description="The identified values by the same names, fixed parameters included; SI units.",
+    )
+    cramer_rao_percent: dict[str, float | None] = Field(
+        default={},
+        description="Cramer-Rao bound of each searched parameter, per cent of its value: the standard error "
+        "if residuals were white noise. null where the samples do not see it, or the value is 0. The "
+        "interval knows that residuals are correlated and is the one to rely on.",
+    )
     undetermined: list[str] = Field(
         default=[], description="Parameters whose standard deviation exceeds a factor of e."
     )
@@ -458,6 +485,12 @@ class IdentifyResult(Result):
     fit: list[SampleFit]
     search: SearchReport
     uncertainty: Uncertainty | None = None
+    verdict: Verdict | None = Field(
+        default=None, description="Whether the model may be believed; null in results of earlier versions."
+    )
+    measurement: dict[str, SampleMeasurement] = Field(
+        default={}, description="By sample: biases, delay and heading that were found, and what was free."
+    )
     warnings: Warnings = Field(default=[])
     cost: dict[str, Any] | None = None
     partial: bool = Field(default=False, description="Best result so far of a job that did not finish.")

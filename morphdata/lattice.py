@@ -1,4 +1,4 @@
-"""How a model's air is computed and where its flight starts: the same words for every model."""
+"""Settings of aerodynamics and start, common to all models."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from morphdata.options import MODEL, Option
 # 1 - (0.1 / 0.5)^4 / 2, so it moves the self-influence by less than 1e-3, while a leg that strikes a control
 # point induces no more than gamma / (2 sqrt(2) pi core).
 LINE_CORE = 0.1
-# Cut-off of "smoothed" as a fraction of the surface's mean chord, as programs with this law commonly have it.
-# A panel of 1/4 chord has its control point 2.5 cut-offs from its edges: the self-influence is damped, and
-# the lift comes out too high (docs/physics.md has the figure).
+# Cut-off of "smoothed" as a fraction of the surface's mean chord, as is common in programs with this law. A
+# panel of 1/4 chord has its control point 2.5 cut-offs from its edges: the self-influence is damped, and the
+# lift comes out too high (docs/physics.md has the figure).
 SMOOTHED_CORE = 0.05
 
 CoreLaw = Literal["line", "smoothed"]
@@ -24,20 +24,20 @@ CORE_LAWS: tuple[CoreLaw, ...] = get_args(CoreLaw)
 
 
 class VortexCore(Document):
-    """What keeps the velocity of a vortex finite: a factor of the distance from its line, or a cut-off."""
+    """Law that keeps the velocity of a vortex finite: a factor of the distance, or a cut-off."""
 
     law: Annotated[CoreLaw, Option("--core", MODEL)] = Field(
         default="line", description="Core of the lattice's vortices."
     )
     fraction: Annotated[float, Field(gt=0.0, le=0.5)] | None = Field(
         default=None,
-        description="Core radius over the smaller side of a panel (line, 0.1 when left out) or over the mean "
-        "chord of the surface (smoothed, 0.05 when left out).",
+        description="Core radius over the smaller side of a panel (line, default 0.1) or over the mean "
+        "chord of the surface (smoothed, default 0.05).",
     )
 
     @property
     def radius_fraction(self) -> float:
-        """The fraction that holds, given or default."""
+        """The effective fraction, given or default."""
         if self.fraction is not None:
             return self.fraction
         return LINE_CORE if self.law == "line" else SMOOTHED_CORE
@@ -55,15 +55,15 @@ class Lattice(Document):
     core: VortexCore = VortexCore()
 
     def to_document(self) -> dict[str, Any]:
-        """Return the JSON form, with the core's fraction that holds."""
+        """Return the JSON form, with the effective core fraction."""
         core = {"law": self.core.law, "fraction": self.core.radius_fraction}
         return {"chordwise": self.chordwise, "spanwise": self.spanwise, "core": core}
 
 
 DEFAULT_CORE = VortexCore()
 DEFAULT_LATTICE = Lattice()
-CHOSEN = "Left out: the longest of 10, 5 and 2.5 ms that holds the attitude to 5e-5 rad."
-OWN_OR_CHOSEN = f"That of the identification, where it is known. {CHOSEN}"
+CHOSEN = "Default: the longest of 10, 5 and 2.5 ms that keeps the attitude error within 5e-5 rad."
+OWN_OR_CHOSEN = f"That of the identification, if known. {CHOSEN}"
 StepS = Annotated[float, Field(ge=0.0005, le=0.01)]  # of a search
-FlightStepS = Annotated[float, Field(ge=1e-5, le=0.02)]  # of one flight, which may be as exact as it likes
+FlightStepS = Annotated[float, Field(ge=1e-5, le=0.02)]  # of one flight, which may be arbitrarily exact
 Start = Literal["trim", "given"]

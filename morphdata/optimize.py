@@ -1,4 +1,4 @@
-"""What POST /optimize takes and what the optimisation of a schedule results in."""
+"""Request and result of POST /optimize."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from morphdata.warnings import Warnings
 LONGEST_MORPH_S = 100.0
 SMALLEST_CHANGE_RAD = 1e-6
 MAX_FLIGHTS = 2_000_000  # of one search
-# nominal figures, to an order of magnitude: what a request leaves out is the solver's choice
+# nominal figures, to an order of magnitude, for settings that a request leaves to the solver
 SWARM_PARTICLES, SWARM_GENERATIONS = 50, 100
 SCREEN, DESCENT_STARTS, DESCENT_ITERATIONS = 16, 3, 8
 SEARCHES = 2  # with the rigid model too
-DURATIONS_TRIED = 10  # on the way to the shortest
+DURATIONS_TRIED = 10  # searches on the way to the shortest duration
 
 Verify = Literal["flexible", "none"]
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -39,18 +39,18 @@ DriveName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,45}$")]
 
 
 class SearchedModel(KnownModel):
-    """The equivalent model that is searched with."""
+    """The equivalent model used in the search."""
 
     step_s: StepS | None = Field(default=None, description=OWN_OR_CHOSEN)
 
 
 class Morph(Document):
-    """The change of shape that is wanted: one schedule for a kind of drive, or for a single one."""
+    """The requested change of shape: one schedule for a kind of drive, or for a single one."""
 
     drive: Annotated[DriveName | None, Option("--drive", MORPH)] = Field(
         default=None,
         description="What morphs: the word of a kind of drive, `fold`, of which both sides follow the "
-        "schedule, or the name of one, `fold_left`. Needed where the aircraft has several kinds; the others "
+        "schedule, or the name of one, `fold_left`. Needed if the aircraft has several kinds; the others "
         "hold their angles.",
     )
     initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
@@ -60,7 +60,7 @@ class Morph(Document):
         description="Angle of the drive at the end of the morph, rad."
     )
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)] = Field(
-        description="Time that the morph takes, s; of the goals `minimum_time` and `pareto` the longest that "
+        description="Duration of the morph, s; for the goals `minimum_time` and `pareto` the longest that "
         "is looked at."
     )
     knots: Annotated[int, Option("--knots", MORPH)] = Field(
@@ -71,10 +71,10 @@ class Morph(Document):
     )
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_MORPH_S), Option("--settle", MORPH)] = Field(
         default=2.0,
-        description="How long after `duration_s` the attitude still counts, of shorter morphs too.",
+        description="Time after `duration_s` in which the attitude still counts, also for shorter morphs.",
     )
     free_values: Annotated[bool, Option("--free-values", MORPH)] = Field(
-        default=False, description="Search the angles at the knots too."
+        default=False, description="Also search the angles at the knots."
     )
     goal: Annotated[Literal["variation", "minimum_time", "pareto"], Option("--goal", MORPH)] = Field(
         default="variation",
@@ -83,18 +83,18 @@ class Morph(Document):
     )
     max_variation_rad2: Annotated[
         Annotated[float, Field(gt=0.0, le=1e6)] | None, Option("--max-variation", MORPH)
-    ] = Field(default=None, description="Largest variation; needed for the goal `minimum_time`.")
+    ] = Field(default=None, description="Maximum variation; needed for the goal `minimum_time`.")
     front_points: Annotated[int, Option("--front-points", MORPH)] = Field(
         default=7, ge=2, le=50, description="Durations on the front of `pareto`."
     )
 
     @property
     def change_rad(self) -> float:
-        """By how much the angle changes, rad, with its sign."""
+        """Signed change of the angle, rad."""
         return self.final_rad - self.initial_rad
 
     def named_drive(self, drives: Mapping[str, Drive]) -> str:
-        """Return the drive that morphs, or its word: as given, else the only word of the aircraft."""
+        """Return the drive to be moved, or its word: as given, else the only word of the aircraft."""
         return self.drive or next(iter(drives.values())).word
 
     def moved(self, drives: Mapping[str, Drive]) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Morph(Document):
         Raises
         ------
         InvalidInput
-            The aircraft has no such drive, or several kinds of which none is named; at ``/morph/drive``.
+            The aircraft has no such drive, or several kinds and none is named; at ``/morph/drive``.
         """
         words = list(dict.fromkeys(drive.word for drive in drives.values()))
         if self.drive is None and len(words) > 1:
@@ -113,7 +113,7 @@ class Morph(Document):
                         "missing",
                         f"The aircraft has several kinds of drives: {', '.join(words)}.",
                         "/morph/drive",
-                        f"Name the one that morphs: {shown_names(drives)}.",
+                        f"Name the one to be moved: {shown_names(drives)}.",
                     )
                 ]
             )
@@ -122,7 +122,7 @@ class Morph(Document):
         return tuple(keys)
 
     def faults(self) -> Iterator[Fault]:
-        """Check that the angle changes, and that the goal has what it needs."""
+        """Check that the angle changes, and that the fields needed by the goal are given."""
         if abs(self.change_rad) < SMALLEST_CHANGE_RAD:
             yield Fault(
                 "nothing_to_morph",
@@ -133,9 +133,9 @@ class Morph(Document):
         if self.goal == "minimum_time" and self.max_variation_rad2 is None:
             yield Fault(
                 "missing",
-                "The least time is searched under a limit of the variation.",
+                "The minimum time needs a limit of the variation.",
                 "/max_variation_rad2",
-                "Add it; the variation of a result at constant rate tells its order of magnitude.",
+                "Add it; the variation of a result at constant rate shows its order of magnitude.",
             )
         elif self.goal != "minimum_time" and self.max_variation_rad2 is not None:
             yield Fault(
@@ -147,7 +147,7 @@ class Morph(Document):
 
 
 class Limits(Document):
-    """What no schedule may exceed; what is left out is not limited."""
+    """Limits of all schedules; omitted quantities are not limited."""
 
     max_rate_rad_s: Annotated[
         Annotated[float, Field(gt=0.0, le=100.0)] | None, Option("--rate-limit", LIMITS)
@@ -162,21 +162,21 @@ class Limits(Document):
         Annotated[float, Field(gt=0.0, le=1e9)] | None, Option("--torque-limit", LIMITS)
     ] = Field(
         default=None,
-        description="Largest torque of any hinge's motor, N m, in the model that is searched with.",
+        description="Largest torque of any hinge's motor, N m, in the model used in the search.",
     )
 
     def shortest_morph_s(self, change_rad: float) -> float:
-        """Compute the least time from rest to rest: full acceleration, full rate, full braking.
+        """Compute the minimum time from rest to rest: full acceleration, full rate, full braking.
 
         Parameters
         ----------
         change_rad : float
-            Angle between, rad, without its sign.
+            Absolute change of the angle, rad.
 
         Returns
         -------
         float
-            Seconds; 0 where nothing is limited.
+            Seconds; 0 if nothing is limited.
         """
         rate = math.inf if self.max_rate_rad_s is None else self.max_rate_rad_s
         accel = math.inf if self.max_accel_rad_s2 is None else self.max_accel_rad_s2
@@ -186,20 +186,20 @@ class Limits(Document):
 
 
 class Weights(Document):
-    """Weights of the squared departures of roll, pitch and yaw in what is minimised."""
+    """Weights of the squared departures of roll, pitch and yaw in the objective."""
 
     phi: Weight = 1.0
     theta: Weight = 1.0
     psi: Weight = 1.0
 
     def faults(self) -> Iterator[Fault]:
-        """Check that an angle counts."""
+        """Check that at least one weight is positive."""
         if self.phi == self.theta == self.psi == 0.0:
             yield Fault("weights_all_zero", "All weights are zero.", hint="Give one of them a weight.")
 
 
 def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
-    """Check that a goal that seeks a duration has a shortest one."""
+    """Check that a shortest duration exists for a goal that searches for one."""
     if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
         yield Fault(
             "missing",
@@ -210,13 +210,16 @@ def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
 
 
 class ScheduleSearch(SwarmSearch):
-    """How the schedule is searched; what is left out depends on the method."""
+    """How the schedule is searched; defaults depend on the method."""
 
     method: Annotated[Literal["hybrid", "pso"], Option("--method", SEARCH)] = Field(
         default="hybrid", description="How the schedule is searched."
     )
     particles: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--particles", SEARCH)] = (
-        Field(default=None, description="Size of the swarm, or schedules among which `hybrid` starts.")
+        Field(
+            default=None,
+            description="Size of the swarm, or number of schedules from which `hybrid` selects its starts.",
+        )
     )
     generations: Annotated[Annotated[int, Field(ge=1, le=10_000)] | None, Option("--generations", SEARCH)] = (
         Field(default=None, description="Generations of the swarm, or iterations of `hybrid`.")
@@ -227,7 +230,7 @@ class ScheduleSearch(SwarmSearch):
 
 
 class VerifyingModel(Document):
-    """The flexible model in which the schedules are flown again."""
+    """The flexible model used for verification."""
 
     elements: Annotated[int, Option("--elements", MODEL)] = Field(
         default=DEFAULT_ELEMENTS,
@@ -235,7 +238,7 @@ class VerifyingModel(Document):
         le=MAX_ELEMENTS,
         description="Beam elements of each wing of the flexible model.",
     )
-    lattice: Lattice | None = Field(default=None, description="As the equivalent model's when left out.")
+    lattice: Lattice | None = Field(default=None, description="Default: that of the equivalent model.")
 
 
 EXAMPLE_OPTIMIZATION: dict[str, Any] = {
@@ -250,7 +253,7 @@ EXAMPLE_OPTIMIZATION: dict[str, Any] = {
 
 
 class OptimizeRequest(Request):
-    """Aircraft, flight condition, an equivalent model, the morph that is wanted and its limits."""
+    """Aircraft, flight condition, an equivalent model, the requested morph and its limits."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_OPTIMIZATION]})
 
@@ -275,7 +278,7 @@ class OptimizeRequest(Request):
 
     @property
     def flights(self) -> int:
-        """Number of flights of the searches, of the rigid model too, to an order of magnitude."""
+        """Number of flights of all searches, including the rigid model's, to an order of magnitude."""
         search, morph = self.search, self.morph
         if search.method == "pso" or search.preset == "paper":
             flights = (search.particles or SWARM_PARTICLES) * (search.generations or SWARM_GENERATIONS)
@@ -330,10 +333,10 @@ class OptimizeRequest(Request):
 
 
 class ScheduleCost(Result):
-    """What an optimisation would take, to an order of magnitude."""
+    """Estimated cost of an optimisation, to an order of magnitude."""
 
     parameters: int = Field(description="Free parameters.")
-    flights: int = Field(description="Flights to be flown in the search, of the rigid model too.")
+    flights: int = Field(description="Flights in the search, including those of the rigid model.")
     flight_s: float = Field(description="Simulated time of all those flights.")
     core_s: float = Field(description="Computing time on one core, the flexible model's flights included.")
 
@@ -355,14 +358,14 @@ class FoundSchedule(Result):
 
 
 class KeptLimits(Result):
-    """Largest rate and acceleration that were allowed."""
+    """The allowed maximum rate and acceleration."""
 
     max_rate_rad_s: float | None
     max_accel_rad_s2: float | None
 
 
 class Variation(Result):
-    """Attitude variation of one schedule, rad^2, flown in each of the models; null where it was not."""
+    """Attitude variation of one schedule, rad^2, in each model; null if not flown."""
 
     rigid: float | None = None
     equivalent: float | None = None
@@ -370,24 +373,24 @@ class Variation(Result):
 
 
 class Variations(Result):
-    """The schedules that are compared."""
+    """The compared schedules."""
 
     constant: Variation = Field(description="At constant rate.")
     rigid_optimum: Variation = Field(description="Optimised with the rigid model.")
-    optimum: Variation = Field(description="Sought with the equivalent model.")
+    optimum: Variation = Field(description="Optimised with the equivalent model.")
 
 
 class OptimizeResult(Result):
     """Result of a schedule optimisation."""
 
     schedule: FoundSchedule | None = Field(
-        description="null in a partial result whose best schedule never flew to its end."
+        description="null in a partial result whose best schedule could not be flown to its end."
     )
     drives: list[str] = Field(default=[], description="Names of the drives that follow the schedule.")
     limits: KeptLimits
     variation: Variations
     reduction_percent: float | None = Field(
-        description="Of the variation against constant rate, in the flexible model where both were flown in "
+        description="Of the variation relative to constant rate, in the flexible model if both were flown in "
         "it, else in the equivalent one."
     )
     search: dict[str, Any]

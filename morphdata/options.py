@@ -1,4 +1,4 @@
-"""Which fields of a request are options of its command."""
+"""Marks the fields of a request that are options of its command."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ SCHEDULE = "Schedule and air"
 MORPH = "Morph"
 LIMITS = "Limits"
 MODEL = "Model"
+MEASUREMENT = "Measurement"
 SEARCH = "Search"
 OUTPUT = "Execution and output"
 
@@ -18,9 +19,8 @@ OUTPUT = "Execution and output"
 class Option:
     """Marks a field as an option of the command; its help, type, choices and limits are the field's.
 
-    Numbers, texts, choices and flags stand on the command line as they are; a list is written with commas
-    between its items, as are the values of an object of numbers (``--weights 1,1,1``); a larger object is a
-    JSON file.
+    Numbers, texts, choices and flags are written as they are; the items of a list are separated by commas, as
+    are the values of an object of numbers (``--weights 1,1,1``); a larger object is a JSON file.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""An equivalent model that is known already: its parameters outright, or the id of an identified model."""
+"""A known equivalent model: its parameters, or the id of an identified model."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from morphdata.refusals import escaped
 MAX_LINKS = 8
 MAX_WINGS = 16
 AXES = 3  # flap, torsion, edgewise
-SUM_TOLERANCE = 1e-6  # of the division: documents may be rounded for printing
-RAGGED = -1  # length of rows that differ in length
+SUM_TOLERANCE = 1e-6  # tolerance of the division: documents may be rounded for printing
+RAGGED = -1  # stands for the length of rows of different lengths
 
 EXAMPLE_PARAMETERS: dict[str, Any] = {
     "links_per_wing": 2,
@@ -39,7 +39,7 @@ Joints = Annotated[list[Joint], Field(max_length=MAX_LINKS - 1)]
 
 if TYPE_CHECKING:
     Corrections = Document
-else:  # type checkers see no fields that come from a list
+else:  # type checkers cannot use fields from a list
     Corrections = create_model(
         "Corrections",
         __base__=Document,
@@ -69,7 +69,7 @@ class SurfaceParameters(Document):
 class MirroredParameters(Document):
     """A surface with the parameters of its mirror image."""
 
-    mirror_of: str = Field(description="Name of the surface whose parameters they are.")
+    mirror_of: str = Field(description="Name of the surface whose parameters are used.")
 
 
 def _whose(value: Any) -> str:
@@ -91,10 +91,10 @@ class Parameters(Document):
     links_per_wing: int = Field(ge=1, le=MAX_LINKS)
     separate_wings: bool = False
     division: Shares | Annotated[list[Shares], Field(min_length=1, max_length=MAX_WINGS)] = Field(
-        description="Share of the span of each link; one list per wing where wings are separate."
+        description="Share of the span of each link; one list per wing if wings are separate."
     )
     stiffness_nm_rad: Joints | Annotated[list[Joints], Field(max_length=MAX_WINGS)] = Field(
-        description="Per joint [flap, torsion, edgewise]; one list per wing where wings are separate."
+        description="Per joint [flap, torsion, edgewise]; one list per wing if wings are separate."
     )
     damping_nms_rad: Joints | Annotated[list[Joints], Field(max_length=MAX_WINGS)] = Field(
         description="The same of the dampings."
@@ -104,7 +104,7 @@ class Parameters(Document):
         default=None,
         min_length=1,
         max_length=MAX_WINGS,
-        description="Of an aircraft whose flexible surfaces are not one mirror pair: by name, each one's "
+        description="For an aircraft whose flexible surfaces are not one mirror pair: by name, each one's "
         "own parameters. `division`, `stiffness_nm_rad`, `damping_nms_rad` and `aero.profile_drag` are then "
         "those of the largest. Without it these are taken for the largest, and the others are as far from "
         "their own beam theory.",
@@ -119,7 +119,7 @@ class Parameters(Document):
         return _rows(self.division)
 
     def faults(self) -> Iterator[Fault]:
-        """The lists have the lengths that the number of links asks for, and the shares make a whole span."""
+        """Check that the lists match the number of links and the shares add up to the whole span."""
         yield from _structure_faults(self, self.links_per_wing)
         surfaces = self.surfaces or {}
         for name, own in surfaces.items():
@@ -131,7 +131,7 @@ class Parameters(Document):
                     "mirrors_nothing",
                     f"{name!r} mirrors {own.mirror_of!r}, which has no parameters.",
                     f"{at}/mirror_of",
-                    "Name a surface with parameters of its own.",
+                    "Name a surface with its own parameters.",
                 )
 
 
@@ -149,7 +149,7 @@ def _structure_faults(own: Parameters | SurfaceParameters, links: int) -> Iterat
     }
     for name, shape in shapes.items():
         allowed = {shape, shape[1:]} if len(rows) == 1 else {shape}
-        if links == 1:  # no joints: [] and a [] per wing are the same
+        if links == 1:  # no joints: [] and one [] per wing are equivalent
             allowed |= {(0,), (len(rows), 0)}
         if _shape(getattr(own, name)) not in allowed:
             wanted = " x ".join(str(number) for number in (shape if len(rows) > 1 else shape[1:]))
@@ -171,7 +171,7 @@ def _structure_faults(own: Parameters | SurfaceParameters, links: int) -> Iterat
 
 
 def _shape(values: list[Any]) -> tuple[int, ...]:
-    """Shape of nested lists; `RAGGED` where rows differ in length."""
+    """Shape of nested lists; `RAGGED` if rows differ in length."""
     shape: tuple[int, ...] = (len(values),)
     level = values
     while level and isinstance(level[0], list):
@@ -184,13 +184,13 @@ def _shape(values: list[Any]) -> tuple[int, ...]:
 
 
 def has_flown(fit: Any) -> bool:
-    """Whether a model flies all samples to fit, by the fits of a result: where it does not, J is null."""
+    """Whether a model flies all fitted samples, judged by the fits of a result: otherwise J is null."""
     rows = [row for row in fit if isinstance(row, dict)] if isinstance(fit, list) else []
     return not any(row.get("role") == "train" and row.get("J_identified", 0.0) is None for row in rows)
 
 
 class WholeResult(Document):
-    """A whole result of an identification, or an exported model: only its `model` is looked at."""
+    """A whole result of an identification, or an exported model; only its `model` is used."""
 
     model: Parameters
     fit: Unread = None
@@ -211,11 +211,11 @@ class WholeResult(Document):
         return self.model
 
     def faults(self) -> Iterator[Fault]:
-        """The model flies the samples that it was fitted to."""
+        """Check that the model flies the samples that it was fitted to."""
         if not has_flown(self.fit):
             yield Fault(
                 "never_flown",
-                "The result holds no model that flies the samples it was fitted to.",
+                "The result contains no model that flies the samples it was fitted to.",
                 "/model",
                 "Its warnings say why; give the result of an identification that succeeded.",
             )
@@ -232,14 +232,14 @@ GivenParameters = Annotated[
 
 
 def parameters_in(given: Parameters | WholeResult | None) -> Parameters | None:
-    """Return the parameters themselves, also of a whole result."""
+    """Return the parameters themselves, also from a whole result."""
     return given.model if isinstance(given, WholeResult) else given
 
 
 class KnownModel(Document):
-    """An equivalent model by its parameters, or by the id of an identified one.
+    """An equivalent model, given by its parameters or by the id of an identified one.
 
-    Lattice, step and start are those it was identified with where they are left out.
+    Lattice, step and start default to those of its identification.
     """
 
     parameters: Annotated[GivenParameters | None, Option("--parameters", MODEL)] = Field(
@@ -258,11 +258,11 @@ class KnownModel(Document):
 
     @property
     def known(self) -> Parameters | None:
-        """The parameters, where the document holds them."""
+        """The parameters, if the document contains them."""
         return parameters_in(self.parameters)
 
     def faults(self) -> Iterator[Fault]:
-        """The model is given once."""
+        """Check that the model is given exactly once."""
         if self.parameters is not None and self.model_id is not None:
             yield Fault(
                 "given_twice",
@@ -280,7 +280,7 @@ class KnownModel(Document):
 
 
 class FliesWith(Protocol):
-    """A model that may say how it is flown."""
+    """A model that may contain flight settings."""
 
     @property
     def lattice(self) -> Lattice | None:
@@ -297,7 +297,7 @@ class FliesWith(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class FlownWith:
-    """How a model is flown.
+    """Flight settings of a model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Names that have changed: documents accept the old spelling, and results carry both throughout version 0.2.
+"""Renamed fields: documents accept the old spelling, and results contain both throughout version 0.2.
 
 A parameter's name may have parts, ``right.stiffness_nm_rad.joint_1.edgewise``: the last one is looked up.
 """
@@ -14,7 +14,7 @@ FORMER_NOTE = "Former name of `{name}`, accepted and written throughout version 
 
 
 def current_name(name: str) -> str:
-    """Return today's spelling of a field's or parameter's name.
+    """Return the current spelling of a field's or parameter's name.
 
     >>> current_name("stiffness_nm_rad.joint_1.lag")
     'stiffness_nm_rad.joint_1.edgewise'
@@ -23,7 +23,7 @@ def current_name(name: str) -> str:
 
 
 def former_name(name: str) -> str:
-    """Return the old spelling of a name; the name itself where it has none.
+    """Return the old spelling of a name, or the name itself if it has none.
 
     >>> former_name("ac_offset_m"), former_name("profile_drag")
     ('centre_shift_m', 'profile_drag')
@@ -32,7 +32,7 @@ def former_name(name: str) -> str:
 
 
 def current_names(names: Iterable[str]) -> list[str]:
-    """Return each name once, in today's spelling.
+    """Return each name once, in its current spelling.
 
     >>> current_names(["ac_offset_m", "lag_s", "centre_shift_m"])
     ['ac_offset_m', 'lag_s']
@@ -41,7 +41,7 @@ def current_names(names: Iterable[str]) -> list[str]:
 
 
 def both_spellings(names: Iterable[str]) -> list[str]:
-    """Return the names of a result's list, and after them the old spellings of those that have one.
+    """Return the names of a result's list, followed by the old spellings of those that have one.
 
     >>> both_spellings(["ac_offset_m", "lag_s"])
     ['ac_offset_m', 'lag_s', 'centre_shift_m']
@@ -51,7 +51,7 @@ def both_spellings(names: Iterable[str]) -> list[str]:
 
 
 def under_both_spellings(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a result's object with today's names, followed by the renamed entries under their old names.
+    """Return a result's object with current names, followed by the renamed entries under their old names.
 
     >>> under_both_spellings({"ac_offset_m": 0.002, "lag_s": 0.004})
     {'ac_offset_m': 0.002, 'lag_s': 0.004, 'centre_shift_m': 0.002}

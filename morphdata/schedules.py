@@ -1,4 +1,4 @@
-"""Schedules: what each drive does over time."""
+"""Schedules: motions of the drives over time."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ class ConstantRate(Document):
 
     @property
     def morph_s(self) -> float:
-        """Duration of the morph, given or out of the mean rate."""
+        """Duration of the morph, as given or from the mean rate."""
         if self.duration_s is not None:
             return self.duration_s
         return abs(self.final_rad - self.initial_rad) / (self.rate_rad_s or 1.0)
 
     def faults(self) -> Iterator[Fault]:
-        """Duration or rate is given, and the ramps fit into the morph."""
+        """Check that duration or rate is given, and that the ramps fit into the morph."""
         if (self.duration_s is None) == (self.rate_rad_s is None):
             both = self.duration_s is not None
             yield Fault(
@@ -120,7 +120,7 @@ class Spline(Document):
     knot_angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
 
     def faults(self) -> Iterator[Fault]:
-        """There is an angle for every time, and time rises."""
+        """Check that there is an angle for every time, and that time increases."""
         yield from _history_faults(self, "knot_time_s", "knot_angle_rad")
 
 
@@ -132,7 +132,7 @@ class Tabulated(Document):
     angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
 
     def faults(self) -> Iterator[Fault]:
-        """There is an angle for every time, and time rises."""
+        """Check that there is an angle for every time, and that time increases."""
         yield from _history_faults(self, "time_s", "angle_rad")
 
 
@@ -165,10 +165,10 @@ EXAMPLE_HOLD: dict[str, Any] = {"kind": "hold", "angle_rad": 0.2}
 
 
 class Schedules(Document):
-    """What the drives do: a schedule for each drive that moves, by its name; the others hold their angle.
+    """Schedules of the drives that move, by name; the others hold their angle.
 
-    A key is the name of a drive (`fold_left`) or the word of a kind of hinge, which moves both sides alike
-    (`sweep`). Where a side has only one kind of hinge, `both`, `left` and `right` may stand for it.
+    A key is the name of a drive (`fold_left`) or the word of a kind of hinge, which moves both sides together
+    (`sweep`). If a side has only one kind of hinge, `both`, `left` and `right` may be used.
     """
 
     model_config = ConfigDict(
@@ -191,7 +191,7 @@ class Schedules(Document):
     @model_validator(mode="before")
     @classmethod
     def _by_drive(cls, given: Any) -> Any:
-        """Refuse a schedule that stands where its drive should be named, in words for this case."""
+        """Refuse a schedule given without the name of its drive, with a specific message."""
         if isinstance(given, dict) and isinstance(given.get("kind"), str):
             fault = Fault(
                 "missing",
@@ -218,12 +218,12 @@ class Schedules(Document):
         Returns
         -------
         dict
-            Drive -> key; a drive that holds its angle is not in it.
+            Drive -> key; drives that hold their angle are left out.
 
         Raises
         ------
         InvalidInput
-            A key names no drive, could mean several, or moves what another key moves.
+            A key names no drive, is ambiguous, or moves a drive that another key moves.
         """
         keys, faults = resolved(self.given, drives)
         refuse(fault.under("/schedules") for fault in faults)
@@ -235,7 +235,7 @@ class Schedules(Document):
         Raises
         ------
         InvalidInput
-            As of `keys_by_drive`.
+            As in `keys_by_drive`.
         """
         given = self.given
         return {name: given[key] for name, key in self.keys_by_drive(drives).items()}
@@ -243,7 +243,7 @@ class Schedules(Document):
     def drive_faults(self, drives: Mapping[str, Drive]) -> Iterator[Fault]:
         """Check that every key moves a drive of an aircraft, within its range.
 
-        A spline may leave its range between knots; the flight sees that.
+        A spline may leave its range between knots; the flight checks that.
         """
         try:
             keys = self.keys_by_drive(drives)
@@ -262,14 +262,14 @@ class Schedules(Document):
 
 
 class TabulatedSchedules(Schedules):
-    """Schedules out of a file, whose columns need not all be drives of the aircraft that flies them."""
+    """Schedules from a file, whose columns need not all be drives of the aircraft."""
 
     _path: str = PrivateAttr(default="")
     _unreadable: dict[str, str] = PrivateAttr(default_factory=dict)
 
     @classmethod
     def of_file(cls, path: Path, histories: dict[str, Any], unreadable: dict[str, str]) -> Self:
-        """Build the schedules of a file's columns.
+        """Build the schedules from a file's columns.
 
         Parameters
         ----------
@@ -278,12 +278,12 @@ class TabulatedSchedules(Schedules):
         histories : dict
             A schedule as a document for every column that could be a drive.
         unreadable : dict of str to str
-            Columns that could be drives as well, and what is wrong with them.
+            Further columns that could be drives, with their faults.
         """
         return cls.parse(histories).read_from(path, unreadable)
 
     def read_from(self, path: Path, unreadable: dict[str, str]) -> Self:
-        """Keep where the schedules are from, and return them."""
+        """Record the origin of the schedules, and return them."""
         self._path, self._unreadable = str(path), unreadable
         return self
 
@@ -293,7 +293,7 @@ class TabulatedSchedules(Schedules):
         Raises
         ------
         InvalidInput
-            No column moves a drive, or one could mean several or cannot be read.
+            No column moves a drive, or one is ambiguous or cannot be read.
         """
         try:
             return columns_of_aircraft(list(self.given), self._unreadable, drives)
@@ -303,7 +303,7 @@ class TabulatedSchedules(Schedules):
 
 
 def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
-    """Angles that a schedule names, with their place in it."""
+    """Angles named in a schedule, with their pointers."""
     if isinstance(schedule, Hold):
         yield schedule.angle_rad, "angle_rad"
     elif isinstance(schedule, ConstantRate | Quadratic):
@@ -318,14 +318,15 @@ def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
 def load_schedules(path: str | Path) -> Schedules:
     """Read schedules from a file with the column t and a column for each drive that moves.
 
-    A column bears the name of a drive, or the word of a kind of hinge that moves both sides alike. Units in
-    the names are accepted (``t_ms``, ``fold_left_deg``); columns that are no drives of the aircraft are not
-    looked at, so that a sample flight is a schedule too. A drive without a column holds its angle.
+    A column is named after a drive, or after the word of a kind of hinge to move both sides together. Units
+    in the names are accepted (``t_ms``, ``fold_left_deg``); columns that are not drives of the aircraft are
+    ignored, so that a sample flight is also a schedule. A drive without a column holds its angle.
 
     Raises
     ------
     InvalidInput
-        The column of time is missing, none could be a drive, there are too few rows, or time does not rise.
+        The time column is missing, no column could be a drive, there are too few rows, or time does not
+        increase.
     """
     path = Path(path)
     table = read_file(path, SCHEDULE_COLUMNS)

@@ -1,4 +1,4 @@
-"""What the requests of all searches say alike."""
+"""Fields common to the requests of all searches."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from morphdata.faults import Fault
 from morphdata.options import SEARCH, Option
 from morphdata.parameters import GivenParameters
 
-MAX_SEED = 2**53 - 1  # every JSON reader keeps integers up to here
+MAX_SEED = 2**53 - 1  # every JSON reader preserves integers up to here
 WEEK_S = 7 * 86_400.0
 
 
 class WarmStart(Document):
-    """The model that a search begins from: of an earlier job, an identified one, or its parameters."""
+    """The model from which a search starts: of an earlier job, an identified one, or its parameters."""
 
     job_id: Identifier | None = Field(
         default=None,
@@ -34,7 +34,7 @@ class WarmStart(Document):
     )
 
     def faults(self) -> Iterator[Fault]:
-        """Check that there is one model to begin from."""
+        """Check that there is exactly one model to start from."""
         ways = ("job_id", "model_id", "parameters")
         given = [name for name in ways if getattr(self, name) is not None]
         if len(given) != 1:
@@ -46,7 +46,7 @@ class WarmStart(Document):
 
 
 class SwarmSearch(Document):
-    """Method, swarm, seed and time budget; how large the swarm may be is each search's own."""
+    """Method, swarm, seed and time budget; each search limits the size of its swarm."""
 
     c1: Annotated[float, Field(ge=0.0, le=4.0)] | None = Field(
         default=None, description="Weight of a particle's own best position (c1)."
@@ -60,9 +60,9 @@ class SwarmSearch(Document):
     )
     max_seconds: Annotated[
         Annotated[float, Field(gt=0.0, le=WEEK_S)] | None, Option("--max-seconds", SEARCH)
-    ] = Field(default=None, description="Time budget of the search; the best so far is the result.")
+    ] = Field(default=None, description="Time budget of the search; the best model so far is the result.")
 
     def swarm_settings(self) -> dict[str, Any]:
-        """Collect what is said about the swarm: size, generations, pulls, inertia."""
+        """Collect the swarm's settings: size, generations, c1, c2, inertia."""
         names = {"particles", "generations", "c1", "c2", "inertia"}
         return self.model_dump(include=names, exclude_none=True)

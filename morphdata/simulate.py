@@ -1,4 +1,4 @@
-"""What POST /simulate takes and what a simulation results in."""
+"""Request and result of POST /simulate."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
 MAX_ELEMENTS = 100
-OUTPUT_STEP_S = 0.01  # as the example flights
+OUTPUT_STEP_S = 0.01  # as in the example flights
 MAX_STEPS = {
     "rigid": 1_200_000,
     "equivalent": 1_200_000,
     "flexible": 60_000,
 }  # about ten minutes of computing
 DEFAULT_STEP_S = {"rigid": 0.01, "equivalent": 0.01, "flexible": 0.001}
-ROUND_OFF = 1e-9  # of a number of rows or steps
+ROUND_OFF = 1e-9  # round-off tolerance of a number of rows or steps
 
 
 class RigidModel(Document):
@@ -47,7 +47,7 @@ class RigidModel(Document):
 
 
 class EquivalentFlightModel(KnownModel):
-    """Wings of rigid links with gimbal joints, with parameters that are known."""
+    """Wings of rigid links with gimbal joints, with known parameters."""
 
     kind: Literal["equivalent"]
 
@@ -63,7 +63,7 @@ class FlexibleModel(Document):
         description="Beam elements of each wing of the flexible model.",
     )
     lattice: Lattice | None = None
-    step_s: FlightStepS | None = Field(default=None, description="1 ms where it is left out.")
+    step_s: FlightStepS | None = Field(default=None, description="Default: 1 ms.")
     start: Annotated[Start | None, Option("--start", MODEL)] = Field(
         default=None, description="Trim each model by itself, or start from `flight.start`."
     )
@@ -82,7 +82,7 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 
 
 class SimulateRequest(Request):
-    """Aircraft, flight condition, a model, and what the drives do."""
+    """Aircraft, flight condition, a model, and the schedules of the drives."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
 
@@ -95,7 +95,7 @@ class SimulateRequest(Request):
         default=OUTPUT_STEP_S, description="Between the rows of the trajectory."
     )
     environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
-        default=None, description="Gust and turbulence; still air without."
+        default=None, description="Gust and turbulence; default: still air."
     )
     channels: Annotated[RequestedChannels | None, Option("--channels", OUTPUT)] = Field(
         default=None, description=CHANNELS_TEXT
@@ -108,12 +108,12 @@ class SimulateRequest(Request):
 
     @property
     def steps(self) -> int:
-        """Time steps: a whole number of them between two rows, none longer than the model's."""
+        """Number of time steps: a whole number between two rows, none longer than the model's."""
         longest_s = flown_with(self.model).step_s or DEFAULT_STEP_S[self.model.kind]
         return math.ceil(self.output_step_s / longest_s - ROUND_OFF) * (self.rows - 1)
 
     def faults(self) -> Iterator[Fault]:
-        """The flight can begin, its drives stay in range, it is neither too short nor too long."""
+        """Check that the flight can start, its drives stay in range, and its length is permitted."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from self.schedules.drive_faults(self.aircraft.drives)
         if not MIN_ROWS <= self.rows <= MAX_ROWS:
@@ -140,7 +140,7 @@ class SimulateRequest(Request):
 
 
 class FlightCost(Result):
-    """What a simulation would take, to an order of magnitude."""
+    """Estimated cost of a simulation, to an order of magnitude."""
 
     rows: int = Field(description="Of the trajectory.")
     steps: int = Field(
@@ -157,7 +157,7 @@ class FlownModel(Result):
 
 
 class TrimState(Result):
-    """How the flight starts: in body axes, at the reference point."""
+    """Start of the flight, in body axes, at the reference point."""
 
     alpha_rad: float
     force_b_n: list[float]
@@ -165,14 +165,14 @@ class TrimState(Result):
 
 
 class SimulatedTrajectory(Result):
-    """Columns of the flight: those of a sample, then those of its channels, with the units in their names.
+    """Columns of the flight: those of a sample, then those of its channels, with units in their names.
 
     Every drive of the aircraft has its column, `fold_left_rad`.
     """
 
     time_s: list[float]
     sweep_left_rad: list[float] = Field(
-        description="Angle of the first drive of the left side, whatever its kind; zeros without any."
+        description="Angle of the first drive of the left side, of any kind; zeros if there is none."
     )
     sweep_right_rad: list[float] = Field(description="The same of the right side.")
     phi_rad: list[float]

@@ -1,4 +1,4 @@
-"""What POST /study takes and what a study results in."""
+"""Request and result of POST /study."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from morphdata.identify import (
 )
 from morphdata.options import MODEL, Option
 from morphdata.parameters import MAX_LINKS
+from morphdata.verdict import Verdict
 from morphdata.warnings import Warnings
 
 Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
@@ -28,7 +29,7 @@ EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": 
 
 
 class StudiedModels(SearchedModel):
-    """The models that are compared: the same wings with different numbers of links."""
+    """The compared models: the same wings with different numbers of links."""
 
     links_per_wing: Annotated[list[Links], Option("--links", MODEL)] = Field(
         default=[1, 2, 3, 4, 5, 6],
@@ -39,11 +40,11 @@ class StudiedModels(SearchedModel):
     )
 
     def numbers_of_links(self) -> Sequence[int]:
-        """List the numbers of links per wing that are compared."""
+        """List the compared numbers of links per wing."""
         return self.links_per_wing
 
     def faults(self) -> Iterator[Fault]:
-        """Check that each number of links is listed once, and what is checked of every such model."""
+        """Check that each number of links is listed once, and check every such model."""
         yield from repeated_faults(self.links_per_wing, "/links_per_wing", "List each number once.")
         yield from super().faults()
 
@@ -51,7 +52,7 @@ class StudiedModels(SearchedModel):
 class StudyRequest(SamplesRequest):
     """As for an identification, with a list of numbers of links.
 
-    `search.max_seconds` is the time for all of them together.
+    `search.max_seconds` applies to all of them together.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_STUDY]})
@@ -66,39 +67,42 @@ class StudyRow(Result):
     bodies: int = Field(description="Rigid bodies of the whole model, fuselage included.")
     parameters: int = Field(description="Unknowns of the identification.")
     J_train: float | None = Field(description="Sum of squared angle errors over the fitted flights, rad^2.")
-    J_held_out: float | None = Field(description="The same over the flights held out; null without any.")
-    rms_rad: Angles = Field(description="Over the flights held out, else over the fitted ones.")
+    J_held_out: float | None = Field(
+        description="The same over the held-out flights; null if there are none."
+    )
+    rms_rad: Angles = Field(description="Over the held-out flights, else over the fitted ones.")
     flight_s: float | None = Field(description="Median wall time of one flight of 2 s on one core.")
     identify_s: float
     flights: int
     fit: list[SampleFit]
     model: IdentifiedParameters | None = Field(
-        description="null where no model of this size flew the samples to fit."
+        description="null if no model of this size could fly the samples to fit."
     )
+    verdict: Verdict | None = Field(default=None, description="As of an identification with this model.")
     warnings: Warnings = Field(default=[])
 
 
 class Recommendation(Result):
-    """The number of links to take."""
+    """The recommended number of links."""
 
     links_per_wing: int | None = Field(description="null if no model could be flown")
     reason: str
 
 
 class StudyReport(Result):
-    """How the study went."""
+    """Report of the search."""
 
     seed: int
     wall_s: float
 
 
 class StudyResult(Result):
-    """Result of a study: a row per number of links, in rising order."""
+    """Result of a study: one row per number of links, in ascending order."""
 
     rows: list[StudyRow]
     recommended: Recommendation
     search: StudyReport
     warnings: Warnings = Field(
-        default=[], description="Of the recommended model; without any, of the first row."
+        default=[], description="Of the recommended model or, if there is none, of the first row."
     )
-    partial: bool = Field(default=False, description="The rows so far of a job that did not run to its end.")
+    partial: bool = Field(default=False, description="The rows so far of a job that did not finish.")

@@ -1,4 +1,4 @@
-"""Aircraft and flight condition together: checks of a request that need both, and what a worker gets."""
+"""Checks of requests that involve aircraft and flight condition together."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ T = TypeVar("T")
 
 
 def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
-    """Check that a flight has the start that a model is to fly from.
+    """Check that a flight has the start requested for a model.
 
     Parameters
     ----------
     start : str or None
-        How the flight is to start; "given" needs ``flight.start``.
+        Requested start of the flight; "given" needs ``flight.start``.
     """
     if start == "given" and flight.start is None:
         yield Fault(
@@ -31,7 +31,7 @@ def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
 
 
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:
-    """Check that there is a wing whose bending counts."""
+    """Check that there is a wing that is both hinged and flexible."""
     if not any(surface.flexible and surface.all_hinges for surface in aircraft.surfaces):
         yield Fault(
             code,
@@ -46,7 +46,7 @@ def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer:
     if model is None:
         return
     flexible = [surface.name for surface in aircraft.surfaces if surface.flexible]
-    hint = "Give the model that was identified for this aircraft."
+    hint = "Give a model that was identified for this aircraft."
     if model.surfaces:
         for name in (each for each in flexible if each not in model.surfaces):
             yield Fault(
@@ -58,7 +58,7 @@ def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer:
     elif len(model.divisions) not in (1, len(flexible)):
         yield Fault(
             "other_number_of_wings",
-            f"The parameters are of {len(model.divisions)} wings, the aircraft has {len(flexible)} flexible "
+            f"The parameters are for {len(model.divisions)} wings, the aircraft has {len(flexible)} flexible "
             "surfaces.",
             f"{pointer}/division",
             hint,
@@ -71,12 +71,12 @@ def paired_by_reflection(surfaces: Sequence[T], reflections: Sequence[T]) -> tup
     Parameters
     ----------
     surfaces, reflections : sequence
-        Each surface and its image on the other side, both without their names, which do not count.
+        Each surface and its mirror image, both without their names, which are not compared.
 
     Returns
     -------
     tuple of tuples of int
-        Groups (first, image) and (first,): every surface is in one of them.
+        Groups (first, image) and (first,); every surface is in exactly one.
     """
     groups = []
     waiting = list(range(len(surfaces)))

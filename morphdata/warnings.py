@@ -8,13 +8,14 @@ from pydantic import BaseModel, Field
 
 
 class ResultWarning(BaseModel):
-    """Something in a result that its method does not answer for."""
+    """A part of a result that is outside the validity of its method."""
 
     code: str = Field(
         description="Stable, for programs: `at_bound`, `large_error`, `large_alpha`, `compressible`, "
-        "`steep_pitch`, `looks_like_degrees`, `surfaces_overlap`, `diverged` (a flight that "
-        "the answer does not rest on), `verification_failed`, `not_flyable` (of a partial result: nothing "
-        "has flown yet).",
+        "`steep_pitch`, `surfaces_overlap`, `diverged` (a flight on which the result does not depend), "
+        "`verification_failed`, `not_flyable` (in a partial result: nothing has flown yet). Of samples: "
+        "`looks_like_degrees`, `flipped_sign`, `swapped_sides`, `late`, `clipped_column`, `frozen_column`, "
+        "`wrong_aircraft`, `start_off_trim`, `repeated_rows`, `gap`.",
         examples=["at_bound"],
     )
     message: str = Field(description="What was seen.")

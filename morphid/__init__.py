@@ -1,1 +1,1 @@
-"""The `morphid` command: serves, identifies, talks to a service."""
+"""The `morphid` command: runs the service, runs operations locally, and is a client of a service."""

@@ -1,4 +1,4 @@
-"""Copies of the database: made while the service runs, put back while it does not."""
+"""Backups of the database: made while the service runs, restored while it is stopped."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from pathlib import Path
 from app.private_files import close_to_others, make_private_folder, open_private, touch_private
 from morphid.exits import CommandError, Exit
 
-PAGES_AT_ONCE = 1000  # 4 MB between two looks at writers that wait
+PAGES_AT_ONCE = 1000  # 4 MB between pauses for waiting writers
 BUSY_S = 30.0
 LOCK_NAME = "serve.lock"  # of `morphid serve`
 
 
 @dataclass(frozen=True, slots=True)
 class Backup:
-    """A copy that was made or put back: where it is, its jobs of every state, the revision of its tables."""
+    """A backup made or restored: its path, its number of jobs, the revision of its tables."""
 
     path: Path
     size_bytes: int
@@ -30,9 +30,9 @@ class Backup:
 
 
 def backup(url: str, target: Path) -> Backup:
-    """Copy an SQLite database as it is at one moment, while others go on writing to it.
+    """Copy a consistent snapshot of an SQLite database while others keep writing to it.
 
-    The copy appears under its name when it is whole, sound and on disk.
+    The copy appears under its name only when it is complete, checked and on disk.
     """
     source = _file_of(url, 'pg_dump --format=custom --file backup.dump "$MORPHID_DATABASE_URL"')
     if not source.exists():
@@ -46,15 +46,16 @@ def backup(url: str, target: Path) -> Backup:
     growing = target.with_name(target.name + ".part")
     with _reports_system_errors(target):
         growing.unlink(missing_ok=True)
-        touch_private(growing)  # webhook secrets and everybody's samples are in it
+        touch_private(growing)  # it contains webhook secrets and the samples of all users
         try:
             with (
                 closing(sqlite3.connect(source, timeout=BUSY_S)) as live,
                 closing(sqlite3.connect(growing)) as copy,
             ):
-                # one read transaction: SQLite begins anew when a writer changes a page between two steps
+                # one read transaction: otherwise SQLite restarts when a writer changes a page between two
+                # steps
                 live.execute("BEGIN")
-                live.execute("SELECT count(*) FROM sqlite_master").fetchone()  # now it has begun
+                live.execute("SELECT count(*) FROM sqlite_master").fetchone()  # starts the read transaction
                 live.backup(copy, pages=PAGES_AT_ONCE)
                 copy.execute("PRAGMA journal_mode = DELETE")  # one file, without a journal next to it
             made = inspected(growing)
@@ -67,7 +68,7 @@ def backup(url: str, target: Path) -> Backup:
 
 
 def restore(url: str, source: Path) -> Backup:
-    """Put a copy in the place of an SQLite database; what was there is kept as ``....before-restore``."""
+    """Replace an SQLite database by a copy; the old one is kept as ``....before-restore``."""
     target = _file_of(url, 'pg_restore --clean --if-exists --dbname "$MORPHID_DATABASE_URL" backup.dump')
     if not source.is_file():
         raise CommandError(f"there is no file {source}", code=Exit.INVALID_INPUT)
@@ -82,10 +83,10 @@ def restore(url: str, source: Path) -> Backup:
             copy.backup(new)
         _to_disk(growing)
         if target.exists():
-            close_to_others(target)  # before it is opened: its journals get its mode
+            close_to_others(target)  # before it is opened, because its journals get its mode
             _fold_journal(target)
             target.replace(target.with_name(target.name + ".before-restore"))
-        for suffix in ("-wal", "-shm"):  # of the former file: with the new one they would spoil it
+        for suffix in ("-wal", "-shm"):  # journals of the former file, which would corrupt the new one
             target.with_name(target.name + suffix).unlink(missing_ok=True)
         growing.rename(target)
         _to_disk(target.parent)
@@ -93,7 +94,7 @@ def restore(url: str, source: Path) -> Backup:
 
 
 def inspected(file: Path) -> Backup:
-    """Describe a database file; refuse one that is damaged, not MorphID's, or of a newer version."""
+    """Inspect a database file; refuse one that is damaged, not MorphID's, or of a newer version."""
     from migrations import HEAD
 
     try:
@@ -124,7 +125,7 @@ def _file_of(url: str, instead: str) -> Path:
     parsed = make_url(url)
     if parsed.get_backend_name() != "sqlite" or not parsed.database:
         raise CommandError(
-            f"the database is {parsed.get_backend_name()}, which has tools of its own for this",
+            f"the database is {parsed.get_backend_name()}, which has its own tools for this",
             code=Exit.USAGE,
             hint=instead,
         )
@@ -132,14 +133,14 @@ def _file_of(url: str, instead: str) -> Path:
 
 
 def _fold_journal(file: Path) -> None:
-    """Bring what lies in the write-ahead journal into the file itself, so that the file alone is all."""
+    """Move the write-ahead journal into the file, so that the file is complete on its own."""
     with contextlib.suppress(sqlite3.DatabaseError), closing(sqlite3.connect(file, timeout=1.0)) as link:
         link.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # a damaged file is kept as it is
 
 
 @contextmanager
 def _nobody_serves(target: Path) -> Iterator[None]:
-    """Hold the data directory as `morphid serve` does, and make sure that nobody else has the file open."""
+    """Lock the data directory as `morphid serve` does, and check that no other process has the file open."""
     busy = CommandError(
         f"a service uses {target}",
         code=Exit.ENVIRONMENT,
@@ -156,7 +157,7 @@ def _nobody_serves(target: Path) -> Iterator[None]:
 
 
 def _others_have_open(file: Path) -> bool:
-    """Whether another process has the file open (Linux; elsewhere the lock must do)."""
+    """Whether another process has the file open (Linux; elsewhere only the lock is checked)."""
     wanted = file.stat()
     for link in Path("/proc").glob("[0-9]*/fd/*"):
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The message broker that `morphid serve` runs by itself: a valkey or redis server on loopback."""
+"""The message broker run by `morphid serve` itself: a valkey or redis server on loopback."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from app.private_files import close_to_others, make_private_folder
 from morphid.exits import CommandError, Exit
 from morphid.supervisor import ChildSpec
 
-PREFERRED_PORT = 6399  # one off redis' own, so that neither is taken for the other
+PREFERRED_PORT = 6399  # next to Redis's default, so that the two are not confused
 LOOPBACK = "127.0.0.1"
 
 
 @dataclass(frozen=True)
 class Broker:
-    """How to run the broker, its port on loopback, and the password that this service's children share."""
+    """How to run the broker, its port on loopback, and the password shared by the service's processes."""
 
     spec: ChildSpec
     port: int
@@ -34,7 +34,7 @@ class Broker:
         return f"redis://:{self.password}@{LOOPBACK}:{self.port}/0"
 
     def answers(self) -> bool:
-        """Whether it takes commands yet (right after a start it loads its journal first)."""
+        """Whether it accepts commands yet (after a start it loads its journal first)."""
         address = (LOOPBACK, self.port)
         with contextlib.suppress(OSError), socket.create_connection(address, timeout=0.5) as link:
             link.sendall(f"AUTH {self.password}\r\nPING\r\n".encode())
@@ -68,12 +68,12 @@ def find_server() -> Path:
 
 
 def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> Broker:
-    """Choose a port and a password, and write down how to run the broker.
+    """Choose a port and a password, and write the broker's configuration.
 
     Parameters
     ----------
     data_dir : the service's data directory; the queue's journal lives in its folder ``broker``.
-    preferred_port : taken when it is free.
+    preferred_port : used if it is free.
     """
     home = data_dir / "broker"
     make_private_folder(home)
@@ -96,7 +96,7 @@ def prepare_broker(data_dir: Path, *, preferred_port: int = PREFERRED_PORT) -> B
 
 
 def bound_port(host: str, port: int) -> int:
-    """Bind a TCP port (0: one that the system picks) and let it go again; OSError where it is taken."""
+    """Bind a TCP port (0: chosen by the system) and release it; OSError if it is in use."""
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind((host, port))
@@ -104,7 +104,7 @@ def bound_port(host: str, port: int) -> int:
 
 
 def free_port(preferred: int, host: str = LOOPBACK) -> int:
-    """Give the preferred TCP port if it is free, else one that the system picks."""
+    """Return the preferred TCP port if it is free, else one chosen by the system."""
     for port in (preferred, 0):
         with contextlib.suppress(OSError):
             return bound_port(host, port)
@@ -114,7 +114,7 @@ def free_port(preferred: int, host: str = LOOPBACK) -> int:
 
 
 def in_url(host: str) -> str:
-    """Write the host that a service listens on as clients on this machine address it."""
+    """Return the host of a service's address in the form that clients on this machine use."""
     everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}  # noqa: S104 - recognised here, not bound
     return everywhere.get(host, f"[{host}]" if ":" in host else host)
 

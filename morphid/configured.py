@@ -1,4 +1,4 @@
-"""The service's settings as a command has them: its options, then the environment, then the defaults."""
+"""The service's settings for a command: its options, then the environment, then the defaults."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def settings_for(**given: object) -> Settings:
-    """Read the settings; warn of a variable that is nearly called like one.
+    """Read the settings; warn about variables whose names resemble a setting.
 
     Parameters
     ----------

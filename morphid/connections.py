@@ -1,4 +1,4 @@
-"""How the command reaches a service: at which address, with which key, and by which way."""
+"""Connections of the command to a service: address, key and proxy."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ EVERY_ADDRESS = frozenset({"0.0.0.0", "::"})  # noqa: S104 - a client that dials
 
 
 def at_service_of_environment(url: str | None) -> bool:
-    """Whether it is MORPHID_URL that leads to a service."""
+    """Whether the service is selected by MORPHID_URL."""
     return url is not None and url == os.environ.get(URL_VARIABLE)
 
 
 def client_for(url: str, *, direct: bool = False, **options: Any) -> httpx.Client:
     """Open a client for one service: through the environment's proxy, but never to this machine.
 
-    A proxy's own loopback is another machine's: a service that runs here would look dead, and the proxy
-    would be handed its key.
+    The loopback of a proxy is another machine's: a service running here would seem to be down, and the proxy
+    would receive its key.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ def client_for(url: str, *, direct: bool = False, **options: Any) -> httpx.Clien
     try:
         parts = urlsplit(url)
         host = parts.hostname or ""
-        _ = parts.port  # looked at: it may be none
+        _ = parts.port  # parsed here because it may be invalid
         httpx.URL(url)
     except (ValueError, httpx.InvalidURL) as error:
         raise CommandError(
-            f"{url} is no address of a service: {error}", code=Exit.USAGE, hint=f"write {DEFAULT_URL}"
+            f"{url} is not the address of a service: {error}", code=Exit.USAGE, hint=f"write {DEFAULT_URL}"
         ) from None
     if options.get("transport") is None and (direct or _reached_directly(host)):
-        options["transport"] = httpx.HTTPTransport()  # of its own: the client then asks for no proxies
+        options["transport"] = httpx.HTTPTransport()  # explicit, so that the client does not look for proxies
     try:
         return httpx.Client(base_url=url, **options)
     except (ImportError, ValueError, httpx.InvalidURL) as error:

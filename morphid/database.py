@@ -1,4 +1,4 @@
-"""The service's database as commands use it: found by the settings, migrated; what is wrong as a sentence."""
+"""The service's database for commands: found by the settings, migrated, with errors as messages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def migrate(migration: Callable[[str, str], None], url: str, revision: str = "head") -> None:
-    """Migrate a database, by `app.database.upgrade` or `downgrade`; CommandError where it fails."""
+    """Migrate a database with `app.database.upgrade` or `downgrade`; raises CommandError on failure."""
     from alembic.util import CommandError as MigrationError
     from sqlalchemy.exc import OperationalError
 

@@ -8,10 +8,10 @@ from morphdata.faults import Pickled
 
 
 class Exit(IntEnum):
-    """What a shell script can rely on."""
+    """Exit codes that shell scripts can rely on."""
 
     OK = 0
-    FAILED = 1  # the job failed, or something unforeseen happened
+    FAILED = 1  # the job failed, or an unexpected error occurred
     USAGE = 2  # the command line itself was wrong (typer's own code)
     INVALID_INPUT = 3  # a file is missing or unreadable, or a value in it is refused
     STOPPED = 4  # the job was cancelled or ran out of time; a partial result may have been written
@@ -21,15 +21,15 @@ class Exit(IntEnum):
 
 
 class CommandError(Pickled, Exception):
-    """A sentence for the user and the exit code that goes with it.
+    """A message for the user with its exit code.
 
     Parameters
     ----------
     message : what is wrong.
     code : exit code.
     hint : what to do about it.
-    pointer : JSON pointer to the offending field, "" when there is none.
-    given_by : the option or file that filled in that field, "" when unknown.
+    pointer : JSON pointer to the field at fault, "" if there is none.
+    given_by : the option or file that set that field, "" if unknown.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class CommandError(Pickled, Exception):
         self.given_by = given_by
 
     def to_document(self) -> dict[str, str | int]:
-        """Give the error as the JSON that ``--json`` prints."""
+        """Return the error as the JSON that ``--json`` prints."""
         return {
             "error": self.message,
             "pointer": self.pointer,

@@ -1,4 +1,4 @@
-"""Read the user's files and write answers, with errors that name the file and what to do."""
+"""Reads the user's files and writes results, with errors that name the file and a remedy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_json(path: Path) -> Any:
 
 
 def require_file(path: Path) -> None:
-    """Raise CommandError where there is no such file."""
+    """Raise CommandError if there is no such file."""
     if not path.is_file():
         raise CommandError(
             f"there is no file {path}", code=Exit.INVALID_INPUT, hint=f"looked in {Path.cwd()}"
@@ -39,9 +39,9 @@ def require_file(path: Path) -> None:
 
 
 def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
-    """The files that are named, patterns (``flights/*.csv``) replaced by what matches them, by name.
+    """Expand patterns (``flights/*.csv``) in a list of files, sorted by name.
 
-    A shell replaces them before, unless they are quoted; a file of that very name is no pattern.
+    A shell expands unquoted patterns itself; an existing file of exactly that name is not a pattern.
     """
     found: list[Path] = []
     for path in paths:
@@ -49,7 +49,7 @@ def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
         if not glob.has_magic(pattern) or path.exists():
             found.append(path)
             continue
-        # a pattern may begin anywhere, which Path.glob does not know
+        # a pattern may be absolute, which Path.glob does not support
         names = glob.glob(pattern, recursive=True)  # noqa: PTH207
         matches = sorted(Path(name) for name in names if Path(name).is_file())
         if not matches:
@@ -63,28 +63,28 @@ def matching_files(paths: Sequence[Path], option: str) -> list[Path]:
 
 
 def require_place(path: Path | None, option: str) -> None:
-    """Refuse a file to be written whose folder is missing, before a search rather than after it."""
+    """Refuse an output file whose folder is missing, before a search rather than after it."""
     if path is not None and path != STANDARD_OUTPUT and not path.absolute().parent.is_dir():
         raise CommandError(
             f"{option} {path}: there is no folder {path.parent}",
             code=Exit.ENVIRONMENT,
-            hint="make it first, or choose another",
+            hint="create it first, or choose another",
         )
 
 
 def write_json(document: object, path: Path) -> None:
-    """Write a document for machines and people."""
+    """Write a document as indented JSON."""
     write_bytes((json.dumps(document, indent=1) + "\n").encode(), path)
 
 
 def write_bytes(content: bytes, path: Path) -> None:
-    """Write a file; raise CommandError where that cannot be done."""
+    """Write a file; raise CommandError if that fails."""
     with writing(path):
         path.write_bytes(content)
 
 
 def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
-    """Write plots and curves into a folder and give their paths.
+    """Write plots and curves into a folder and return their paths.
 
     Names may come from a service, which is not trusted to stay in the folder.
     """
@@ -103,7 +103,7 @@ def save_files(files: Mapping[str, bytes], folder: Path) -> list[Path]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Say what cannot be written, and why, as a CommandError."""
+    """Convert write errors to a CommandError with path and reason."""
     try:
         yield
     except OSError as error:

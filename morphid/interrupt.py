@@ -1,4 +1,4 @@
-"""Ctrl-C as a question that work asks, not as an exception from anywhere."""
+"""Ctrl-C as a flag that work checks, not as an exception at an arbitrary point."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from types import FrameType
 
 @contextmanager
 def first_interrupt() -> Iterator[Callable[[], bool]]:
-    """Note the first Ctrl-C, whose question the block gets, instead of dying of it; the second kills as ever.
+    """Record the first Ctrl-C, which the block checks, instead of raising; the second one kills as usual.
 
-    Python's own exception may come while the compiler calls back to have a kernel loaded, and is lost there.
+    Python's own exception may be raised in a callback of the compiler that loads a kernel, and be lost there.
     """
     interrupted = threading.Event()
     before = signal.getsignal(signal.SIGINT)

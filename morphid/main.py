@@ -29,7 +29,7 @@ from morphid.streams import flush_streams, prepare_streams
 
 
 class Morphid(TyperGroup):
-    """All commands, on outputs that take every character and whose readers may leave."""
+    """All commands, with output streams that accept every character and survive closed pipes."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Run a command line."""
@@ -41,7 +41,7 @@ class Morphid(TyperGroup):
 
 
 def print_version(wanted: bool) -> None:
-    """Print the version and end, where it is requested."""
+    """Print the version and exit, if requested."""
     if wanted:
         from morphdata.version import VERSION
 

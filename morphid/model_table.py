@@ -46,14 +46,23 @@ def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
 
 
 def model_table(result: Document) -> Table:
-    """Show every parameter with its 95 % interval; grey are those that the samples do not determine."""
+    """Show every parameter with its Cramer-Rao bound and its 95 % interval.
+
+    Grey are those that the samples do not determine.
+    """
     model, uncertainty = result["model"], result.get("uncertainty") or {}
     intervals = {current_name(name): ends for name, ends in (uncertainty.get("interval_95") or {}).items()}
     unseen = current_names(uncertainty.get("undetermined") or ())
     bound = current_names(uncertainty.get("at_bound") or ())
     title = f"Equivalent model, {model['links_per_wing']} links per wing"
-    caption = "grey: the samples do not determine it" if unseen else None
-    table = new_table("parameter", "value", "± 95 %", title=title, caption=caption)
+    bounds = {
+        current_name(name): each for name, each in (uncertainty.get("cramer_rao_percent") or {}).items()
+    }
+    captions = ["CR: Cramer-Rao bound in % of the value, for white residuals"] * bool(bounds)
+    captions += ["grey: the samples do not determine it"] * bool(unseen)
+    table = new_table(
+        *("parameter", "value", "CR %", "95 % interval"), title=title, caption="; ".join(captions) or None
+    )
     table.add_column("")
     for name, value in named_parameters(model):
         known = name in intervals
@@ -61,11 +70,19 @@ def model_table(result: Document) -> Table:
         table.add_row(
             name,
             short(value),
+            percent(bounds.get(name)),
             shown_interval(intervals[name]) if known else "",
             " ".join(notes if known or not intervals else ["fixed"]),
             style="dim" if name in unseen else None,
         )
     return table
+
+
+def percent(bound: float | None) -> str:
+    """Give a Cramer-Rao bound; one beyond the value itself says no more than that."""
+    if bound is None:
+        return ""
+    return "> 1000" if bound > 1e3 else f"{bound:.2g}" if bound < 1e2 else f"{bound:.0f}"
 
 
 def shown_interval(interval: Sequence[float | None]) -> str:

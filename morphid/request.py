@@ -1,4 +1,4 @@
-"""The request that a command line makes, and the option behind each part of it."""
+"""The request built from a command line, and the option behind each part of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SampleForm = Callable[[Path, Role], Document]
 
 
 class Request:
-    """A request, filled in part by part; the operation's name is also its path at a service."""
+    """A request, built part by part; the operation's name is also its path at a service."""
 
     def __init__(self, operation: str) -> None:
         self.operation = operation
@@ -28,12 +28,12 @@ class Request:
         self._given_by: dict[str, str] = {}
 
     def put(self, pointer: str, value: Any, option: str) -> None:
-        """Fill in a part; None leaves it out, so that the library's default holds.
+        """Set a part; None omits it, so that the library's default applies.
 
         Parameters
         ----------
-        pointer : where, as a JSON pointer.
-        option : the option that gave the value, as the user wrote it; named in errors.
+        pointer : JSON pointer of the part.
+        option : the option that gave the value, as written by the user; named in errors.
         """
         if value is None:
             return
@@ -41,19 +41,19 @@ class Request:
         self._given_by[pointer] = option if isinstance(value, dict | list) else f"{option} {value}"
 
     def add_samples(self, paths: Sequence[Path], role: Role, option: str) -> None:
-        """Add sample files; how they go into the request depends on where it goes (see `body`)."""
+        """Add sample files; their form in the request depends on its destination (see `body`)."""
         for path in paths:
             self._given_by[f"/samples/{len(self._samples)}"] = f"{option} {path}"
             self._samples.append((path, role))
 
     def body(self, sample: SampleForm) -> Document:
-        """Give the whole request, with each sample file in the form that ``sample`` gives it."""
+        """Return the whole request, with each sample file in the form returned by ``sample``."""
         if not self._samples:
             return self.document
         return {**self.document, "samples": [sample(path, role) for path, role in self._samples]}
 
     def option_at(self, pointer: str) -> str:
-        """Give the option behind a part of the request, "" where nobody chose it."""
+        """Return the option behind a part of the request, "" if no option set it."""
         parts = pointer.split("/")
         for length in range(len(parts), 1, -1):
             option = self._given_by.get("/".join(parts[:length]))
@@ -63,7 +63,7 @@ class Request:
 
 
 def aircraft_drives(request: Request) -> Mapping[str, Drive] | None:
-    """Return the drives of the request's aircraft; None where it is none, which its own faults say."""
+    """Return the drives of the request's aircraft; None if it is invalid, which is reported elsewhere."""
     try:
         return Aircraft.parse(request.document.get("aircraft")).drives
     except InvalidInput:
@@ -71,11 +71,11 @@ def aircraft_drives(request: Request) -> Mapping[str, Drive] | None:
 
 
 def changed(document: Document, changes: Iterable[str]) -> Document:
-    """Give a request with other values at some places.
+    """Return a request with changed values.
 
     Parameters
     ----------
-    changes : ``pointer=value`` each; the value is JSON, or a text where it is none.
+    changes : ``pointer=value`` each; the value is JSON, or else text.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Run an operation in this process or at a service, and hand over what comes out.
+"""Runs an operation in this process or at a service, and outputs its result.
 
-``identify``, ``study``, ``simulate`` and ``optimize`` are the same errand: a request document goes in,
-progress is shown, the first Ctrl-C requests the best so far, a result and its files come out.
+All operations follow the same pattern: a request document goes in, progress is shown, the first Ctrl-C
+requests the best result so far, a result and its files come out.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from morphid.service import Service
 
 @dataclass(frozen=True)
 class Answer:
-    """What an operation gave.
+    """The outcome of an operation.
 
     Parameters
     ----------
     exit : how it ended.
-    result : the result document, None when there is none.
+    result : the result document; None if there is none.
     files : plots and curves, by name.
-    error : why it failed, in the service's words.
+    error : the error document of a failure.
     """
 
     exit: Exit
@@ -46,7 +46,7 @@ class Answer:
 
 
 def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
-    """Run the operation, at the service of this address or in this process; print what went wrong on the way.
+    """Run the operation, at the service of this address or in this process; print errors on the way.
 
     An error names the option at fault.
     """
@@ -68,7 +68,7 @@ def run(request: Request, url: str | None, api_key: str | None = None) -> Answer
 
 
 def run_here(request: Request, bar: Meter) -> Answer:
-    """Run in this process; the first Ctrl-C ends it with the best so far."""
+    """Run in this process; the first Ctrl-C ends it with the best result so far."""
     from worker import numerics
 
     drives = aircraft_drives(request)
@@ -107,7 +107,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
 
 
 def require_valid(operation: str, body: Document) -> None:
-    """Refuse a request that the operation's document refuses: the first fault, and a line for each other."""
+    """Refuse an invalid request, with its first fault and one line for each further fault."""
     try:
         operation_named(operation).request.parse(body)
     except InvalidInput as error:
@@ -151,11 +151,11 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
 def hand_over(
     answer: Answer, show: Callable[[Mapping[str, Any]], None], *, json_out: Path | None, plots: Path | None
 ) -> NoReturn:
-    """Save the result and its files as the user wants them, show the result, and exit with the answer's code.
+    """Save the result and its files as requested, show the result, and exit with the answer's code.
 
     Parameters
     ----------
-    show : prints a result for people.
+    show : prints a result in readable form.
     json_out : file of the result; ``-`` prints it instead of the tables.
     plots : folder of plots and curves.
     """
@@ -177,16 +177,16 @@ def hand_over(
 
 
 def wrote(path: Path) -> None:
-    """Say that a file was written."""
+    """Report a written file."""
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
 def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None = None) -> Document:
-    """Read a sample file and give it as it stands inline in a request.
+    """Read a sample file and return its inline form in a request.
 
     Parameters
     ----------
-    drives : of the aircraft, where it is one.
+    drives : of the aircraft, if it is valid.
     """
     require_file(path)
     try:

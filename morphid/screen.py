@@ -1,4 +1,4 @@
-"""What the user sees: tables, progress, errors. Progress and errors go to stderr, answers to stdout."""
+"""Terminal output: tables, progress, errors. Progress and errors go to stderr, results to stdout."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 LINE_EVERY_S = 5.0
+LETTERS = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 STATUS_COLOURS = {
     "queued": "yellow",
     "running": "cyan",
@@ -36,24 +37,24 @@ STATUS_COLOURS = {
 
 
 def stdout() -> Console:
-    """Give the console for answers."""
+    """Return the console for results."""
     prepare_streams()
     return Terminal(highlight=False)
 
 
 def stderr() -> Console:
-    """Give the console for progress and errors."""
+    """Return the console for progress and errors."""
     prepare_streams()
     return Terminal(stderr=True, highlight=False)
 
 
 def print_json(document: object) -> None:
-    """Print a document for machines."""
+    """Print a document as JSON."""
     _write(sys.stdout, json.dumps(document, indent=1) + "\n")
 
 
 def print_json_line(document: object) -> bool:
-    """Print one of several documents for machines, at once; False where nobody reads them any more."""
+    """Print one of several documents as a JSON line, at once; False if the reader has left."""
     return _write(sys.stdout, json.dumps(document) + "\n")
 
 
@@ -68,7 +69,7 @@ def _write(stream: TextIO, text: str) -> bool:
 
 
 def reports_errors(command: Callable[P, R]) -> Callable[P, R]:
-    """Print a command's error as a sentence (JSON where the answer would be JSON) and exit with its code."""
+    """Print a command's error as a sentence (as JSON if the result would be JSON) and exit with its code."""
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -103,7 +104,7 @@ def _print_error(error: CommandError) -> None:
 
 
 def print_job_error(error: Document, given_by: str = "") -> None:
-    """Print why a job failed, and the option or file at fault where it is known."""
+    """Print why a job failed, and the option or file at fault if known."""
     where = f"{error['pointer']}: " if error.get("pointer") else ""
     detail = error.get("detail") or error.get("message") or ""
     hint = f" ({error['hint']})" if error.get("hint") else ""
@@ -115,7 +116,7 @@ def print_job_error(error: Document, given_by: str = "") -> None:
 
 
 def print_warnings(result: Document) -> None:
-    """Print what a result is not good for, with what to do about it."""
+    """Print the warnings of a result with their hints."""
     for warning in result.get("warnings") or ():
         where = f"{warning['pointer']}: " if warning.get("pointer") else ""
         hint = f" ({warning['hint']})" if warning.get("hint") else ""
@@ -124,7 +125,7 @@ def print_warnings(result: Document) -> None:
 
 
 class Meter:
-    """A progress bar fed with a job's progress documents; where there is no terminal, a line now and then."""
+    """A progress bar for a job's progress documents; without a terminal, an occasional line."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
@@ -133,7 +134,7 @@ class Meter:
         self._last_line = ""
 
     def note(self, message: str) -> None:
-        """Show what is done before there is progress to show, or between."""
+        """Show the current activity when there is no progress to show."""
         self._progress.update(self._task, description="preparing", detail=message)
         self._print("preparing", message)
 
@@ -149,7 +150,7 @@ class Meter:
         self._print(phase, f"{100.0 * fraction:3.0f} %  {progress_detail(progress)}")
 
     def _print(self, phase: str, detail: str) -> None:
-        """Print a line, now and then, where there is no terminal."""
+        """Print an occasional line if there is no terminal."""
         line, console = f"{phase:<10} {detail}", self._progress.console
         if not console.is_terminal and line != self._last_line and time.monotonic() >= self._next_line_at:
             console.print(line, markup=False, soft_wrap=True)
@@ -180,7 +181,7 @@ def new_table(
     Parameters
     ----------
     columns : their titles.
-    left : as many columns hold texts and stand left; the others hold numbers and stand right.
+    left : number of left-aligned text columns; the others hold numbers and are right-aligned.
     wrapped : columns whose cells may take several lines.
     """
     table = Table(
@@ -220,8 +221,40 @@ def fit_table(result: Document) -> Table:
     return table
 
 
+def statistics_table(result: Document) -> Table | None:
+    """Show Theil's coefficient with its parts, and what the residuals are like; None where nobody counted."""
+    rows = [
+        (fit, angle, found)
+        for fit in result["fit"]
+        for angle, found in (fit.get("statistics") or {}).items()
+        if found.get("theil") is not None
+    ]
+    if not rows:
+        return None
+    table = new_table(
+        *("sample", "angle", "Theil U", "bias", "variance", "covariance", "lag 1", "white", "drives"),
+        title="Residuals: Theil's U and its parts in %, autocorrelation, correlation with the drives",
+        left=2,
+    )
+    last = None
+    for fit, angle, found in rows:
+        parts = (found.get(f"theil_{part}") for part in ("bias", "variance", "covariance"))
+        white = found.get("white")
+        table.add_row(
+            "" if fit is last else str(fit["sample"]),
+            LETTERS.get(angle, angle),
+            f"{found['theil']:.4f}",
+            *("" if part is None else f"{100.0 * part:.0f}" for part in parts),
+            "" if found.get("lag_1") is None else f"{found['lag_1']:.2f}",
+            "" if white is None else "yes" if white else "no",
+            "" if found.get("drive_correlation") is None else f"{found['drive_correlation']:.2f}",
+        )
+        last = fit
+    return table
+
+
 def jobs_table(jobs: Sequence[Document]) -> Table:
-    """Show jobs, one a line; ids are whole on a screen of 80 columns, to be copied."""
+    """Show jobs, one per line; ids are shown in full on 80 columns, so that they can be copied."""
     columns = ("job", "operation", "status", "done", "try", "created UTC")
     table = new_table(*columns, left=len(columns))
     for job in jobs:
@@ -239,12 +272,12 @@ def jobs_table(jobs: Sequence[Document]) -> Table:
 
 
 def exit_for(status: str) -> Exit:
-    """Give the exit code that a job's final status means."""
+    """Return the exit code for a job's final status."""
     return {"succeeded": Exit.OK, "cancelled": Exit.STOPPED, "expired": Exit.STOPPED}.get(status, Exit.FAILED)
 
 
 def progress_detail(progress: Document) -> str:
-    """Give what is known of a job's progress besides its fraction."""
+    """Return the details of a job's progress besides its fraction."""
     parts = []
     if progress.get("best_cost") is not None:
         parts.append(f"cost {short(progress['best_cost'])}")
@@ -260,7 +293,7 @@ def progress_detail(progress: Document) -> str:
 
 
 def short(value: float | None) -> str:
-    """Give a number with three digits, thousands in full, nothing for None."""
+    """Format a number with three digits, thousands in full, None as empty text."""
     if value is None:
         return ""
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e4 else f"{value:.3g}"

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 BROKER_WITHIN_S = 10.0
 API_WITHIN_S = 30.0
-WORKER_STOP_S = 25.0  # a running job is checkpointed and handed back in this time
+WORKER_STOP_S = 25.0  # s in which a running job is checkpointed and handed back
 LOCK_NAME = "serve.lock"
 
 
 class Announcer:
-    """Tell the user what happens, in sentences or as JSON lines."""
+    """Reports events to the user, as sentences or as JSON lines."""
 
     def __init__(self, *, json_events: bool) -> None:
         self._json = json_events
@@ -48,13 +48,13 @@ def serve(settings: Settings, *, json_events: bool) -> None:
 
     Parameters
     ----------
-    settings : where the API listens (port 0 takes a free one), jobs at once, data directory and all else.
+    settings : address of the API (port 0 selects a free one), jobs at once, data directory and all others.
     json_events : one JSON object per line instead of sentences.
     """
     from app.database import upgrade
 
     announcer = Announcer(json_events=json_events)
-    ensure_cache()  # here, where its warning is seen; the workers inherit the folder
+    ensure_cache()  # here, where its warning is visible; the workers inherit the folder
     data_dir = settings.data_dir
     with _own_data_dir(data_dir):
         port = _api_port(settings.host, settings.port)
@@ -92,7 +92,7 @@ def _start_children(
     if supervisor.stopping:
         return
     api = supervisor.start(api_process(environment, settings.host, port))
-    # the worker loads while the API does; a wake-up that comes early waits in the queue
+    # the worker loads while the API does; an early wake-up waits in the queue
     supervisor.start(worker_process(environment, settings.workers))
     supervisor.start(beat_process(environment))
     _expect(supervisor, api, lambda: _alive(settings.host, port), API_WITHIN_S)
@@ -105,7 +105,7 @@ def _expect(supervisor: Supervisor, child: Child, ready: Callable[[], bool], wit
     raise CommandError(
         f"the {child.spec.name} {state}; the end of its log {child.log_path}:\n{child.last_words()}",
         code=Exit.ENVIRONMENT,
-        hint="repair what the log says and start again",
+        hint="fix the problem in the log and start again",
     )
 
 
@@ -115,23 +115,23 @@ def api_process(environment: dict[str, str], host: str, port: int) -> ChildSpec:
 
 
 def worker_process(environment: dict[str, str], slots: int) -> ChildSpec:
-    """A worker for so many jobs at once."""
+    """A worker for a number of concurrent jobs."""
     command = _python("worker.process", "worker", "--concurrency", str(slots))
     return ChildSpec("worker", command, environment, stop_within_s=WORKER_STOP_S)
 
 
 def beat_process(environment: dict[str, str]) -> ChildSpec:
-    """The beat: not inside the worker, or nobody would notice its death and find lost jobs any more."""
+    """The beat; separate from the worker, so that jobs of a dead worker are still found."""
     return ChildSpec("beat", _python("worker.process", "beat"), environment)
 
 
 def _python(module: str, *arguments: str) -> list[str]:
-    """Run one of our modules; nothing is imported from the working folder (-P), whatever lies there."""
+    """Command to run one of our modules; nothing is imported from the working folder (-P)."""
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
 def _environment(settings: Settings, port: int) -> dict[str, str]:
-    """Hand on what options said: the children read variables."""
+    """Pass options on as environment variables, which the children read."""
     return {
         "MORPHID_DATA_DIR": str(settings.data_dir),
         "MORPHID_HOST": settings.host,
@@ -144,7 +144,7 @@ def _environment(settings: Settings, port: int) -> dict[str, str]:
 
 @contextmanager
 def _own_data_dir(home: Path) -> Iterator[None]:
-    """Make the data directory and hold it alone."""
+    """Create the data directory and lock it."""
     try:
         make_private_folder(home)
         _close_to_others(home)
@@ -168,10 +168,10 @@ def _own_data_dir(home: Path) -> Iterator[None]:
 
 
 def _close_to_others(home: Path) -> None:
-    """Let nobody else look into a data directory that is ours; say what is done with one that exists.
+    """Make a data directory of ours private; report what is done with an existing one.
 
-    One that holds other things, such as a home directory, is somebody else's to close. What we write there is
-    private all the same.
+    The mode of a directory with other contents, such as a home directory, is not changed. The files we write
+    there are private in any case.
     """
     names = {path.name for path in home.iterdir()}
     if not home.stat().st_mode & OTHERS:
@@ -196,7 +196,7 @@ def _api_port(host: str, port: int) -> int:
 
 def _alive(host: str, port: int) -> bool:
     try:
-        with closing(HTTPConnection(in_url(host), port, timeout=1.0)) as link:  # which knows no proxies
+        with closing(HTTPConnection(in_url(host), port, timeout=1.0)) as link:  # ignores proxies
             link.request("GET", "/livez")
             return link.getresponse().status == HTTPStatus.OK
     except (HTTPException, OSError):

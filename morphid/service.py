@@ -1,4 +1,4 @@
-"""Talk to a running MorphID service: short methods over httpx, errors as sentences."""
+"""Client of a running MorphID service: short methods over httpx, with errors as messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from morphid.exits import CommandError, Exit
 Document = dict[str, Any]
 FINISHED = frozenset({"succeeded", "failed", "cancelled", "expired"})
 POLL_S = 0.25
-PATIENCE_S = 30.0  # a service that restarts comes back within this
+PATIENCE_S = 30.0  # s in which a restarting service comes back
 
 
 class Service:
@@ -25,7 +25,7 @@ class Service:
     Parameters
     ----------
     url : base address, such as ``http://127.0.0.1:8000``.
-    api_key : for services that demand one.
+    api_key : for services that require one.
     transport : handed in by tests.
     """
 
@@ -45,12 +45,12 @@ class Service:
         self._http.close()
 
     def submit(self, operation: str, body: Document, *, idempotency_key: str | None = None) -> Document:
-        """Post a job and give its representation."""
+        """Post a job and return its representation."""
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
         return self._document("POST", f"/{operation}", json=body, headers=headers)
 
     def upload(self, path: Path) -> Document:
-        """Upload a sample file and give its representation, with an ``id``."""
+        """Upload a sample file and return its representation, with an ``id``."""
         with path.open("rb") as stream:
             return self._document("POST", "/trajectories", files={"file": (path.name, stream)})
 
@@ -63,23 +63,23 @@ class Service:
         return found
 
     def job(self, job_id: str) -> Document:
-        """Give one job."""
+        """Return one job."""
         return self._document("GET", f"/jobs/{job_id}")
 
     def cancel(self, job_id: str) -> Document:
-        """Ask for a job's end."""
+        """Request the cancellation of a job."""
         return self._document("POST", f"/jobs/{job_id}/cancel")
 
     def result(self, job_id: str) -> Document:
-        """Give the result of a finished job."""
+        """Return the result of a finished job."""
         return self._document("GET", f"/jobs/{job_id}/result")
 
     def request(self, job_id: str) -> Document:
-        """Give the request of a job."""
+        """Return the request of a job."""
         return self._document("GET", f"/jobs/{job_id}/request")
 
     def watch(self, job_id: str, *, poll_s: float = POLL_S) -> Iterator[Document]:
-        """Give the job again and again until it is finished; wait for a service that restarts meanwhile."""
+        """Yield the job repeatedly until it is finished; wait for a service that restarts meanwhile."""
         patience_until = time.monotonic() + PATIENCE_S
         while True:
             try:
@@ -95,7 +95,7 @@ class Service:
             time.sleep(poll_s)
 
     def artifacts(self, job_id: str) -> dict[str, bytes]:
-        """Give every file that a job left behind, by name."""
+        """Return all files of a job, by name."""
         found = self._document("GET", f"/jobs/{job_id}/artifacts")["artifacts"]
         names = [str(item["name"]) for item in found]
         return {name: self._request("GET", f"/jobs/{job_id}/artifacts/{name}").content for name in names}
@@ -119,7 +119,7 @@ class Service:
 
 
 def _sendable(api_key: str) -> str:
-    """Give the key without the space around it that copying brings."""
+    """Return the key without surrounding white space from copying."""
     key = api_key.strip()
     if not key.isascii() or not key.isprintable() or " " in key:
         raise CommandError(
@@ -129,7 +129,7 @@ def _sendable(api_key: str) -> str:
 
 
 def _refusal(answer: httpx.Response) -> CommandError:
-    """Turn a problem document (RFC 9457) into a sentence."""
+    """Convert a problem document (RFC 9457) to a message."""
     try:
         problem = answer.json()
     except ValueError:
@@ -146,7 +146,7 @@ def _refusal(answer: httpx.Response) -> CommandError:
 
 
 def _further_faults(problem: Document) -> Iterator[str]:
-    """Give the further faults of the request, a line each; the first fault is the problem's own."""
+    """Return the further faults of the request, one per line; the first one is the problem's own."""
     for fault in (problem.get("errors") or [])[1:]:
         hint = f" ({fault['hint']})" if fault.get("hint") else ""
         yield f"{fault.get('pointer', '')}: {fault.get('detail', '')}{hint}"

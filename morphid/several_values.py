@@ -1,4 +1,4 @@
-"""Options that take several values at once: ``--sample a.csv b.csv``, which a shell makes of ``*.csv``."""
+"""Options with several values at once: ``--sample a.csv b.csv``, as a shell expands ``*.csv``."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 class SeveralValues(TyperCommand):
-    """A command whose repeatable options go on taking words until the next option.
+    """A command whose repeatable options take all words up to the next option.
 
     It must have no positional arguments: a word could be one.
     """
 
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
-        """Repeat the option before each further value, as the parser underneath wants it."""
+        """Repeat the option before each further value, as the underlying parser requires."""
         repeatable = {
             name
             for parameter in self.params
@@ -30,7 +30,7 @@ class SeveralValues(TyperCommand):
 
 
 def repeated(words: Sequence[str], options: Collection[str]) -> Iterator[str]:
-    """The words with each of the `options` named again before its second and every further value.
+    """Insert each of the `options` again before its second and every further value.
 
     >>> list(repeated(["--sample", "a", "b", "--seed", "1"], {"--sample"}))
     ['--sample', 'a', '--sample', 'b', '--seed', '1']

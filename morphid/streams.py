@@ -1,4 +1,4 @@
-"""Standard output and error that take every character, and outlive their readers."""
+"""Standard output and error that accept every character and survive closed pipes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from typing import IO
 
 from rich.console import Console
 
-SPELT = "morphid-spelt"  # name of the way to write what an encoding lacks
-REPLACEABLE = frozenset({"strict", "backslashreplace", "surrogateescape"})  # what streams begin with
+SPELT = "morphid-spelt"  # name of our handler for characters that an encoding lacks
+REPLACEABLE = frozenset(
+    {"strict", "backslashreplace", "surrogateescape"}
+)  # error handlers that streams start with
 WORDS = {
     **dict(zip("φθψαΔ", ("phi", "theta", "psi", "alpha", "Delta"), strict=True)),
     **dict(zip("≤≥±²³→…°", ("<=", ">=", "+-", "^2", "^3", "->", "...", "deg"), strict=True)),
@@ -22,7 +24,7 @@ WORDS = {
 
 
 def _spelt(error: UnicodeError) -> tuple[str, int]:
-    """Write in ASCII what an output's encoding does not have."""
+    """Spell in ASCII the characters that an output's encoding lacks."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(_in_ascii, error.object[error.start : error.end])), error.end
@@ -37,22 +39,22 @@ codecs.register_error(SPELT, _spelt)
 
 
 def prepare_streams() -> None:
-    """Let standard output and error write every character, in words where their encoding lacks it."""
+    """Make standard output and error accept every character, spelled out if their encoding lacks it."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors in REPLACEABLE:
             stream.reconfigure(errors=SPELT)
 
 
 def silence(stream: IO[str]) -> None:
-    """Let what is still written to a stream go nowhere, for its reader has left (``morphid ... | head``)."""
-    with suppress(OSError, ValueError):  # of a stream without a file
+    """Discard further output to a stream whose reader has left (``morphid ... | head``)."""
+    with suppress(OSError, ValueError):  # for a stream without a file
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
 
 
 def flush_streams() -> None:
-    """Write out what is left; at the interpreter's end a reader who has left would be a traceback."""
+    """Flush the streams; at interpreter exit, a closed pipe would cause a traceback."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -61,9 +63,9 @@ def flush_streams() -> None:
 
 
 class Terminal(Console):
-    """A console whose reader may leave: the work goes on, files are written, the exit code is the work's."""
+    """A console whose reader may leave: the work continues, files are written, the exit code is its own."""
 
     def on_broken_pipe(self) -> None:
-        """Print to nowhere from now on."""
+        """Discard output from now on."""
         self.quiet = True
         silence(self.file)

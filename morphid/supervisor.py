@@ -1,4 +1,4 @@
-"""Keep a handful of child processes alive, and end them all together."""
+"""Keeps a few child processes alive, and ends them all together."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from typing import IO
 
 from app.private_files import PRIVATE_UMASK, close_to_others, make_private_folder, open_private
 
-FIRST_PAUSE_S = 0.5  # before the first restart: long enough to free a port, short enough to go unnoticed
+FIRST_PAUSE_S = 0.5  # s before the first restart: long enough to free a port, short enough to go unnoticed
 MAX_PAUSE_S = 30.0
 HEALTHY_AFTER_S = 60.0  # a child that lived this long starts again with the first pause
 POLL_S = 0.1
-LOG_LIMIT_BYTES = 10_000_000  # a longer log is begun anew at the next start
+LOG_LIMIT_BYTES = 10_000_000  # a longer log is restarted at the next start
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
@@ -46,7 +46,7 @@ class ChildSpec:
 
 
 class Child:
-    """One supervised process, in a session of its own so that its whole tree can be ended."""
+    """One supervised process, in its own session so that its whole process tree can be ended."""
 
     def __init__(self, spec: ChildSpec, log_path: Path, *, clock: Callable[[], float]) -> None:
         self.spec = spec
@@ -79,7 +79,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 text=True,
                 start_new_session=True,
-                umask=PRIVATE_UMASK,  # what it writes by itself, such as the broker's journal
+                umask=PRIVATE_UMASK,  # files it writes itself, such as the broker's journal, are private
                 preexec_fn=_die_with_parent if sys.platform == "linux" else None,  # noqa: PLW1509 - no threads here
             )
         if self.spec.stdin_text is not None and self._process.stdin is not None:
@@ -89,11 +89,11 @@ class Child:
         self._start_again_at = None
 
     def tend(self) -> str | None:
-        """Restart the process when it has died and its pause is over.
+        """Restart the process if it has died and its pause is over.
 
         Returns
         -------
-        What happened, as a sentence, or None when nothing did.
+        A sentence on what happened, or None.
         """
         now = self._clock()
         if self._start_again_at is not None:
@@ -105,7 +105,7 @@ class Child:
         code = self.exit_code
         if code is None:
             return None
-        self._kill_group()  # what it leaves behind would work at the same time as its successor
+        self._kill_group()  # leftover processes would run at the same time as the successor
         if now - self._started_at > HEALTHY_AFTER_S:
             self._pause_s = FIRST_PAUSE_S
         pause_s, self._pause_s = self._pause_s, min(2.0 * self._pause_s, MAX_PAUSE_S)
@@ -113,7 +113,7 @@ class Child:
         return f"{self.spec.name} ended ({describe_exit(code)}); starting it again in {pause_s:g} s"
 
     def stop(self) -> None:
-        """Ask it to end, wait, insist."""
+        """Terminate it, wait, then kill it."""
         self._start_again_at = None
         if self._process is None:
             return
@@ -129,7 +129,7 @@ class Child:
             self._process.wait(5.0)
 
     def last_words(self, lines: int = 12) -> str:
-        """Give the end of the log."""
+        """Return the end of the log."""
         with contextlib.suppress(OSError):
             return "\n".join(self.log_path.read_text("utf-8", "replace").splitlines()[-lines:])
         return ""
@@ -153,7 +153,7 @@ class Supervisor:
     ----------
     log_dir : where each child's output goes.
     report : called with a sentence for every event that the user should know.
-    clock, sleep : handed in so that tests need not wait.
+    clock, sleep : injected so that tests need not wait.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class Supervisor:
         self.stopping = False  # whether a signal requested the end; `watch` then returns
 
     def on_signals(self) -> None:
-        """Take SIGINT, SIGTERM and SIGHUP as the wish to end."""
+        """Treat SIGINT, SIGTERM and SIGHUP as requests to end."""
 
         def stop(_number: int, _frame: FrameType | None) -> None:
             self.stopping = True
@@ -224,7 +224,7 @@ class Supervisor:
 
 
 def describe_exit(code: int) -> str:
-    """Say how a process ended: its exit code, or the signal that killed it."""
+    """Describe how a process ended: its exit code, or the signal that killed it."""
     if code >= 0:
         return f"exit code {code}"
     try:
@@ -234,5 +234,5 @@ def describe_exit(code: int) -> str:
 
 
 def _die_with_parent() -> None:
-    """Have the kernel end this child when the supervisor vanishes without a word (Linux)."""
+    """Have the kernel end this child if the supervisor disappears (Linux)."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,1 +1,1 @@
-"""The worker: claims queued jobs, lets morphcore do the work, writes what happens into the job store."""
+"""The worker: claims queued jobs, runs them with morphcore, and records progress and results."""

@@ -1,4 +1,4 @@
-"""One attempt at a job, or at one chunk of it: every way it can end has its own branch."""
+"""One attempt at a job, or at one chunk of it; every possible ending has its own branch."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from worker.spans import PhaseSpans
 
 log = logging.getLogger(__name__)
 
-# a generation may take milliseconds; two writes a second serve the user's eye and the disk
+# a generation may take milliseconds; two writes a second are enough for the user and gentle on the disk
 SAVE_EVERY_S = 0.5
 
 
 class Ending(Enum):
-    """What became of one wake-up."""
+    """The outcome of one wake-up."""
 
     NOTHING_QUEUED = "nothing queued"
     SUCCEEDED = "succeeded"
@@ -34,7 +34,7 @@ class Ending(Enum):
     EXPIRED = "expired"
     RELEASED = "released"  # back in the queue with its checkpoint
     ABANDONED = "abandoned"  # another claim holds the job
-    HANDED_OUT = "handed out"  # its next generation is in chunks that any worker may fly
+    HANDED_OUT = "handed out"  # its next generation was split into chunks that any worker may fly
     CHUNK_STORED = "chunk stored"
 
 
@@ -44,7 +44,7 @@ class Attempt:
     Attributes
     ----------
     handed_out : int
-        Number of chunks that the job was given up for; publish as many messages.
+        Number of chunks that the job was split into; publish as many messages.
     """
 
     def __init__(self, claim: Claim, keeper: LeaseKeeper, kernels: Kernels, cache: JobCache) -> None:
@@ -58,11 +58,11 @@ class Attempt:
         self._phases = PhaseSpans()
         self._work: Work | None = None
         self._checkpoint: bytes | None = None
-        self._unsaved: Document | None = None  # progress of the last step
+        self._unsaved: Document | None = None  # progress at the last step
         self._saved_at = float("-inf")
 
     def run(self) -> Ending:
-        """Work to an end, whatever it is."""
+        """Work until the attempt ends, in any way."""
         try:
             return self._run()
         except StaleClaim:
@@ -73,7 +73,7 @@ class Attempt:
             self._phases.close()
 
     def give_up(self, error: Document) -> Ending:
-        """End the job as failed, because a chunk of it has shown that it cannot be done."""
+        """End the job as failed because one of its chunks cannot be done."""
         try:
             self._checkpoint, _ = self._keeper.read(self._load)
             self._begin()
@@ -89,7 +89,7 @@ class Attempt:
             return self._stopped()
         work = self._begin()
         if self._chunks:
-            self._keeper.look()  # it may have been taken over to end
+            self._keeper.look()  # it may have been taken over only to be ended
             if self._keeper.should_stop():
                 return self._stopped()
             self._take_outcomes(flown)
@@ -120,19 +120,19 @@ class Attempt:
     def _prepare_kernels(self) -> bool:
         if self._kernels.ready:
             return True
-        if self._checkpoint is None:  # otherwise the progress so far says more
+        if self._checkpoint is None:  # otherwise the progress so far is more informative
             message = "compiling the numeric kernels (a minute or two at the first start on a machine)"
             self._save({"fraction": 0.0, "phase": "preparing", "message": message}, None)
         return self._kernels.wait(self._keeper.should_stop)
 
-    # a generation over several workers
+    # a generation spread over several workers
 
     def _hand_out(self) -> bool:
-        """Give the job up for chunks if its next step is made of parts that others can fly."""
+        """Release the job as chunks if its next step consists of parts that others can fly."""
         if not self._chunks or self._checkpoint is None or not isinstance(self._work, SpreadWork):
             return False
         tasks = self._work.tasks(self._checkpoint, self._chunks)
-        if tasks is None or len(tasks) < 2:  # one part is flown as well here
+        if tasks is None or len(tasks) < 2:  # a single part is better flown here
             return False
         checkpoint, progress = self._checkpoint, self._unsaved
         self._keeper.write(lambda session: hand_out(session, self._claim, tasks, checkpoint, progress))
@@ -140,7 +140,7 @@ class Attempt:
         return True
 
     def _take_outcomes(self, flown: Flown | None) -> None:
-        """Take the step that the outcomes of all chunks make; without them the chunks are handed out anew."""
+        """Take the step made up of the outcomes of all chunks; without them, hand the chunks out again."""
         if flown is None or self._checkpoint is None or not isinstance(self._work, SpreadWork):
             return
         step = self._work.combine(self._checkpoint, flown.outcomes, flown.elapsed_s)
@@ -188,10 +188,10 @@ class Attempt:
         try:
             return self._end(JobStatus.FAILED, error)
         except (StaleClaim, StorageFull):
-            return Ending.ABANDONED  # without room for the error the reaper tries it later
+            return Ending.ABANDONED  # if there is no room for the error, the reaper tries again later
 
     def _end(self, status: JobStatus, error: Document | None = None) -> Ending:
-        """End early with as much of the best so far as there is room for: with files, without, nothing."""
+        """End early with as much of the best result as space allows: with files, without, or nothing."""
         best = self._best_so_far()
         for outcome in [] if best is None else [best, Outcome(best.document)]:
             try:
@@ -206,7 +206,7 @@ class Attempt:
         try:
             return self._work.best_so_far(self._checkpoint)
         except Exception:
-            # how the job ended matters more than what it leaves behind
+            # the ending of the job matters more than its files
             log.exception("job %s: no result at its last checkpoint", self._claim.job_id)
             return None
 
@@ -231,7 +231,7 @@ class Attempt:
 def fly_chunk(
     chunk: ChunkClaim, keeper: LeaseKeeper, kernels: Kernels, cache: JobCache
 ) -> tuple[Ending, Document | None]:
-    """Fly one chunk and store its outcome exactly once; return also why the whole job cannot be done."""
+    """Fly one chunk and store its outcome exactly once; also return why the whole job cannot be done."""
     try:
         outcome = _outcome(chunk, keeper, kernels, cache)
         keeper.note_work_ended()
@@ -256,7 +256,7 @@ def _outcome(chunk: ChunkClaim, keeper: LeaseKeeper, kernels: Kernels, cache: Jo
 
 
 def _leave(chunk: ChunkClaim, keeper: LeaseKeeper) -> Ending:
-    """Give the chunk to the next worker, or leave it if its job is ending."""
+    """Return the chunk for the next worker, or leave it if its job is ending."""
     if keeper.reason is not StopReason.SHUTDOWN:
         return Ending.ABANDONED
     try:
@@ -267,17 +267,17 @@ def _leave(chunk: ChunkClaim, keeper: LeaseKeeper) -> Ending:
 
 
 def begin(claim: Claim, keeper: LeaseKeeper, cache: JobCache) -> tuple[Work, int]:
-    """Begin the work of a job, or find it in the cache, with the number of its chunks."""
+    """Start the work of a job, or find it in the cache, and return it with the number of its chunks."""
     return cache.prepared(claim, lambda: keeper.read(lambda session: load_request(session, claim.job_id)))
 
 
 def error_document(error: Exception, job_id: str) -> Document:
-    """Return what the user is shown of an error."""
+    """Return the error document shown to the user."""
     if isinstance(error, MorphError):
         return _error(error.code, error.message, hint=error.hint, pointer=error.pointer)
     if isinstance(error, MemoryError):
         hint = "use fewer particles, fewer or shorter samples, or a machine with more memory"
-        return _error("out_of_memory", "the job needs more memory than there is", hint=hint)
+        return _error("out_of_memory", "the job needs more memory than is available", hint=hint)
     log.error("job %s: unforeseen", job_id, exc_info=error)
     hint = f"see the worker's log for {job_id}, and please report it"
     return _error("internal_error", "unexpected error in the worker", hint=hint)

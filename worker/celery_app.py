@@ -1,4 +1,4 @@
-"""The Celery application of the workers: messages are wake-up hints, the job table is the truth.
+"""The Celery application of the workers: messages are only wake-up hints; the job table is authoritative.
 
 `worker.process` starts it, for `morphid serve` and docker-compose.yml.
 """
@@ -33,12 +33,12 @@ from worker.row_watch import RowWatch
 
 log = logging.getLogger(__name__)
 
-# by the worker's clock, which may be hours off: a message with a short life would never reach it
+# judged by the worker's clock, which may be hours off: a short-lived message would never reach it
 REAP_EXPIRES_S = 24 * 3600.0
 
 
 def make_app(settings: Settings) -> Celery:
-    """Configure Celery for work that our own tables keep track of."""
+    """Configure Celery for work that is tracked in our own tables."""
     broker = celery_broker(settings.broker_url, "worker.transport:Transport")
     celery = Celery("morphid", include=["worker.tasks"])
     celery.conf.update(
@@ -46,16 +46,16 @@ def make_app(settings: Settings) -> Celery:
         task_default_queue=QUEUE,
         task_acks_late=False,  # redelivery by visibility timeout would run an hour-long job twice
         worker_prefetch_multiplier=1,
-        worker_disable_prefetch=True,  # a busy worker must not sit on a hint that an idle one could take
+        worker_disable_prefetch=True,  # a busy worker must not hold a hint that an idle one could take
         worker_concurrency=settings.workers,
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
-        worker_enable_remote_control=False,  # nobody controls workers through the broker
+        worker_enable_remote_control=False,  # workers are not controlled through the broker
         worker_consumer="worker.consumer:IndependentConsumer",
         worker_pool_start_method="fork",  # children inherit the pipe of `worker.shutdown`
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
-        broker_channel_error_retry=True,  # a broker that is full or out of order is one that is away
+        broker_channel_error_retry=True,  # a broker that is full or faulty is treated as unavailable
         task_serializer="json",
         accept_content=["json"],
         beat_schedule={
@@ -71,7 +71,7 @@ def make_app(settings: Settings) -> Celery:
 
 
 def threads_per_job() -> int:
-    """Numeric threads of one job: this machine's cores shared by the jobs that run at once."""
+    """Numeric threads per job: this machine's cores shared by the jobs that run concurrently."""
     return numerics.share_cores(app.conf.worker_concurrency)
 
 
@@ -108,7 +108,7 @@ def _at_the_end_of_each_child(**_: Any) -> None:
 
 @worker_ready.connect
 def _look_at_the_table(**_: Any) -> None:
-    # leases lost while no worker was there need not wait for the beat
+    # leases lost while no worker was running need not wait for the beat
     with contextlib.suppress(OperationalError):  # the beat will repeat it
         app.send_task(REAP, kwargs={"republish_after_s": 0.0}, queue=QUEUE, expires=REAP_EXPIRES_S)
 

@@ -1,7 +1,7 @@
-"""Wake-up messages as a worker takes them: read strictly, and written anew before Celery sees them.
+"""Wake-up messages on the worker's side: parsed strictly and rebuilt before Celery sees them.
 
-Whatever else a message carries (time limits, callbacks, compression, a broken body) never reaches Celery: it
-would act on it, or fall over it. A malformed message is dropped and counted.
+Anything else a message carries (time limits, callbacks, compression, a broken body) never reaches Celery,
+which would act on it or crash. A malformed message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _ReapOptions(BaseModel):
     republish_after_s: float | None = Field(default=None, ge=0.0, le=86_400.0, allow_inf_nan=False)
 
 
-# positional arguments, named ones, and what Celery appends, which nobody here reads
+# positional arguments, named ones, and Celery's additions, which are not read here
 _JobName = Annotated[str, Field(max_length=64)]
 _RUN_JOB_BODY = TypeAdapter(tuple[tuple[_JobName], dict[str, Any], Any])
 _REAP_BODY = TypeAdapter(tuple[tuple[()], _ReapOptions, Any])
@@ -56,7 +56,9 @@ class Hint:
     task: str  # `RUN_JOB` or `REAP`
     arguments: list[str] = field(default_factory=list)  # the job that caused it, for `RUN_JOB`
     options: dict[str, float] = field(default_factory=dict)  # how to reap, for `REAP`
-    id: str = field(default_factory=lambda: str(uuid4()))  # new for each: two of one id would count as one
+    id: str = field(
+        default_factory=lambda: str(uuid4())
+    )  # unique: two messages with the same id would count as one
 
     def headers(self) -> dict[str, Any]:
         """Return the headers of a Celery message (protocol 2)."""
@@ -80,7 +82,7 @@ class Hint:
         return json.dumps([self.arguments, self.options, {}]).encode()
 
     def packed(self) -> bytes:
-        """Return the whole message as kombu keeps it in a Redis list."""
+        """Return the whole message in the form that kombu stores in a Redis list."""
         return json.dumps(
             {
                 "body": base64.b64encode(self.body()).decode(),

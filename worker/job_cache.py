@@ -1,4 +1,4 @@
-"""The work of the spread jobs seen last: model, plans and tables are made once for all chunks of a job."""
+"""Cache of the most recent spread jobs: model, plans and tables are made once for all chunks of a job."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ DEFAULT_CHUNKS = 16
 
 
 class JobCache:
-    """Begins work, and keeps that of spread jobs, whose chunks come one after the other.
+    """Starts work, and caches that of spread jobs, whose chunks come one after the other.
 
-    ``find_operation(name)`` returns the function that begins the work; each job has so many numeric
-    ``threads``.
+    ``find_operation(name)`` returns the function that starts the work; each job uses ``threads`` numeric
+    threads.
     """
 
     def __init__(self, find_operation: Callable[[str], Begin], threads: int) -> None:
@@ -25,7 +25,7 @@ class JobCache:
         self._kept: OrderedDict[str, tuple[Work, int]] = OrderedDict()
 
     def prepared(self, claim: Claim, load_request: Callable[[], Document]) -> tuple[Work, int]:
-        """Return a job's work, and the number of chunks that each generation is divided into.
+        """Return a job's work and the number of chunks per generation.
 
         The number is 0 for work that one worker does alone.
         """

@@ -1,4 +1,4 @@
-"""A claim on a job or a chunk in a worker's hands: kept alive, watched, and written for."""
+"""A worker's claim on a job or a chunk: renewed, watched, and used for guarded writes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,15 @@ from morphdata.faults import MorphError
 log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
 
-STUCK_AFTER_S = 120.0  # work looks at its stop signal every second; if not, a kernel never returned
+STUCK_AFTER_S = 120.0  # work checks its stop signal every second; otherwise a kernel has not returned
 # a cancelled job must end within two seconds: one for a chunk of work, one for its result
 LOOK_EVERY_S = 0.25
-FIRST_PAUSE_S = 0.5  # before the job store is asked again; doubles
+FIRST_PAUSE_S = 0.5  # before the job store is tried again; doubles
 MAX_PAUSE_S = 4.0
-FULL_TRIES = 4  # somebody may be making room; then the job fails with `storage_full`
-SHUTDOWN_PATIENCE_S = 5.0  # a worker that ends waits so long for the job store; then the reaper does the rest
+FULL_TRIES = 4  # space may be freed meanwhile; after that the job fails with `storage_full`
+SHUTDOWN_PATIENCE_S = (
+    5.0  # a worker that shuts down waits this long for the job store; then the reaper does the rest
+)
 
 
 class StaleClaim(Exception):
@@ -38,13 +40,13 @@ class StaleClaim(Exception):
 
 
 class StorageFull(MorphError):
-    """The job store has no room for what should be written; what was there before still is."""
+    """The job store has no room for the write; earlier contents are unchanged."""
 
     code = "storage_full"
 
 
 def end_process() -> None:
-    """End this process at once: a kernel that never returns hears no signal. The reaper does the rest."""
+    """End this process at once: a kernel that never returns ignores signals. The reaper does the rest."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -52,17 +54,17 @@ class LeaseKeeper:
     """Keeps one claim alive in a thread while kernels run (they release the GIL).
 
     Use as a context manager around the work, and hand `should_stop` to it. Transactions are repeated while
-    the job store is away: nobody else can take the job meanwhile, and if only this worker is cut off, the
-    fence keeps its writes out.
+    the job store is unreachable: no other worker can take the job meanwhile, and if only this worker is cut
+    off, the fence rejects its later writes.
 
     Parameters
     ----------
     lease_s, heartbeat_s : float
-        How long each renewal lasts, and the time between two, s.
+        Duration of each renewal, and the time between two, s.
     shutting_down : callable
-        Whether this worker was asked to end.
+        Returns whether a shutdown of this worker was requested.
     look_every_s : float
-        Time between two looks at the row, s.
+        Time between two checks of the row, s.
     on_stuck : callable
         Called when the work has ignored its stop signal for `stuck_after_s`.
     """
@@ -111,24 +113,24 @@ class LeaseKeeper:
 
     @property
     def reason(self) -> StopReason | None:
-        """Why the work should stop, None while it should go on."""
+        """Why the work should stop; None while it should continue."""
         return self._reason
 
     def should_stop(self) -> bool:
-        """Whether the work should stop; cheap enough to ask between chunks."""
+        """Whether the work should stop; cheap enough to call between chunks."""
         return self._reason is not None
 
     def note_work_ended(self) -> None:
-        """Note that the work itself has stopped: its end is written as soon as the store lets it."""
+        """Note that the work itself has stopped; its end is written as soon as the store is available."""
         self._work_ended = True
 
     def look(self) -> None:
-        """Look at the row at once, in the caller's thread; if the store is away, the thread does it later."""
+        """Check the row at once, in the caller's thread; if the store is away, the thread does it later."""
         with suppress(SQLAlchemyError), self._database.read() as session:
             self._judge(look_at_lease(session, self._claim))
 
     def read(self, load: Callable[[Session], Answer]) -> Answer:
-        """Read in a transaction of its own, repeated while the store is away."""
+        """Read in a separate transaction, repeated while the store is unreachable."""
 
         def once() -> Answer:
             with self._database.read() as session:
@@ -137,19 +139,19 @@ class LeaseKeeper:
         return self._retried(once)
 
     def write(self, write: Callable[[Session], bool], *, even_if_full: bool = False) -> None:
-        """Write in a transaction of its own, repeated while the store is away.
+        """Write in a separate transaction, repeated while the store is unreachable.
 
         Parameters
         ----------
         write : callable
             Returns False when the claim is stale.
         even_if_full : bool
-            Use the job store's reserve of disk space: for a few rows that must be written.
+            Use the job store's reserve of disk space, for a few rows that must be written.
 
         Raises
         ------
         StaleClaim
-            The store refused the write, or this worker ends before the store is back.
+            The store refused the write, or this worker shuts down before the store is back.
         StorageFull
             There is no room.
         """
@@ -174,7 +176,7 @@ class LeaseKeeper:
                     raise
                 if trouble is DatabaseTrouble.FULL and tries == FULL_TRIES:
                     hint = "make room (delete finished jobs, or grow the disk) and submit the job again"
-                    message = "the job store has no room for what the job wrote"
+                    message = "the job store has no room for the job's data"
                     raise StorageFull(message, hint=hint) from error
                 log.warning("the job store is %s, trying again", trouble.value)
             if self._reason is StopReason.LOST:
@@ -187,7 +189,7 @@ class LeaseKeeper:
             pause_s = min(2.0 * pause_s, MAX_PAUSE_S)
 
     def _watch(self) -> None:
-        renewed_at = time.monotonic()  # the claim itself began the lease
+        renewed_at = time.monotonic()  # the claim itself started the lease
         requested_at: float | None = None
         while not self._over.wait(self._look_every_s):
             now = time.monotonic()
@@ -201,8 +203,8 @@ class LeaseKeeper:
                         found = look_at_lease(session, self._claim)
                 self._judge(found)
             except SQLAlchemyError as error:
-                # The claim is not lost by that: nobody can take the job while the job store is away for all,
-                # and if it is away only for us, the fence keeps our writes out.
+                # The claim is not lost: no worker can take the job while the job store is unreachable for
+                # all, and if it is unreachable only for us, the fence rejects our writes.
                 log.warning("job %s: lease not renewed: %s", self._claim.job_id, type(error).__name__)
             if self._reason is None and self._shutting_down():
                 self._reason = StopReason.SHUTDOWN

@@ -1,8 +1,8 @@
 """Threads and compiled kernels of one worker process.
 
-The thread count is fixed by environment variables before numba is imported. Kernels are compiled or loaded
-from the cache in the pool's child, in the background, while it already listens: run in the parent, they
-would break its forks.
+The thread count is set by environment variables before numba is imported. Kernels are compiled or loaded from
+the cache in the pool's child, in the background, while it already accepts jobs: run in the parent, they would
+break its forks.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def usable_cores() -> int:
         if quota != "max":
             cores = min(cores, -(-int(quota) // int(period)))
     except (OSError, ValueError):
-        pass  # no quota that we could read
+        pass  # no readable quota
     return max(1, cores)
 
 
@@ -41,11 +41,11 @@ def share_cores(concurrency: int, *, cores: int | None = None) -> int:
 
 
 def prepare_environment(threads: int) -> None:
-    """Fix the thread count of this process and of those it forks; without effect once numba is imported."""
+    """Set the thread count of this process and its forks; no effect once numba is imported."""
     if "numba" in sys.modules:
-        return  # its threads may run already; numba refuses to change their number
+        return  # its threads may be running already; numba refuses to change their number
     os.environ["NUMBA_NUM_THREADS"] = str(threads)
-    # the kernels spread blocks over threads themselves; a second pool under them would fight for the cores
+    # the kernels distribute blocks over threads themselves; a second pool would compete for the cores
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     os.environ.setdefault("MPLBACKEND", "Agg")
@@ -53,13 +53,13 @@ def prepare_environment(threads: int) -> None:
 
 
 def ensure_cache() -> None:
-    """Point numba and matplotlib to a folder of the user's where they can write in none of their own."""
+    """Point numba and matplotlib to a folder of the user if their default folders are not writable."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen and not takes_files(Path(chosen)):
         _keep_kernels_elsewhere(f"NUMBA_CACHE_DIR {chosen} cannot be written")
     elif not chosen and not any(takes_files(folder) for folder in _own_cache_folders()):
-        _keep_kernels_elsewhere("compiled kernels fit neither in this installation nor in a home folder")
-    # without a folder matplotlib makes one at each start and complains
+        _keep_kernels_elsewhere("neither this installation nor a home folder can hold compiled kernels")
+    # without one, matplotlib makes a temporary folder at each start and warns
     if not os.environ.get("MPLCONFIGDIR") and not takes_files(_home("XDG_CONFIG_HOME", ".config")):
         folder = os.environ.get("NUMBA_CACHE_DIR") or _private_folder()
         if folder is not None:
@@ -67,9 +67,9 @@ def ensure_cache() -> None:
 
 
 def takes_files(folder: Path) -> bool:
-    """Whether a file can really be made there: permission bits do not show read-only and full disks.
+    """Whether a file can actually be created there: permission bits do not show read-only or full disks.
 
-    For a folder that is not there yet the nearest one above it is tried.
+    For a folder that does not exist yet, the nearest existing parent is tried.
     """
     try:
         there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
@@ -81,7 +81,7 @@ def takes_files(folder: Path) -> bool:
 
 
 def _own_cache_folders() -> Iterator[Path]:
-    """Where numba keeps what it compiled by default: next to the source, else in the user's cache."""
+    """Numba's default folders for compiled code: next to the source, else in the user's cache."""
     library = find_spec("morphcore")  # found, not imported
     if library is not None and library.origin is not None:
         yield Path(library.origin).parent / "__pycache__"
@@ -89,13 +89,13 @@ def _own_cache_folders() -> Iterator[Path]:
 
 
 def _home(variable: str, name: str) -> Path:
-    return Path(os.environ.get(variable) or os.path.expanduser(f"~/{name}"))  # noqa: PTH111 - raises for nobody
+    return Path(os.environ.get(variable) or os.path.expanduser(f"~/{name}"))  # noqa: PTH111 - Path.expanduser raises without a home
 
 
 def _keep_kernels_elsewhere(reason: str) -> None:
     folder = _private_folder()
     if folder is None:
-        return  # morphcore.jit then compiles anew in each process, and says so
+        return  # morphcore.jit then compiles in each process and logs a warning
     log.warning(
         "%s; they are kept in %s. Set NUMBA_CACHE_DIR to a folder that this user may write", reason, folder
     )
@@ -103,7 +103,7 @@ def _keep_kernels_elsewhere(reason: str) -> None:
 
 
 def _private_folder() -> Path | None:
-    """A temporary folder of this user alone: we run no code that others compiled. None: no room for one."""
+    """A temporary folder private to this user, so that no foreign code is run. None if it cannot be made."""
     try:
         folder = Path(tempfile.gettempdir()) / f"morphid-kernels-{os.getuid()}"
         with contextlib.suppress(FileExistsError):
@@ -117,10 +117,10 @@ def _private_folder() -> Path | None:
 
 
 class Kernels:
-    """The compiled kernels of this process, made ready once, in the background.
+    """The compiled kernels of this process, prepared once, in the background.
 
-    ``warm_up(threads)`` compiles or loads those that most jobs need, ``further()`` the others, once jobs may
-    run; each job has so many numeric ``threads``.
+    ``warm_up(threads)`` compiles or loads those that most jobs need; ``further()`` the others, once jobs may
+    run. Each job uses ``threads`` numeric threads.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class Kernels:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin in the background; a second call does nothing."""
+        """Start in the background; a second call does nothing."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="warm-up", daemon=True)
             self._thread.start()
@@ -144,7 +144,7 @@ class Kernels:
         return self._done.is_set()
 
     def wait(self, stop: Callable[[], bool], *, poll_s: float = 0.2) -> bool:
-        """Wait for the end of the warm-up; return False when ``stop()`` turned true first."""
+        """Wait for the end of the warm-up; return False if ``stop()`` returned True first."""
         self.start()
         while not self._done.wait(poll_s):
             if stop():
@@ -155,15 +155,15 @@ class Kernels:
         try:
             self._warm_up(self.threads)
         except Exception:
-            # the job itself will meet the same trouble and say so where the user sees it
-            log.exception("the numeric kernels could not be made ready")
+            # the job itself will fail in the same way and report it to the user
+            log.exception("the numeric kernels could not be prepared")
         finally:
             self._done.set()
         if self._further is not None:
             try:
                 self._further()
             except Exception:
-                log.exception("the further numeric kernels could not be made ready")
+                log.exception("the further numeric kernels could not be prepared")
 
 
 def warm_up_library(threads: int) -> None:

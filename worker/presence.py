@@ -1,9 +1,9 @@
-"""A worker's signs of life: rows written from the very loop that hands jobs to its children.
+"""A worker's signs of life: rows written from the same loop that hands jobs to its children.
 
-A process that is there but begins no jobs (stopped, hung) writes none, and one whose children are gone or do
-not answer writes that it has no slots. Without a broker the rows are looked
-at all the same (`worker.row_watch`), so the broker is no part of these signs. Each sign is a transaction on a
-connection of its own, closed at once: the parent process forks, and a child must not inherit a connection.
+A process that exists but starts no jobs (stopped, hung) writes none, and one whose children are gone or do
+not answer reports no free slots. Rows are also checked without a broker (`worker.row_watch`), so these signs
+do not depend on the broker. Each sign is a transaction on its own connection, closed at once: the parent
+process forks, and a child must not inherit a connection.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from worker.transport import dropped
 
 log = logging.getLogger(__name__)
 
-PATIENCE_S = 2  # with a busy or absent database: the loop has messages to take
-UNABLE_AFTER_S = 15.0  # free children that have not looked at the rows for so long will take no job either
+PATIENCE_S = 2  # s to wait for a busy or absent database: the loop has messages to take
+UNABLE_AFTER_S = 15.0  # free children that have not checked the rows for this long will not take a job either
 IDLE_STATES = frozenset("TtZXx")  # stopped, traced, zombie, dead (proc(5))
 
 
 def process_name() -> str:
-    """Name this process among all processes of workers."""
+    """Return the name of this process among all worker processes."""
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
 def brief_engine(url: str) -> Engine:
-    """Open an engine that keeps no connection and loses little time with a database that is away."""
+    """Open an engine that keeps no connection and loses little time if the database is unreachable."""
     parsed = make_url(normal_url(url))
     link: dict[str, Any] = {"connect_timeout": PATIENCE_S, "options": f"-c statement_timeout={PATIENCE_S}s"}
     if parsed.get_backend_name() == "sqlite":
@@ -54,7 +54,7 @@ def brief_engine(url: str) -> Engine:
 
 
 def can_work(pid: int, *, proc: Path = Path("/proc")) -> bool:
-    """Whether a process runs: not stopped, not dead. Where there is no /proc, it does."""
+    """Whether a process is running: not stopped, not dead. Without /proc this is assumed."""
     try:
         stat = (proc / str(pid) / "stat").read_text()
     except FileNotFoundError:
@@ -65,22 +65,25 @@ def can_work(pid: int, *, proc: Path = Path("/proc")) -> bool:
 
 
 class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
-    """Part of Celery's worker: writes signs of life from its event loop, and a last one when it ends."""
+    """Step of Celery's worker: writes signs of life from its event loop, and a last one at shutdown."""
 
-    requires = ("celery.worker.components:Pool", RowWatch)  # a sign says that the rows are looked at
+    requires = (
+        "celery.worker.components:Pool",
+        RowWatch,
+    )  # a sign of life implies that the rows are being checked
 
     def __init__(self, worker: Any, **options: Any) -> None:
         super().__init__(worker, **options)
         settings = load_settings()
         self._every_s = settings.worker_seen_every_s
         self._engine = brief_engine(settings.database_url)
-        self._name = process_name()  # the parent's, not a pool child's
+        self._name = process_name()  # that of the parent, not of a pool child
         self._timers: list[Any] = []
         self._known = False
         self._written = True
 
     def start(self, worker: Any) -> None:
-        """Write a sign at once, but in the loop, so that it proves that the loop runs; then regularly."""
+        """Write a sign at once, but in the loop, to prove that the loop runs; then regularly."""
         beat = (worker,)
         self._timers = [
             worker.timer.call_after(0.01, self._beat, beat),
@@ -88,7 +91,7 @@ class Presence(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         ]
 
     def stop(self, _worker: Any) -> None:
-        """Write that the worker ends."""
+        """Record that the worker ends."""
         for timer in self._timers:
             timer.cancel()
         self._timers = []

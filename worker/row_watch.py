@@ -1,7 +1,7 @@
-"""A worker looks at the rows by itself: hints make jobs begin at once, looking makes them begin at all.
+"""Periodic checks of the job rows: hints start jobs promptly, checks guarantee that they start at all.
 
-Every second, when a slot is free, a pool child is asked whether work waits; if so, the worker wakes itself as
-a message would have done. So messages that are lost, dropped or never sent cost a second.
+Every second, when a slot is free, a pool child checks whether work is waiting; if so, the worker wakes itself
+as a message would have done. So a message that is lost, dropped or never sent costs only a second.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from worker.hints import Hint
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 1.0
-ANSWER_WITHIN_S = 5.0  # then another child is asked; a look takes a millisecond
+ANSWER_WITHIN_S = 5.0  # then another child is tried; a check takes a millisecond
 NOBODY_IN_PARTICULAR = "a look at the rows"
 
 
 def work_waits() -> bool:
-    """Look at the rows (called in a pool child)."""
+    """Check the rows (called in a pool child)."""
     from worker import tasks
 
     return tasks.work_waits()
 
 
 class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries no types
-    """Part of Celery's worker: looks in its event loop, as long as the pool is there."""
+    """Step of Celery's worker: checks rows in its event loop while the pool exists."""
 
     requires = ("celery.worker.components:Pool",)
 
@@ -52,11 +52,11 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
         return bool(worker.use_eventloop)
 
     def start(self, worker: Any) -> None:
-        """Look from now on."""
+        """Start the checks."""
         self._timer = worker.timer.call_repeatedly(LOOK_EVERY_S, self._look, (worker,))
 
     def stop(self, _worker: Any) -> None:
-        """Look no more."""
+        """Stop the checks."""
         if self._timer is not None:
             self._timer.cancel()
 
@@ -64,12 +64,12 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
 
     @property
     def unanswered_s(self) -> float:
-        """How long free children have not answered, s."""
+        """Time for which free children have not answered, s."""
         return 0.0 if self._unanswered_since is None else self._clock() - self._unanswered_since
 
     def _look(self, worker: Any) -> None:
         if len(state.reserved_requests) >= worker.pool.num_processes:
-            self._unanswered_since = None  # all are at work
+            self._unanswered_since = None  # all are busy
             return
         now = self._clock()
         if self._requested_at is not None and now - self._requested_at < ANSWER_WITHIN_S:
@@ -85,9 +85,9 @@ class RowWatch(bootsteps.StartStopStep):  # type: ignore[misc]  # celery carries
 
         def failed(error: object) -> None:
             self._requested_at = None
-            log.warning("a look at the rows failed: %s", error)
+            log.warning("a check of the job rows failed: %s", error)
 
-        # the pool gives the slot back with the answer
+        # the pool returns the slot with the answer
         worker.semaphore.acquire(
             partial(worker.pool.apply_async, work_waits, callback=answered, error_callback=failed)
         )

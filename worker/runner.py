@@ -1,4 +1,4 @@
-"""Answer a wake-up: claim the work that should be done next, a job or a chunk of one, and do it."""
+"""Handle a wake-up: claim the next work, a job or a chunk of one, and do it."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from worker.spans import attempt_span
 
 log = logging.getLogger(__name__)
 
-CLAIM_TRIES = 5  # each lost race means that another worker took a job
-CHUNK_LEASE_S = 10.0  # a chunk that is lost holds up its generation for so long and a round of the reaper
-HEARTBEATS_PER_LEASE = 5  # a chunk of a second needs none
+CLAIM_TRIES = 5  # each race lost means that another worker took a job
+CHUNK_LEASE_S = 10.0  # a lost chunk delays its generation by this time plus one round of the reaper
+HEARTBEATS_PER_LEASE = 5  # a chunk of about a second needs none
 
 
 def publish_nothing(_job_id: str, _count: int) -> None:
-    """Send no wake-up messages: the reaper does."""
+    """Send no wake-up messages; the reaper will."""
 
 
 def never() -> bool:
@@ -38,7 +38,7 @@ def never() -> bool:
 
 @dataclass
 class Runner:
-    """Everything that running jobs needs, handed in.
+    """Runs jobs with the given dependencies.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class Runner:
     kernels : the compiled kernels of this process.
     worker_name : shown in the job's events.
     lease_s, heartbeat_s : life and renewal of a claim, s.
-    find_operation : name -> function that begins the work.
-    shutting_down : whether this worker was asked to end.
+    find_operation : name -> function that starts the work.
+    shutting_down : returns whether a shutdown of this worker was requested.
     publish : sends a number of wake-up messages for a job.
     chunk_lease_s : life of a claim on a chunk, s; short, because a lost one holds up its whole generation.
     """
@@ -66,7 +66,7 @@ class Runner:
         self._cache = JobCache(self.find_operation, self.kernels.threads)
 
     def run_next(self) -> tuple[Ending, str | None]:
-        """Do what should be done next, by the rows; return the ending and the job's id."""
+        """Do the next work according to the rows; return the ending and the job's id."""
         claim = None if self.shutting_down() else self._claim()
         if claim is None:
             return Ending.NOTHING_QUEUED, None
@@ -87,7 +87,7 @@ class Runner:
         return ending, error
 
     def _taken_over(self, job_id: str, error: Document | None) -> Claim | None:
-        """Claim a spread job that must go on, now that its chunks are stored or its end has come."""
+        """Claim a spread job that must continue because its chunks are stored or it must end."""
         if error is None:
             with self.database.read() as session:
                 if not must_be_taken_over(session, job_id):

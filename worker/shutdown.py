@@ -1,8 +1,8 @@
-"""Let the pool's children know that a shutdown was requested.
+"""Inform the pool's children of a requested shutdown.
 
-Only the parent process receives SIGTERM; its children go on until their task ends, maybe in an hour. They
-inherit the reading end of a pipe, and one byte in it, which nobody takes out, is the message to all of them.
-A pipe has no name that others could use, and writing to it takes no lock in a signal handler.
+Only the parent process receives SIGTERM; its children continue until their task ends, perhaps in an hour.
+They inherit the reading end of a pipe; one byte in it, which is never read out, is the message to all of
+them. A pipe has no name that others could use, and writing to it takes no lock in a signal handler.
 """
 
 from __future__ import annotations

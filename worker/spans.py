@@ -16,7 +16,7 @@ def attempt_span(claim: Claim) -> Iterator[None]:
     """Trace an attempt as part of the request's trace; log lines within the block carry the job."""
     chunk = isinstance(claim, ChunkClaim)
     with bound(job_id=claim.job_id, request_id=claim.request_id, attempt=claim.attempt, worker=claim.worker):
-        if not chunk and claim.fence == 1:  # a job handed back begins attempt 1 again
+        if not chunk and claim.fence == 1:  # a job that was handed back starts attempt 1 again
             past_span("wait in the queue", seconds=claim.waited_s, traceparent=claim.traceparent)
         with span(
             f"{'chunk' if chunk else 'attempt'} {claim.operation}",
@@ -32,7 +32,7 @@ def attempt_span(claim: Claim) -> Iterator[None]:
 
 
 class PhaseSpans:
-    """Spans of the phases of a search: a phase began when the last step of the one before ended."""
+    """Spans of the phases of a search; a phase begins when the last step of the previous one ends."""
 
     def __init__(self) -> None:
         self._phase: str | None = None

@@ -1,4 +1,4 @@
-"""The two tasks: run a job, reap what was lost. Thin; the work is in `runner` and in the job store."""
+"""The two tasks: run a job, reap lost work. They are thin; the work is in `runner` and in the job store."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class Process:
-    """What one pool child keeps between tasks."""
+    """State that a pool child keeps between tasks."""
 
     def __init__(self, threads: int) -> None:
         self.settings = load_settings()
@@ -53,7 +53,7 @@ class Process:
         )
 
     def reap_is_due(self) -> bool:
-        """Whether this process has not reaped just now."""
+        """Whether this process has not reaped recently."""
         return bool(time.monotonic() - self.reaped_at > app.conf.beat_schedule["reap"]["schedule"] / 2.0)
 
     def next_unit(self) -> Unit | None:
@@ -78,7 +78,7 @@ def enter_process() -> Process:
 
 @contextmanager
 def _unless_away() -> Iterator[None]:
-    """Ignore that the job store is away: the reaper repeats the message when the store is back."""
+    """Ignore an unreachable job store: the reaper repeats the message when the store is back."""
     try:
         yield
     except SQLAlchemyError as error:
@@ -89,12 +89,12 @@ def _unless_away() -> Iterator[None]:
 
 
 def publish(job_id: str) -> bool:
-    """Send the wake-up hint for a queued job; without a broker the workers' own looks replace it."""
+    """Send the wake-up hint for a queued job; without a broker the workers' own checks replace it."""
     return send_hint(job_id, enter_process().settings.broker_url)
 
 
 def publish_all(job_ids: Iterable[str]) -> None:
-    """Send several hints, up to the first that the broker does not take."""
+    """Send several hints, until the broker refuses one."""
     all(publish(job_id) for job_id in job_ids)
 
 
@@ -108,14 +108,14 @@ def run_job(job_id: str) -> None:
         if ending is Ending.RELEASED and released_id is not None:
             publish(released_id)
         elif ending is not Ending.NOTHING_QUEUED:
-            # wake somebody for the next job unless a message is on its way: a lost one costs nothing
+            # wake a worker for the next job unless a message is on its way: a lost one costs nothing
             unit = process.next_unit()
             if unit is not None and messages_waiting(process.settings.broker_url) == 0:
                 publish(unit.job_id)
 
 
 def work_waits() -> bool:
-    """Whether a job or a part of one waits; never for a worker that ends, or while the store is away."""
+    """Whether a job or a part of one is waiting; False while shutting down or while the store is away."""
     if shutdown.announced():
         return False
     unit = None
@@ -126,11 +126,11 @@ def work_waits() -> bool:
 
 @app.task(name=REAP)
 def reap_jobs(republish_after_s: float | None = None) -> None:
-    """Give back what dead workers held, end what ran out of time, repeat lost hints."""
+    """Release the work of dead workers, end jobs that ran out of time, repeat lost hints."""
     process = enter_process()
     if republish_after_s is None:
         if not process.reap_is_due():
-            return  # messages pile up while every worker is busy: the first of them did the work
+            return  # messages accumulate while every worker is busy: the first of them did the work
         republish_after_s = process.settings.republish_after_s
     report = ReapReport()
     with _unless_away(), process.database.write() as session:

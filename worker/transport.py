@@ -1,4 +1,4 @@
-"""The worker's side of the broker: every message is read strictly before kombu and Celery see it."""
+"""The worker's side of the broker: every message is parsed strictly before kombu and Celery see it."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ log = logging.getLogger(__name__)
 
 
 class Dropped:
-    """Malformed messages that this process took and that are not yet written down."""
+    """Malformed messages received by this process and not yet recorded."""
 
     def __init__(self) -> None:
         self.number = 0
 
     def note(self, reason: str) -> None:
-        """Count one; only the first since the last count is worth a line."""
+        """Count one; only the first since the last record is logged."""
         if self.number == 0:
             log.warning("a malformed wake-up message was dropped: %s", reason)
         self.number += 1
 
 
-dropped = Dropped()  # kombu makes the channels, so nothing can be handed to them
+dropped = Dropped()  # kombu creates the channels, so nothing can be passed to them
 
 
 class HintClient(Redis):
-    """A client whose BRPOP gives well-formed messages; any other counts as none."""
+    """A client whose BRPOP returns only well-formed messages; others count as none."""
 
     def parse_response(self, connection: Any, command_name: str, **options: Any) -> Any:
         """Read the server's answer."""
@@ -48,7 +48,7 @@ class HintClient(Redis):
 
 
 class Channel(PlainChannel):
-    """A channel that takes wake-up messages."""
+    """A channel for wake-up messages."""
 
     def _get_client(self) -> type[Redis]:
         return HintClient

@@ -1,1 +1,1 @@
-"""Who did what, and when: one row per deed, never a secret in it."""
+"""The audit log: one row per action, without secrets."""

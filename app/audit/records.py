@@ -1,4 +1,4 @@
-"""What is noted, and what a noted deed looks like when it is read back."""
+"""Recorded actions and the entries of the audit log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class Action(StrEnum):
-    """Deeds that are noted."""
+    """Actions that are recorded."""
 
     JOB_POST = "job.post"
     JOB_CANCEL = "job.cancel"
@@ -28,7 +28,7 @@ class Action(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One noted deed."""
+    """One recorded action."""
 
     id: str
     at: datetime

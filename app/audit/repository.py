@@ -28,9 +28,9 @@ def note(
     *,
     detail: Mapping[str, Any] | None = None,
 ) -> None:
-    """Note what `caller` did to the thing with the id `target`, in the transaction that did it.
+    """Record what `caller` did to the object with the id `target`, in the same transaction.
 
-    ``detail`` holds a few small facts; never a secret, never content.
+    ``detail`` holds a few small facts, never secrets or content.
     """
     insert_entry(
         session,
@@ -56,7 +56,7 @@ def insert_entry(
     address: str | None = None,
     detail: Mapping[str, Any] | None = None,
 ) -> None:
-    """Note one deed, in the transaction that does it: what is rolled back was never done."""
+    """Record one action in its own transaction, so that a rollback also removes the record."""
     session.execute(
         insert(audit_log).values(
             id=new_identifier("audit"),
@@ -80,7 +80,7 @@ def list_entries(
     action: str | None = None,
     limit: int,
 ) -> list[Entry]:
-    """Newest deeds first; of one owner or of one kind, when given."""
+    """List entries, newest first; optionally of one owner or one kind."""
     query = select(audit_log).order_by(audit_log.c.at.desc(), audit_log.c.id.desc()).limit(limit)
     if owner is not None:
         query = query.where(audit_log.c.owner == owner)
@@ -90,6 +90,6 @@ def list_entries(
 
 
 def prune(session: Session, older_than_s: float) -> int:
-    """Delete entries older than so many seconds; return how many there were."""
+    """Delete entries older than a number of seconds; return how many were deleted."""
     old = delete(audit_log).where(audit_log.c.at < database_time() - older_than_s)
     return int(session.execute(old).rowcount)

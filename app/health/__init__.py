@@ -1,1 +1,1 @@
-"""For machines: alive, ready, metrics."""
+"""Liveness, readiness and metrics."""

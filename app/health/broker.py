@@ -1,4 +1,4 @@
-"""Health of the broker: the answer to a PING with our password; an open port alone proves little."""
+"""Health of the broker: the reply to a PING with our password, since an open port alone proves little."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Endpoints for machines."""
+"""Endpoints for monitoring."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ async def livez() -> Liveness:
 async def readyz(app: ServiceDep, response: Response, *, strict: Strict = False) -> Readiness:
     """Report whether database, broker and workers are available.
 
-    Load balancers check without `strict`: while broker or workers are away this process still takes jobs and
-    keeps them. Monitoring of the whole service checks with it.
+    Load balancers should check without `strict`: while broker or workers are away, this process still accepts
+    and keeps jobs. Monitoring of the whole service should use `strict`.
     """
     state = await app.health.readiness()
     if state.status == "not_ready" or (strict and state.status == "degraded"):
@@ -53,5 +53,5 @@ async def readyz(app: ServiceDep, response: Response, *, strict: Strict = False)
     dependencies=[demands(Scope.METRICS)],
 )
 def metrics(app: ServiceDep) -> Response:
-    """Jobs, queue, workers and counters from the database; requests as this process has served them."""
+    """Jobs, queue, workers and counters from the database; requests served by this process."""
     return Response(app.health.metrics.text(), media_type=MEDIA_TYPE)

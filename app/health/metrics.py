@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: what is in the rows, the same from every API process, and this one's requests."""
+"""Metrics for Prometheus: those of the database, the same in every API process, and this one's requests."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from app.observability.counters import Counted
 from app.observability.request_metrics import REGISTRY
 from morphdata.version import VERSION
 
-FRESH_S = 2.0  # scrapers that come at once share one look at the rows
+FRESH_S = 2.0  # simultaneous scrapes share one query of the database
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 COUNTERS = {  # by the name of their rows
     job_counts.ATTEMPTS: ("morphid_job_attempts", "Claims of jobs by workers.", ("operation",)),
@@ -72,8 +72,8 @@ class _Rows(Collector):
         workers = {"alive": seen.workers.alive, "stalled": seen.workers.stalled}
         yield _gauge("morphid_workers", "Workers by state.", "status", workers.items())
         for name, help_text, value in (
-            ("queue_depth", "Jobs that wait for a worker.", seen.jobs["queued"]),
-            ("oldest_queued_seconds", "Age of the oldest job that waits.", seen.oldest_queued_s),
+            ("queue_depth", "Jobs waiting for a worker.", seen.jobs["queued"]),
+            ("oldest_queued_seconds", "Age of the oldest waiting job.", seen.oldest_queued_s),
             ("flights_per_second", "Flights per second of all running jobs.", seen.flights_per_s),
             ("webhook_deliveries_waiting", "Webhook deliveries to be sent.", seen.deliveries_waiting),
             ("worker_slots", "Jobs that living workers can run at once.", seen.workers.slots),

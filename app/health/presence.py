@@ -1,6 +1,6 @@
-"""The table of workers as they write it: signs of life, and the sign that one ended as it should.
+"""The table of workers: their signs of life, and the record of a regular shutdown.
 
-A sign names its process uniquely: the system reuses process numbers, and containers each count from 1.
+A sign identifies its process uniquely: the system reuses process numbers, and each container counts from 1.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sqlalchemy import delete, insert, update
 from app.database import Session, database_time
 from app.tables import workers
 
-REMEMBERED_S = 86_400.0  # a worker that is silent for longer is gone: its row is old news
+REMEMBERED_S = 86_400.0  # s; the row of a worker that is silent for longer is removed
 PROC = Path("/proc")
 START_TIME = 19  # place of the start time behind the program's name in /proc/<pid>/stat (proc(5))
 ENDED = frozenset("ZXx")
@@ -32,7 +32,7 @@ class Sign:
 
 
 def note_started(session: Session, sign: Sign) -> None:
-    """Write a worker's first sign of life; a namesake before it (a container's process 1) is forgotten."""
+    """Write a worker's first sign of life; an earlier worker of the same name is forgotten."""
     session.execute(delete(workers).where(workers.c.name == sign.name))
     session.execute(delete(workers).where(workers.c.seen_at < database_time() - REMEMBERED_S))
     _insert(session, sign)
@@ -50,7 +50,7 @@ def note_seen(session: Session, sign: Sign) -> None:
 
 
 def note_stopped(session: Session, name: str) -> None:
-    """Write that a worker takes no more jobs because it is shutting down."""
+    """Record that a worker takes no more jobs because it is shutting down."""
     session.execute(update(workers).where(workers.c.name == name).values(stopped_at=database_time(), busy=0))
 
 
@@ -60,10 +60,10 @@ def _insert(session: Session, sign: Sign) -> None:
 
 
 def process_identity(pid: int) -> str | None:
-    """Name a process of this machine uniquely; None where the system does not say.
+    """Identify a process of this machine uniquely; None if the system does not provide the data.
 
-    The name has four parts: this boot, the space of process numbers (each container has its own), the
-    number and the moment of the process's start.
+    The identity has four parts: this boot, the process namespace (each container has its own), the process
+    number and the time of its start.
     """
     try:
         return "/".join((*_here(), str(pid), _stat(pid)[START_TIME]))
@@ -72,7 +72,7 @@ def process_identity(pid: int) -> str | None:
 
 
 def is_gone(identity: str | None) -> bool | None:
-    """Whether a process has ended; None when it cannot be seen from here."""
+    """Whether a process has ended; None if it is not visible from here."""
     try:
         boot, space, pid, started = (identity or "").split("/")
         if (boot, space) != _here():
@@ -87,7 +87,7 @@ def is_gone(identity: str | None) -> bool | None:
     try:
         stat = _stat(int(pid))
     except OSError:
-        return False  # it is there; another user's, perhaps
+        return False  # it exists, perhaps as another user's
     return stat[START_TIME] != started or stat[0] in ENDED
 
 

@@ -1,4 +1,4 @@
-"""SQL of health and metrics; counts of all owners, no content. Each query walks along an index."""
+"""SQL of health and metrics: counts over all owners, no content. Each query uses an index."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from app.jobs.records import HELD, JobStatus
 from app.observability.counters import Counted, read_counters
 from app.tables import STATUSES, job_chunks, jobs, webhook_deliveries, workers
 
-SILENT_BEATS = 3  # a worker that missed so many of its signs of life is stalled
-GONE_S = 60.0  # one that is silent for longer, and whose process cannot be seen from here, is not there
+SILENT_BEATS = 3  # a worker that missed this many signs of life is stalled
+GONE_S = 60.0  # a worker that is silent for longer, and whose process is not visible from here, is gone
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The rows of the service, counted."""
+    """Counts of the service's rows."""
 
     jobs: Mapping[str, int]  # by state, each state there
     oldest_queued_s: float
@@ -32,7 +32,7 @@ class Snapshot:
 
 
 def snapshot(session: Session, beat_s: float) -> Snapshot:
-    """Count everything once; workers show every `beat_s` that they are there."""
+    """Count everything once; workers write a sign of life every `beat_s`."""
     return Snapshot(
         jobs=_jobs(session),
         oldest_queued_s=_oldest_queued_s(session),
@@ -45,10 +45,10 @@ def snapshot(session: Session, beat_s: float) -> Snapshot:
 
 
 def count_workers(session: Session, beat_s: float, *, host: str | None = None) -> WorkerState:
-    """Count workers, of one host or of all; the time since their last sign of life is the database's.
+    """Count workers, of one host or of all; ages of signs of life are by the database's clock.
 
-    A worker whose process has ended is not counted: at once where its process can be looked for, else when
-    it has been silent for `GONE_S`. One that is there and silent is stalled.
+    A worker whose process has ended is not counted: at once if its process is visible from here, otherwise
+    after `GONE_S` of silence. An existing but silent worker is stalled.
     """
     silence = (database_time() - workers.c.seen_at).label("silent_s")
     rows = session.execute(

@@ -1,4 +1,4 @@
-"""Readiness of this process and of what it depends on."""
+"""Readiness of this process and of its dependencies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from app.health.schemas import Readiness, WorkerState
 from app.settings import Settings
 from migrations import HEAD
 
-FRESH_S = 0.5  # as long an answer about readiness is given again
+FRESH_S = 0.5  # s for which a readiness result is reused
 UNKNOWN_WORKERS = WorkerState(status="unknown", alive=0, stalled=0, slots=0, busy=0)
 
 
@@ -31,7 +31,7 @@ def database_state(database: Database, beat_s: float, *, host: str | None = None
 
 
 class Health:
-    """What this process reports of itself and of what it depends on."""
+    """Reports the health of this process and its dependencies."""
 
     def __init__(self, database: Database, settings: Settings) -> None:
         self._database = database
@@ -43,9 +43,9 @@ class Health:
         self.metrics = Metrics(self._snapshot)
 
     async def readiness(self) -> Readiness:
-        """Look at database, broker and workers; requests need no key, so those at one time share a look.
+        """Check database, broker and workers; requests need no key, so simultaneous ones share a check.
 
-        Only the database makes the service unable to serve: jobs are rows, kept while the rest is away.
+        Only the database can make the service unavailable: jobs are rows, kept while the rest is away.
         """
         async with self._looking:
             if self._seen is None or time.monotonic() - self._seen_at > FRESH_S:

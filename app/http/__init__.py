@@ -1,1 +1,1 @@
-"""What every request passes through: limits, parsing, problem documents."""
+"""Processing common to all requests: limits, parsing, problem documents."""

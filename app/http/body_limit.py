@@ -1,4 +1,4 @@
-"""Limits on request bodies: bytes are counted as they arrive, whatever was announced, and so is time."""
+"""Limits on request bodies: bytes and time are counted as they arrive, whatever was announced."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from app.http.problems import answer_early
 from app.keys.watch import KeyInUse
 from app.settings import Settings
 
-MIN_RATE = 16_384.0  # bytes per second that a body must arrive with once its grace time is over
-BODIES_AT_ONCE = 16  # of the largest size: all bodies together that are being received or read
+MIN_RATE = 16_384.0  # bytes per second at which a body must arrive after its grace time
+BODIES_AT_ONCE = 16  # multiple of the largest size: all bodies together that are being received or read
 
 
 class BodyLimit(HttpMiddleware):
-    """ASGI middleware: a problem document as soon as a body is too large, too slow, or one too many."""
+    """ASGI middleware that refuses a body as soon as it is too large, too slow, or one too many."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         super().__init__(app)
         self.max_bytes = settings.max_body_bytes
         self.grace_s = settings.body_grace_s
         self.max_total_bytes = BODIES_AT_ONCE * self.max_bytes
-        # one owner of several leaves room for the others
+        # with several owners, one leaves room for the others
         self.max_owner_bytes = self.max_total_bytes // (2 if settings.demands_keys else 1)
         self.total = 0  # bytes of all bodies whose requests are not yet answered
         self.of_owners: Counter[str] = Counter()  # the same of each owner's
@@ -44,7 +44,7 @@ class BodyLimit(HttpMiddleware):
         try:
             await self.app(scope, body.receive, body.send)
         except ClientDisconnect:
-            return  # nobody waits for an answer
+            return  # the client has gone
         except Exception:
             if not body.refused:
                 raise
@@ -57,7 +57,7 @@ class BodyLimit(HttpMiddleware):
 
 
 class _Body:
-    """One body on its way: the application receives it and answers through this."""
+    """One body in transit; the application receives it and answers through this object."""
 
     def __init__(self, limit: BodyLimit, scope: Scope, receive: Receive, send: Send) -> None:
         self.limit = limit
@@ -68,13 +68,15 @@ class _Body:
         self.owner = "" if caller is None else caller.owner
         self.key = KeyInUse() if caller is None else caller.key
         self.counted = 0
-        self.waited_s = 0.0  # for the client; the application's own pauses are not the client's fault
+        self.waited_s = (
+            0.0  # waiting for the client only; pauses of the application are not the client's fault
+        )
         self.complete = False
         self.refused = False
         self.answering = False
 
     async def receive(self) -> Message:
-        """The next piece, or the end of the request when the body is refused."""
+        """Return the next piece, or the end of the request if the body is refused."""
         if self.complete or self.refused:
             return await self.from_client()
         try:
@@ -85,17 +87,17 @@ class _Body:
             self.refused = True
             if not self.answering:
                 await answer_early(error, self.scope, self.from_client, self.to_client)
-            return {"type": "http.disconnect"}  # the application gives up; nobody hears its answer
+            return {"type": "http.disconnect"}  # the application gives up; its answer is not sent
         return message
 
     async def send(self, message: Message) -> None:
-        """Pass the application's answer on, unless the body has been refused before."""
+        """Pass on the application's answer, unless the body has been refused already."""
         if not self.refused or self.answering:
             self.answering = True
             await self.to_client(message)
 
     async def _in_time(self) -> Message:
-        """Wait for the next piece as long as the pieces until now have earned."""
+        """Wait for the next piece, for as long as the pieces received so far allow."""
         start = time.monotonic()
         patience_s = self.limit.grace_s + self.counted / MIN_RATE - self.waited_s
         try:
@@ -120,7 +122,7 @@ class _Body:
             raise ServiceBusy("Too many large bodies of yours are being received at the moment.")
 
     def release(self) -> None:
-        """Give back what the body took of the limits."""
+        """Release the body's share of the limits."""
         self.limit.total -= self.counted
         self.limit.of_owners[self.owner] -= self.counted
         if not self.limit.of_owners[self.owner]:

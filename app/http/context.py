@@ -1,4 +1,4 @@
-"""What endpoints are handed: database, settings, the caller and what the caller may do."""
+"""Dependencies of endpoints: database, settings, the caller and its permissions."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from app.parsing.pool import ParserPool
 from app.settings import Settings
 from app.webhooks.addresses import AddressPolicy
 
-CALLER = "morphid.caller"  # where the gate leaves the caller in a request's scope
+CALLER = "morphid.caller"  # key of the caller in a request's scope, set by the gate
 BEARER = HTTPBearer(
     scheme_name="api_key",
     description="`Authorization: Bearer mid_...`; the operator makes keys with `morphid keys create`.",
-    auto_error=False,  # the gate has checked the key; this is how the OpenAPI document knows of it
+    auto_error=False,  # the gate has checked the key; this only documents it in OpenAPI
 )
 
 
@@ -54,10 +54,10 @@ class Service:
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who makes the request that is being served."""
+    """The caller of the current request."""
 
-    owner: str  # the request may see what belongs to any key of this owner
-    key_id: str | None  # None where no keys are required
+    owner: str  # the request may see the data of all keys of this owner
+    key_id: str | None  # None if no keys are required
     scopes: frozenset[Scope]
     request_id: str
     address: str
@@ -72,13 +72,13 @@ async def current_service(request: Request) -> Service:
 
 
 def caller_of(scope: AsgiScope) -> Caller | None:
-    """Return who makes a request; None on public paths, and when the gate has refused the request."""
+    """Return the caller of a request; None on public paths, and if the gate has refused the request."""
     caller: Caller | None = scope.get(CALLER)
     return caller
 
 
 async def current_caller(request: Request) -> Caller:
-    """Return who makes the request.
+    """Return the caller of the request.
 
     Raises
     ------
@@ -108,13 +108,13 @@ async def _allowed(
 def demands(*scopes: Scope) -> Any:
     """Make a route demand these scopes of its caller: ``dependencies=[demands(Scope.JOBS_READ)]``.
 
-    Without a scope any valid key will do.
+    Without a scope any valid key is sufficient.
     """
     return Security(_allowed, scopes=[scope.value for scope in scopes])
 
 
 async def current_owner(caller: CallerDep) -> str:
-    """Name the owner that the request acts for."""
+    """Return the owner for whom the request acts."""
     return caller.owner
 
 

@@ -1,7 +1,7 @@
-"""The gate before every route: where a request comes from, and whose key it carries.
+"""The gate before every route: checks the origin of a request and its key.
 
-It stands before bodies are read and paths are looked at, and is closed by default: what is not on the short
-public list needs a valid key. Each route declares what a key may do (`app.http.context.demands`).
+It runs before bodies are read and paths are resolved, and is closed by default: every path outside the short
+public list needs a valid key. Each route declares the scopes it requires (`app.http.context.demands`).
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from app.settings import Settings
 
 PUBLIC_PATHS = frozenset({"/", "/docs", "/openapi.json", "/livez", "/readyz"})
 PUBLIC_FOLDER = "/static/"
-LOCAL_OWNER = "local"  # everyone, where no keys are required
-ADDRESS_LENGTH = 64  # a proxy may pass on anything
+LOCAL_OWNER = "local"  # the caller if no keys are required
+ADDRESS_LENGTH = 64  # a proxy may pass on any value
 
 logger = logging.getLogger(__name__)
 
 
 class Gate(HttpMiddleware):
-    """ASGI middleware that knows the caller before anything else is done."""
+    """ASGI middleware that identifies the caller before anything else."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         super().__init__(app)
@@ -70,18 +70,18 @@ class Gate(HttpMiddleware):
         await self.app(scope, receive, send)
 
     async def _key(self, scope: Scope, address: str) -> ApiKey:
-        """Find the key that the request carries.
+        """Find the key of the request.
 
         Raises
         ------
         Unauthorized
-            It carries none, or one that is not valid.
+            It has no key, or an invalid one.
         TooManyRefusals
-            The address has sent too many of those.
+            The address has sent too many invalid keys.
         """
         given = Headers(scope=scope).getlist("authorization")
         if not given:
-            raise Unauthorized  # not a guess: the page tries once without, to learn that keys are required
+            raise Unauthorized  # not a guess: the page tries once without, to learn whether keys are required
         scheme, _, credentials = given[0].partition(" ")
         well_formed = len(given) == 1 and scheme.lower() == "bearer"
         text = KeyText.parsed(credentials.strip()) if well_formed else None

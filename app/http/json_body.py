@@ -21,26 +21,26 @@ from app.errors import (
 from app.http.context import Service, current_caller
 from app.parsing.json_text import parse_json
 
-# a process costs 50 ms; parsing this much holds up the other requests for 10
+# a process costs 50 ms; parsing this much blocks the other requests for 10 ms
 MAX_BYTES_HERE = 2**19
-# what any route with a body may answer
+# errors possible on any route with a body
 BODY_ERRORS = (MalformedBody, SlowBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, ServiceBusy)
 
 
 def media_type(request: Request) -> str:
-    """The media type that the request announces, without parameters.
+    """The media type of the request, without parameters.
 
     Raises
     ------
     UnsupportedMediaType
-        When the body is compressed, or its text is in another encoding than UTF-8.
+        The body is compressed, or its text is not in UTF-8.
     """
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     if coding not in ("identity", ""):
         raise UnsupportedMediaType(
             f"The Content-Encoding of the body is {coding[:40]!r}.",
             "#header/Content-Encoding",
-            "Send it as it is, without Content-Encoding.",
+            "Send it uncompressed, without Content-Encoding.",
         )
     kind, *parameters = request.headers.get("content-type", "").lower().split(";")
     for parameter in parameters:
@@ -58,12 +58,12 @@ def is_json(kind: str) -> bool:
 
 
 async def json_document(request: Request) -> Any:
-    """Read and parse the JSON body of a request; what is large waits on disk for its parser.
+    """Read and parse the JSON body of a request; large bodies are stored on disk for their parser.
 
     Raises
     ------
     MalformedBody
-        When it is not a sensible JSON text.
+        It is not a valid JSON text.
     ServiceBusy
         Too many large ones are being read.
     """

@@ -1,4 +1,4 @@
-"""Small ASGI middleware: request ids, careful headers, and HEAD wherever there is GET."""
+"""Small ASGI middleware: request ids, security headers, and HEAD wherever there is GET."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from app.identifiers import new_identifier
 from app.observability.context import bound
 
 MAX_ID_CHARACTERS = 64  # of a request id: the width of its columns
-# an id that no log, header or shell takes for anything but a word
+# an id that is safe in logs, headers and shells
 SANE_ID = re.compile(rf"[A-Za-z0-9][A-Za-z0-9._:-]{{0,{MAX_ID_CHARACTERS - 1}}}")
-# an API's answer is no page: nothing in it runs, and no page shows it in a frame
+# API responses are not pages: nothing in them may run, and no page may frame them
 CLOSED_POLICY = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-HSTS = "max-age=31536000"  # s: a year; subdomains are not ours to decide
+HSTS = "max-age=31536000"  # s: one year; without subdomains, which are not ours
 CAREFUL_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
@@ -36,7 +36,7 @@ class HttpMiddleware(ABC):
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve a request, or pass on what is none."""
+        """Serve an HTTP request, or pass on anything else."""
         if scope["type"] == "http":
             await self.serve(scope, receive, send)
         else:
@@ -48,10 +48,10 @@ class HttpMiddleware(ABC):
 
 
 class RequestId(HttpMiddleware):
-    """An id for every request: the caller's `X-Request-ID` when it is a sane one, else our own.
+    """An id for every request: the caller's `X-Request-ID` if it is acceptable, else our own.
 
-    It stands in every answer, in every line that is logged while the request is served, on the job that the
-    request posts, and so in the lines of the worker that runs it.
+    It appears in the response, in every line logged while the request is served, on the job that the request
+    posts, and so in the log of the worker that runs it.
     """
 
     async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -69,7 +69,7 @@ class RequestId(HttpMiddleware):
 
 
 class SecurityHeaders(HttpMiddleware):
-    """Headers that make browsers careful, where an answer does not set them itself."""
+    """Security headers for browsers, unless a response sets them itself."""
 
     async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -89,14 +89,14 @@ def _add_careful_headers(headers: MutableHeaders, scope: Scope, status: int) -> 
         headers.setdefault("Strict-Transport-Security", HSTS)
     caller = caller_of(scope)
     if status == 401 or (caller is not None and caller.key_id is not None):
-        # what one key may see must not stay in a cache that another user of the machine can read
+        # responses must not stay in a cache that another user of the machine can read
         headers["Cache-Control"] = "no-store"
 
 
 class HeadAsGet(HttpMiddleware):
-    """HEAD as GET without the body; it stands innermost, because routes know only GET.
+    """HEAD as GET without the body; innermost, because routes only define GET.
 
-    A stream ends with its headers: the application sees a client that has disconnected.
+    A stream ends after its headers: to the application the client seems to have disconnected.
     """
 
     async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:

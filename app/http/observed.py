@@ -1,4 +1,4 @@
-"""Every request leaves a line in the log, a place in the latency histogram and, where configured, a span."""
+"""Records every request in the log, in the latency histogram and, if configured, as a span."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from app.observability.request_metrics import IN_FLIGHT, LATENCY
 from app.observability.tracing import span
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-UNROUTED = "unrouted"  # refused before a route was found, or there is none
+UNROUTED = "unrouted"  # refused before routing, or no route
 STATIC = "/static"
 QUIET_ROUTES = frozenset({"/livez", "/readyz", "/metrics", STATIC})  # requested by machines all day
 MAX_PATH = 300  # characters in a line of the log
-CLIENT_WENT = 499  # nginx' number for a client that did not wait for its answer
+CLIENT_WENT = 499  # nginx's status for a client that closed the connection
 
 access = logging.getLogger("morphid.access")
 
@@ -47,8 +47,7 @@ class Observed(HttpMiddleware):
             except Exception:
                 if exchange.status != 500:
                     raise
-                # answered and logged by the handler of unforeseen errors, which raises it again for servers
-                # that would not know of it otherwise
+                # answered and logged by the handler of unexpected errors, which re-raises it for the server
             finally:
                 if exchange.status == 0:
                     exchange.answer(CLIENT_WENT)
@@ -62,7 +61,7 @@ class Observed(HttpMiddleware):
 
 @dataclass
 class _Exchange:
-    """What becomes of one request."""
+    """The course of one request."""
 
     scope: Scope
     began: float = field(default_factory=time.perf_counter)
@@ -71,14 +70,14 @@ class _Exchange:
 
     @property
     def route(self) -> str:
-        """The path's template: a label must not have as many values as there are jobs."""
+        """The path's template, so that a label does not have as many values as there are jobs."""
         template = getattr(self.scope.get("route"), "path", None)
         if isinstance(template, str) and template:
             return template
         return STATIC if self.scope["path"].startswith(STATIC + "/") else UNROUTED
 
     def answer(self, status: int) -> None:
-        """Note that the answer begins; streams go on for as long as their clients like."""
+        """Record the start of the response; streams may last arbitrarily long."""
         self.status = status
         self.answered_s = time.perf_counter() - self.began
         method = self.scope["method"]
@@ -100,7 +99,7 @@ class _Exchange:
         facts = {
             "method": scope["method"],
             "route": self.route,
-            "path": scope["path"][:MAX_PATH],  # without its query: what callers put there is theirs
+            "path": scope["path"][:MAX_PATH],  # without the query, which may contain private data
             "status": self.status,
             "answered_s": round(self.answered_s, 4),
             "duration_s": round(time.perf_counter() - self.began, 4),

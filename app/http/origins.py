@@ -1,9 +1,9 @@
-"""Who may send a request at all: no page of another site, nobody by a name that is not ours.
+"""Checks of origin and host: no requests from pages of other sites or to host names that are not ours.
 
-A service on loopback is open to every program of its user, and a browser is one: any web page could have it
-post jobs (cross-site requests), or read answers after its own name has been pointed at 127.0.0.1 (DNS
-rebinding). Browsers state where a request comes from (``Sec-Fetch-Site``, ``Origin``) and by which name
-(``Host``); pages cannot forge these. Programs that are not browsers send none or any, and are let through.
+A service on loopback is open to every program of its user, including browsers: any web page could make a
+browser post jobs (cross-site requests), or read responses after pointing its own name at 127.0.0.1 (DNS
+rebinding). Browsers state the origin of a request (``Sec-Fetch-Site``, ``Origin``) and the host name used
+(``Host``); pages cannot forge these. Other programs may omit or set them freely, and are let through.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ OWN_SITES = frozenset({"same-origin", "none"})  # none: typed, or a bookmark
 
 @dataclass(frozen=True, slots=True)
 class Boundary:
-    """What is let in from outside.
+    """Rules for requests from outside.
 
     Attributes
     ----------
     hosts : frozenset of str or None
-        Names that the service answers for, in addition to addresses and loopback names; None: any name.
+        Accepted host names, in addition to addresses and loopback names; None: any name.
     loopback_only : bool
-        Refuse whatever came over a network, even if the server listens there.
+        Refuse all requests from a network, even if the server listens there.
     """
 
     hosts: frozenset[str] | None
@@ -39,10 +39,10 @@ class Boundary:
 
     @classmethod
     def of(cls, settings: Settings) -> Boundary:
-        """The boundary that the settings draw.
+        """Build the rules from the settings.
 
-        With keys a foreign page gains nothing by a name of its own: it has no key. So names are then
-        restricted only on request.
+        If keys are required, a foreign page gains nothing from DNS rebinding because it has no key. So names
+        are then restricted only on request.
         """
         named = settings.host_names
         if settings.demands_keys:
@@ -51,7 +51,7 @@ class Boundary:
 
 
 def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
-    """Return why a request is refused unseen; None when it may pass."""
+    """Return why a request is refused; None if it may pass."""
     headers = Headers(scope=scope)
     if boundary.loopback_only and not _came_over_loopback(scope):
         return WrongHost(
@@ -68,7 +68,7 @@ def refusal(scope: Scope, boundary: Boundary) -> ServiceError | None:
 
 
 def _came_over_loopback(scope: Scope) -> bool:
-    # a Unix socket has no address; a proxy on this machine that forwards the client's address is seen through
+    # a Unix socket has no address; behind a local proxy the forwarded client address counts
     return all(
         end is None or end[1] is None or not end[0] or is_loopback(end[0])
         for end in (scope.get("server"), scope.get("client"))
@@ -88,7 +88,7 @@ def _answers_for(host: str, names: frozenset[str]) -> bool:
         ipaddress.ip_address(name)
     except ValueError:
         return name in names or is_loopback(name) or name.endswith(".localhost")
-    return True  # nobody can point an address elsewhere
+    return True  # an address, unlike a name, cannot be redirected
 
 
 def _from_another_site(scope: Scope, headers: Headers) -> bool:
@@ -100,7 +100,7 @@ def _from_another_site(scope: Scope, headers: Headers) -> bool:
 
 
 def _is_navigation(scope: Scope, headers: Headers) -> bool:
-    """Whether someone followed a link to here: the answer is shown to them, not to the page with the link."""
+    """Whether the user followed a link: the response goes to the user, not to the linking page."""
     return (
         scope["method"] in ("GET", "HEAD")
         and headers.get("sec-fetch-mode") == "navigate"

@@ -1,4 +1,4 @@
-"""Parameters that routes share: identifiers, pages of a list, `Prefer: wait=n` and `Idempotency-Key`."""
+"""Parameters shared by routes: identifiers, pages of a list, `Prefer: wait=n` and `Idempotency-Key`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ IdempotencyKeyHeader = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",
-        description="Makes a repeated request safe: the same key and body give the first answer again.",
+        description="Makes a repeated request safe: the same key and body return the first response again.",
         examples=["8e03978e-40d5-43e8-bc93-6894a57f9324"],
         min_length=1,
         max_length=255,

@@ -1,4 +1,4 @@
-"""Errors on the wire: problem documents (RFC 9457) for everything that can go wrong."""
+"""Error responses: problem documents (RFC 9457) for every error."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ from morphdata.refusals import MAX_FAULTS, faults_of
 
 MEDIA_TYPE = "application/problem+json"
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
-LINGER_S = 0.3  # a client that is still sending gets to read the answer before the connection closes
+LINGER_S = (
+    0.3  # gives a client that is still sending the time to read the response before the connection closes
+)
 HTTP_HINTS = {404: "GET /openapi.json lists every path.", 405: "See the Allow header or /docs."}
 
 logger = logging.getLogger(__name__)
@@ -56,7 +58,7 @@ def problem_response(
     error: ServiceError, request: Request, headers: Mapping[str, str] | None = None
 ) -> Response:
     """Answer a request with a problem document."""
-    # ASCII only: half of a surrogate pair in a field's name must not spoil the answer
+    # ASCII only: half of a surrogate pair in a field's name must not break the response
     body = json.dumps(finite(problem_document(error, request.url.path)))
     return Response(body, error.status, headers=headers, media_type=MEDIA_TYPE)
 
@@ -70,7 +72,7 @@ def closing_answer(error: ServiceError, path: str) -> tuple[dict[str, str], byte
 
 
 async def answer_early(error: ServiceError, scope: Scope, receive: Receive, send: Send) -> None:
-    """Answer before any route has seen the request; what the client still sends is dropped for `LINGER_S`."""
+    """Respond before routing; further data from the client are discarded for `LINGER_S`."""
     headers, content = closing_answer(error, scope["path"])
     start = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
     await send({"type": "http.response.start", "status": error.status, "headers": start})
@@ -83,7 +85,7 @@ async def answer_early(error: ServiceError, scope: Scope, receive: Receive, send
 
 
 def documented(*errors: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
-    """OpenAPI responses of an operation that may fail with `errors`."""
+    """OpenAPI responses of an operation that can fail with `errors`."""
     found: dict[int | str, dict[str, Any]] = {}
     for error in errors:
         sentence = f"`{error.code}`: {error.title}"
@@ -95,7 +97,7 @@ def documented(*errors: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
 
 
 def _request_faults(request: Request, error: RequestValidationError) -> list[Fault]:
-    """Translate what FastAPI found in the body, or else in path, query and headers."""
+    """Convert FastAPI's validation errors of the body, or else of path, query and headers."""
     errors = [dict(item) for item in error.errors()]
     inside = [{**item, "loc": item["loc"][1:]} for item in errors if item["loc"][0] == "body"]
     if inside:
@@ -108,9 +110,9 @@ def _request_faults(request: Request, error: RequestValidationError) -> list[Fau
 
 
 def allowed_methods(document: Mapping[str, Any], path: str) -> str:
-    """Return the value of the Allow header of `path`: every method that the OpenAPI document gives it.
+    """Return the value of the Allow header of `path`: its methods in the OpenAPI document.
 
-    Pages and files are in no document, and are there to be read. Where there is GET there is HEAD.
+    Pages and files are not in the document and are read-only. Wherever there is GET there is HEAD.
     """
     methods: set[str] = set()
     for template, operations in document["paths"].items():
@@ -140,7 +142,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     async def _http(request: Request, error: HTTPException) -> Response:
         headers = dict(error.headers or {})
         if error.status_code == http.HTTPStatus.METHOD_NOT_ALLOWED:
-            # the router names the methods of the first route only
+            # the router only reports the methods of the first route
             headers["allow"] = allowed_methods(app.openapi(), request.url.path)
             headers.pop("Allow", None)
         phrase = http.HTTPStatus(error.status_code).phrase

@@ -1,7 +1,7 @@
 """The server process: uvicorn with limits on slow clients. ``python -m app.http.server --host --port``.
 
-Uvicorn itself waits for headers and for readers as long as a client likes. The parser of requests is h11: it
-bounds the size of headers and is strict about what is ambiguous, where the faster one does neither.
+Uvicorn itself waits indefinitely for headers and for slow readers. Requests are parsed by h11, which bounds
+the size of headers and rejects ambiguous requests; the faster parser does neither.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from app.settings import Settings, doubtful_variables, settings_or_exit
 
 MAX_HEADER_BYTES = 32 * 1024  # request line and headers
 END_OF_HEADERS = re.compile(rb"\n\r?\n")
-LINGER_S = 1.0  # to read an answer that came before the end of the request
-MIN_READ_RATE = 4096.0  # bytes per second that a client must take of an answer that waits for it
-DEAD_PEER_S = 60.0  # a peer whose system answers nothing is gone
+LINGER_S = 1.0  # s to read a response sent before the end of the request
+MIN_READ_RATE = 4096.0  # bytes per second that a client must read of a waiting response
+DEAD_PEER_S = 60.0  # s; a peer whose system does not answer is gone
 KEEP_ALIVE_S = 5
-STOP_S = 5  # for open answers when the process shuts down
-DRAIN_S = 1.0  # then: for requests that are on their way through idle connections
+STOP_S = 5  # s for open responses when the process shuts down
+DRAIN_S = 1.0  # s after that for requests in transit on idle connections
 SPARE_FILES = 200  # for databases, brokers, uploads, logs
 
 SLOW_HEADERS = HttpError(
@@ -64,9 +64,9 @@ logger = logging.getLogger(__name__)
 
 
 class BoundedConnection(h11.Connection):
-    """A parser that bounds headers however they arrive.
+    """A parser that bounds the size of headers, however they arrive.
 
-    h11 itself looks at the size of what is incomplete only: headers of any size pass that come in one piece.
+    h11 itself checks the size of incomplete data only: headers of any size pass if they arrive in one piece.
     """
 
     def _extract_next_receive_event(self) -> Any:
@@ -81,7 +81,7 @@ class BoundedConnection(h11.Connection):
         taken = before - len(self._receive_buffer)
         if isinstance(event, h11.Data):
             taken -= len(event.data)
-        if taken > MAX_HEADER_BYTES:  # fields after a chunked body, or of one of its chunks
+        if taken > MAX_HEADER_BYTES:  # fields after a chunked body, or in one of its chunks
             raise _too_large(LARGE_HEADERS)
         return event
 
@@ -101,7 +101,7 @@ class GuardedConfig(uvicorn.Config):
             timeout_keep_alive=KEEP_ALIVE_S,
             server_header=False,
             access_log=False,
-            # a kept connection would hand the trace of its last request to the next one
+            # a kept-alive connection would pass the trace of its last request to the next one
             reset_contextvars=True,
             **others,
         )
@@ -121,19 +121,19 @@ class GuardedProtocol(H11Protocol):
         self._write_timer: asyncio.TimerHandle | None = None
         self._linger_timer: asyncio.TimerHandle | None = None
         self._drain_timer: asyncio.TimerHandle | None = None
-        self._unread = 0  # bytes that wait for the client, when last looked at
+        self._unread = 0  # bytes waiting for the client at the last check
         self._refused = False
         self._ending = False
 
     # a connection begins and ends
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection, or turn it away when there are too many."""
+        """Accept a connection, or refuse it if there are too many."""
         super().connection_made(transport)
         _notice_dead_peers(transport)
         if len(self.connections) > self.config.max_connections:
             self._refuse(ServiceBusy("There are too many connections to this service."))
-            self.transport.close()  # at once: each one that lingers is one more
+            self.transport.close()  # closed at once, since lingering would add to their number
         else:
             self._header_timer = self.loop.call_later(self.config.header_timeout_s, self._headers_late)
 
@@ -144,9 +144,9 @@ class GuardedProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def shutdown(self) -> None:
-        """End when the server does: open answers first, and requests whose first byte is still on its way.
+        """Shut down with the server, after open responses and requests whose first byte is still in transit.
 
-        Closed at once, a connection that waits would lose the request that its client is just sending.
+        Closing an idle connection at once would lose a request that its client is just sending.
         """
         self._ending = True
         # None before the first request, whatever its annotation says
@@ -158,7 +158,7 @@ class GuardedProtocol(H11Protocol):
     # headers
 
     def data_received(self, data: bytes) -> None:
-        """Read a piece; the time for headers runs from a request's first byte and no piece prolongs it."""
+        """Read a piece; the time limit for headers runs from a request's first byte and is never extended."""
         if self._refused or self.transport.is_closing():
             return
         if self._header_timer is None and self._between_requests():
@@ -178,23 +178,23 @@ class GuardedProtocol(H11Protocol):
         else:
             self.transport.close()
 
-    def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's sentence; ours says more
-        """Answer what is no request with a problem document, where an answer has not begun."""
+    def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's message; ours is more specific
+        """Respond to an invalid request with a problem document, unless a response has begun."""
         # called where the parser's error is handled
         status = getattr(sys.exception(), "error_status_hint", None)
         found = (error for error in (LARGE_HEADERS, LONG_ADDRESS) if error.status == status)
         self._refuse(next(found, BAD_REQUEST))
 
     def _refuse(self, error: ServiceError) -> None:
-        """Answer and hang up; a client that is still sending gets to read the answer before."""
+        """Respond and close; a client that is still sending gets time to read the response."""
         self._refused = True
         self._cancel("_header_timer")
-        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):  # another answer is under way
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):  # another response is in progress
             self.transport.close()
             return
         # None before the first request, whatever its annotation says
         if self.cycle is not None and not self.cycle.response_complete:  # type: ignore[redundant-expr]
-            # the application waits for the rest of the body; whatever it would answer is too late
+            # the application waits for the rest of the body; its response would come too late
             self.cycle.disconnected = True
             self.cycle.message_event.set()
         self.transport.write(_answer(error))
@@ -205,7 +205,7 @@ class GuardedProtocol(H11Protocol):
     # answers
 
     def on_response_complete(self) -> None:
-        """End the connection soon when the client still sends a request that was answered already."""
+        """Close the connection soon if the client still sends a request that was already answered."""
         still_sending = self.conn.their_state is h11.SEND_BODY
         super().on_response_complete()
         if still_sending and not self.transport.is_closing():
@@ -246,7 +246,7 @@ def _answer(error: ServiceError) -> bytes:
 
 
 def _notice_dead_peers(transport: asyncio.Transport) -> None:
-    """Let the system end connections whose other end is gone without a word."""
+    """Let the system close connections whose peer vanished silently."""
     connection: socket.socket | None = transport.get_extra_info("socket")
     if connection is None or connection.family not in (socket.AF_INET, socket.AF_INET6):
         return
@@ -257,7 +257,7 @@ def _notice_dead_peers(transport: asyncio.Transport) -> None:
 
 
 def connection_limit(requested: int) -> int:
-    """Let the process open as many files as it may, and bound connections by that."""
+    """Raise the process's limit of open files to its maximum, and bound connections by it."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     needed = requested + SPARE_FILES
     if soft == resource.RLIM_INFINITY or soft >= needed:
@@ -268,7 +268,7 @@ def connection_limit(requested: int) -> int:
 
 
 def _application(settings: Settings) -> Any:
-    """Build the service in a process of its own, which therefore logs in the service's format."""
+    """Build the service for its own process, which therefore logs in the service's format."""
     from app.main import create_app
 
     configure_logging(settings.log_format, settings.log_level)
@@ -285,7 +285,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     settings = settings_or_exit(host=options.host, port=options.port)
     config = GuardedConfig(
-        # the options too decide whether keys are demanded
+        # the options also determine whether keys are required
         partial(_application, settings),
         settings,
         factory=True,

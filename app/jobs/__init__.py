@@ -1,1 +1,1 @@
-"""Jobs: the rows that are the truth about every piece of long work."""
+"""Jobs: the authoritative rows for all long work."""

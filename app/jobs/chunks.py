@@ -1,9 +1,9 @@
-"""The life of a spread job: its work handed out as chunks, claimed, stored exactly once, and taken up again.
+"""The life cycle of a spread job: work handed out as chunks, claimed, stored exactly once, and resumed.
 
-Like the job store, every function takes a `Session` and leaves the commit to its caller. A chunk has a lease
-and a fence of its own; an outcome is stored where job, generation, number, fence and state are the claim's,
-and only there. The claim on the job itself is given up while its chunks are flown and taken again, with a
-higher fence, by the worker that finds all stored or that must end the job.
+As in the job store, every function takes a `Session` and leaves the commit to its caller. A chunk has its own
+lease and fence; an outcome is stored only if job, generation, number, fence and state match the claim. The
+claim on the job itself is released while its chunks are flown. It is taken again, with a higher fence, by the
+worker that finds all chunks stored or must end the job.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from app.tables import job_checkpoints, job_chunks, jobs
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What the chunks of a generation brought."""
+    """The outcomes of a generation's chunks."""
 
-    outcomes: tuple[bytes, ...]  # in the order in which the tasks were handed out
-    elapsed_s: float  # since they were handed out
-    before: Document  # the progress shown until now
+    outcomes: tuple[bytes, ...]  # in the order of the tasks
+    elapsed_s: float  # s since they were handed out
+    before: Document  # the progress shown so far
 
 
 def hand_out(
@@ -38,10 +38,10 @@ def hand_out(
     checkpoint: bytes,
     progress: Document | None = None,
 ) -> bool:
-    """Give a claimed job up for chunks; return False for a stale claim.
+    """Release a claimed job as chunks; return False for a stale claim.
 
-    Publish the job's id once for each task after the commit. The chunks of the generation before are deleted;
-    `progress` is written when it is given.
+    Publish the job's id once for each task after the commit. The chunks of the previous generation are
+    deleted; `progress` is written if given.
     """
     if progress is not None and not save_progress(session, claim, progress, None):
         return False
@@ -67,7 +67,7 @@ def hand_out(
 
 
 def claim_chunk(session: Session, unit: Unit, worker_name: str, lease_s: float) -> ChunkClaim | None:
-    """Take an open chunk; None when it is not open any more."""
+    """Claim an open chunk; None if it is no longer open."""
     lease_until = database_time() + lease_s
     row = CHUNKS.claim(session, unit.key, lease_until=lease_until, worker=worker_name)
     if row is None:
@@ -92,7 +92,7 @@ def claim_chunk(session: Session, unit: Unit, worker_name: str, lease_s: float) 
 
 
 def finish_chunk(session: Session, chunk: ChunkClaim, outcome: bytes) -> bool:
-    """Store the outcome of a chunk; return False when it is another worker's now, or deleted."""
+    """Store the outcome of a chunk; return False if it now belongs to another worker or was deleted."""
     return CHUNKS.settle(session, chunk, status=DONE, outcome=outcome, **CHUNKS.unheld) is not None
 
 
@@ -102,17 +102,17 @@ def give_back_chunk(session: Session, chunk: ChunkClaim) -> bool:
 
 
 def must_be_taken_over(session: Session, job_id: str) -> bool:
-    """Whether a spread job waits for somebody to advance or to end it."""
+    """Whether a spread job is waiting for a worker to advance or end it."""
     return session.scalar(select(jobs.c.id).where(jobs.c.id == job_id, must_go_on())) is not None
 
 
 def take_over(
     session: Session, job_id: str, worker_name: str, lease_s: float, *, whatever: bool = False
 ) -> Claim | None:
-    """Claim a spread job that must go on: the fence rises, the attempt does not.
+    """Claim a spread job that must continue: the fence rises, the attempt does not.
 
-    ``whatever`` claims it while chunks are still flown: one of them has shown that the job cannot be done.
-    Returns None when another worker has it, or nothing is to be done.
+    ``whatever`` claims it even while chunks are being flown, because one of them showed that the job cannot
+    be done. Returns None if another worker has it, or there is nothing to do.
     """
     row = JOBS.take(
         session,
@@ -125,7 +125,7 @@ def take_over(
 
 
 def flown(session: Session, claim: Claim) -> Flown | None:
-    """Return what the chunks of a claimed job brought; None where there are none, or not all are stored."""
+    """Return the outcomes of a claimed job's chunks; None if there are none, or not all are stored."""
     rows = session.execute(
         select(job_chunks.c.status, job_chunks.c.outcome)
         .where(job_chunks.c.job_id == claim.job_id)

@@ -47,7 +47,7 @@ router = APIRouter(tags=["jobs"], generate_unique_id_function=attrgetter("name")
 
 JobId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_ID])]
 FILE_KINDS: dict[str, Any] = {
-    # of a JSON file any value; of the others bytes
+    # any value for a JSON file; bytes for others
     kind.partition(";")[0]: {
         "schema": {} if kind == "application/json" else {"type": "string", "format": "binary"}
     }
@@ -67,9 +67,9 @@ EVENT_STREAM: dict[int | str, dict[str, Any]] = {
     204: {"description": "The job has ended and every event was seen: do not connect again."},
 }
 
-# by reference: the forms of the bodies are in the document already
+# by reference: the schemas of the bodies are already in the document
 REQUEST: dict[str, Any] = {
-    "description": "The request, in the form that `POST /{operation}` takes.",
+    "description": "The request, in the form accepted by `POST /{operation}`.",
     "content": {
         "application/json": {
             "schema": {
@@ -87,7 +87,7 @@ def _files_of(operation: Operation[Any]) -> str:
 
 
 def as_json(answer: BaseModel) -> Response:
-    """Answer with a checked value as it is: the framework would check and copy it once more."""
+    """Return a checked value directly; the framework would check and copy it once more."""
     return Response(answer.model_dump_json(), media_type="application/json")
 
 
@@ -155,12 +155,12 @@ async def get_job_events(
     after: Annotated[int, Query(ge=0, le=2**31 - 1, description="Only events after this number.")] = 0,
     last_event_id: Annotated[
         str | None,
-        Header(alias="Last-Event-ID", pattern=r"^\d{1,9}$", description="The same, as browsers send it."),
+        Header(alias="Last-Event-ID", pattern=r"^\d{1,9}$", description="The same, as sent by browsers."),
     ] = None,
 ) -> Response:
-    """Every event of the job from the beginning (or after a number), then those that come.
+    """Every event of the job from the beginning (or after a number), then new ones as they occur.
 
-    The stream ends with the job. Comment lines come between as signs of life. `HEAD` gives the status and the
+    The stream ends with the job. Comment lines in between are signs of life. `HEAD` gives the status and the
     headers, and opens no stream.
     """
     seen = max(after, int(last_event_id or 0))
@@ -188,7 +188,7 @@ async def get_job_events(
 def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
     """Return the result in the form of the job's operation.
 
-    Of a cancelled or expired search it is the best so far, marked `"partial": true`.
+    For a cancelled or expired search it is the best result so far, marked `"partial": true`.
     """
     with app.database.read() as session:
         text = repository.required_result_json(session, owner, job_id)
@@ -203,10 +203,10 @@ def get_job_result(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
     responses={200: REQUEST, **documented(InvalidRequest, JobNotFound)},
 )
 def get_job_request(app: ServiceDep, owner: OwnerDep, job_id: JobId) -> Response:
-    """Return the complete request: to look at it, or to post it again to the job's operation.
+    """Return the complete request, to inspect it or to post it again to the job's operation.
 
-    Uploaded flights and identified models stand in it with their content, as they were when the job was
-    posted, and so do the defaults. So the same job comes of it even where they were deleted since.
+    It contains uploaded flights, identified models and defaults with their content at the time the job was
+    posted. So it gives the same job even if they have been deleted since.
     """
     with app.database.read() as session:
         text = repository.request_json(session, owner, job_id)
@@ -246,7 +246,7 @@ def get_job_artifact(
     name: Annotated[str, Path(min_length=1, max_length=200, examples=["convergence.svg"])],
 ) -> Response:
     """Return one file, with its own media type."""
-    if not is_plain(name):  # and no database is asked for the character zero
+    if not is_plain(name):  # also keeps the null character away from the database
         raise ArtifactNotFound(job_id, name)
     with app.database.read() as session:
         data = repository.artifact_data(session, owner, job_id, name)
@@ -262,8 +262,8 @@ def get_job_artifact(
 def cancel_job(app: ServiceDep, caller: CallerDep, job_id: JobId) -> Job:
     """Cancel a job in any state.
 
-    A queued job ends at once; a running one within two seconds, and its best so far is a partial result; a
-    finished one stays as it is.
+    A queued job ends at once; a running one within two seconds, with its best result so far as a partial
+    result; a finished one is unchanged.
     """
 
     def cancel(session: Session) -> StoredJob:

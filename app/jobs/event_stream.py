@@ -1,4 +1,4 @@
-"""Server-sent events of a job: every row of its history once, then what comes, with signs of life between."""
+"""Server-sent events of a job: its history once, then new events, with signs of life in between."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from app.jobs.schemas import Job, JobEvent, JobEventPage
 from app.jobs.watch import Subscription
 
 KEEP_ALIVE = b": keep-alive\n\n"
-RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection asks again
+RETRY = b"retry: 2000\n\n"  # ms until a browser that lost the connection reconnects
 
 Found = TypeVar("Found")
 
 
 class EventStream(StreamingResponse):
-    """The answer that follows one of the caller's jobs after event number `after`.
+    """The response that follows one of the caller's jobs after event number `after`.
 
     It counts as one of its owner's streams while it lasts.
     """
@@ -41,19 +41,19 @@ class EventStream(StreamingResponse):
         self._place = service.streams.place(caller.owner)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, or raise `TooManyStreams`."""
+        """Respond, or raise `TooManyStreams`."""
         with self._place:
             await super().__call__(scope, receive, send)
 
 
 def formatted(event: JobEvent) -> bytes:
-    """Format one event as the HTML standard's event stream wants it."""
+    """Format one event for the HTML standard's event stream."""
     data = {**event.payload, "seq": event.seq, "at": event.at.isoformat()}
     return f"id: {event.seq}\nevent: {event.type}\ndata: {json_bytes(data).decode()}\n\n".encode()
 
 
 async def read_in_turn(service: Service, owner: str, read: Callable[[], Found]) -> Found:
-    """Read from the database in a thread; the clients of all owners who follow jobs take turns."""
+    """Read from the database in a thread; the owners of clients that follow jobs take turns."""
     async with service.reads.turn(owner):
         return await asyncio.to_thread(read)
 
@@ -61,8 +61,8 @@ async def read_in_turn(service: Service, owner: str, read: Callable[[], Found]) 
 async def stream_events(service: Service, caller: Caller, job_id: str, after: int) -> AsyncIterator[bytes]:
     """Stream the events after number `after`.
 
-    The stream ends when the job has ended or is deleted, when the caller's key opens no more, and when the
-    service stops.
+    The stream ends when the job has ended or is deleted, when the caller's key is no longer valid, and when
+    the service stops.
     """
 
     def read() -> JobEventPage | None:
@@ -74,7 +74,7 @@ async def stream_events(service: Service, caller: Caller, job_id: str, after: in
         except SQLAlchemyError as error:
             if trouble_of(error) is None:
                 raise
-            # a browser that is answered 503 never comes back; one whose stream is silent stays
+            # a browser that gets a 503 does not reconnect; one with a silent stream stays
             return JobEventPage(events=[], last_seq=after, finished=False)
 
     yield RETRY
@@ -86,13 +86,13 @@ async def stream_events(service: Service, caller: Caller, job_id: str, after: in
             if page.finished or service.watcher.closed or caller.key.lost:
                 return
             if not page.events:
-                # the watcher has looked at the row for everyone: a silent job costs no query of its own
+                # the watcher checks the row for all clients: a silent job costs no separate query
                 while not await _news(subscription, caller, after, service.settings.keep_alive_s):
                     yield KEEP_ALIVE
 
 
 async def _news(subscription: Subscription, caller: Caller, seen: int, timeout_s: float) -> bool:
-    """Wait for news, or the end of the caller's right to hear them; False after `timeout_s`."""
+    """Wait for news, or for the end of the caller's permission; False after `timeout_s`."""
     try:
         async with caller.key.while_valid():
             return await subscription.wait(seen, timeout_s)
@@ -103,10 +103,10 @@ async def _news(subscription: Subscription, caller: Caller, seen: int, timeout_s
 async def wait_for_end(
     service: Service, caller: Caller, job_id: str, timeout_s: float, accepted: StoredJob | None = None
 ) -> Job:
-    """Wait until a job has ended, at most `timeout_s`, and show it as it is then.
+    """Wait until a job has ended, at most `timeout_s`, and return its state at that time.
 
-    A job that was just `accepted` is shown as it was last seen when it is deleted meanwhile: the post was
-    accepted all the same.
+    If a job that was just `accepted` is deleted meanwhile, it is returned as last seen, because the post was
+    accepted.
     """
 
     def read() -> StoredJob:

@@ -1,4 +1,4 @@
-"""Wake-up messages to workers: hints that a row waits. Losing one delays a job, it never loses it."""
+"""Wake-up messages to workers: hints that a row is waiting. A lost one delays a job but never loses it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.settings import load_settings
 
 RUN_JOB = "morphid.run_job"
 QUEUE = "morphid"
-WARM_UP_AFTER_S = 1.0  # the start of the process comes first
+WARM_UP_AFTER_S = 1.0  # s; the start of the process takes precedence
 
 logger = logging.getLogger(__name__)
 
@@ -38,19 +38,19 @@ def publish(job_id: str, broker_url: str | None = None) -> bool:
     url = broker_url or load_settings().broker_url
     try:
         _client(url).send_task(RUN_JOB, args=[job_id], queue=QUEUE, retry=False)
-    except Exception as error:  # noqa: BLE001 - whatever a broker does, the row is safe and the caller goes on
+    except Exception as error:  # noqa: BLE001 - whatever a broker does, the row is safe and the caller continues
         logger.warning("wake-up message for %s not sent (%s); the reaper will repeat it", job_id, error)
         return False
     return True
 
 
 def messages_waiting(broker_url: str) -> int | None:
-    """Count the wake-up messages that no worker has taken yet; None when the broker cannot be asked."""
+    """Count the wake-up messages that no worker has taken yet; None if the broker is unreachable."""
     try:
         with _client(broker_url).connection_for_write() as connection:
             return int(connection.default_channel.queue_declare(queue=QUEUE).message_count)
     except Exception as error:  # noqa: BLE001 - as in `publish`
-        logger.warning("the broker does not say how many messages wait (%s)", error)
+        logger.warning("the broker did not report the number of waiting messages (%s)", error)
         return None
 
 
@@ -71,11 +71,11 @@ class Publisher:
         self._thread.start()
 
     def publish(self, job_id: str) -> None:
-        """Hand over one job id and return at once."""
+        """Queue one job id and return at once."""
         self._waiting.put(job_id)
 
     def stop(self, timeout_s: float = 5.0) -> None:
-        """Send what waits, then end the thread; what is left after `timeout_s` is the reaper's to repeat."""
+        """Send what is waiting, then end the thread; the reaper repeats what is left after `timeout_s`."""
         if self._thread is not None:
             self._waiting.put(None)
             self._thread.join(timeout_s)

@@ -1,6 +1,6 @@
-"""The reaper: ends what ran out of time, gives back what a dead worker held, repeats lost wake-up messages.
+"""The reaper: ends overdue jobs, releases work of dead workers, repeats lost wake-up messages.
 
-Any number of reapers may run at once: each change is a compare-and-set on the fence that the reaper saw.
+Any number of reapers may run at once: each change is a compare-and-set on the fence that was read.
 """
 
 from __future__ import annotations
@@ -21,14 +21,16 @@ from app.observability.counters import count
 from app.observability.job_counts import CHUNK_LEASES_LOST
 from app.tables import job_chunks, jobs
 
-# a worker that notices the deadline itself keeps its best so far; after this the reaper ends the job
+# s; a worker that notices the deadline itself keeps its best result; after this the reaper ends the job
 DEADLINE_GRACE_S = 30.0
-ROUND_LIMIT = 500  # rows per round: a round stays a short transaction whatever the backlog
+ROUND_LIMIT = 500  # rows per round, so that a round is a short transaction whatever the backlog
 PUBLISH_LIMIT = 100  # messages per round, for queued jobs and for chunks
-# A job may begin `max_attempts` times; each of its chunks may be lost three times as often. Where one chunk
-# in a hundred is lost, one job in forty of 25,600 chunks would lose some chunk three times by mere chance.
+# A job may start `max_attempts` times; each of its chunks may be lost three times as often. If one chunk in a
+# hundred is lost, one in forty jobs of 25,600 chunks would lose some chunk three times by chance.
 LOSSES_PER_ATTEMPT = 3
-ADVANCE_WITHIN_S = 2.0  # who stores the last chunk takes the job over in the same breath, or has died
+ADVANCE_WITHIN_S = (
+    2.0  # the worker that stores the last chunk takes the job over immediately, unless it has died
+)
 WIND_DOWN_WITHIN_S = 15.0  # a woken worker ends a cancelled job at once; if none is free, we do
 MEMORY_HINT = "This happens if a search runs out of memory: use fewer particles, or see its log."
 
@@ -44,14 +46,14 @@ def reap(
     republish_after_s: float = 15.0,
     deadline_grace_s: float = DEADLINE_GRACE_S,
 ) -> ReapReport:
-    """Make one round and report what was done; publish the ids in ``publish`` after the commit.
+    """Run one round and report what was done; publish the ids in ``publish`` after the commit.
 
     Parameters
     ----------
     now : float, optional
         Seconds since 1970 UTC; the database's own clock when None.
     republish_after_s : float
-        A job queued this long after its last message gets another.
+        A job still queued this long after its last message gets another.
     deadline_grace_s : float
         How long a running job may outlive its deadline while its worker winds down.
     """
@@ -61,7 +63,7 @@ def reap(
         event, values = _verdict(row)
         if _change(session, row, jobs.c.status == row.status, event, row.reason, values):
             done[event].append(row.id)
-    # jobs before chunks, as everywhere: two that lock in different orders would wait for each other
+    # jobs before chunks, as everywhere: different locking orders would deadlock
     lost = _lost_chunks(session, clock)
     for row in lost:
         if row.lost_attempt >= row.max_attempts * LOSSES_PER_ATTEMPT:
@@ -97,7 +99,7 @@ def _change(
     reason: str | None,
     values: Document,
 ) -> bool:
-    """Requeue or end a job as the reaper saw it; False when it has been changed since."""
+    """Requeue or end a job in the state that was read; False if it has changed since."""
     error = {"error": values["error"]} if "error" in values else {}
     note = Note(event, None if reason is None else {"reason": reason, **error})
     return JOBS.reap(session, (row.id,), row.fence, condition, note=note, **values) is not None
@@ -133,7 +135,7 @@ def _overdue(session: Session, clock: ColumnElement[float], grace_s: float) -> R
 
 
 def _verdict(row: Row[Any]) -> tuple[str, Document]:
-    """Decide what becomes of an overdue job: event type and columns to set."""
+    """Decide the fate of an overdue job: event type and columns to set."""
     if row.status == JobStatus.CANCELLING.value:
         return "cancelled", _end(JobStatus.CANCELLED)
     if row.deadline_passed and row.started_at is None:
@@ -155,8 +157,8 @@ def _unheard(
 ) -> tuple[str, ...]:
     """Queued jobs whose message may have been lost; they are marked as published now.
 
-    As many as there are idle workers: a message wakes a worker for whatever job is next, and a worker that
-    ends a job passes on the next one. So even the longest queue sends no useless messages.
+    At most as many as there are idle workers: a message wakes a worker for whichever job is next, and a
+    worker that ends a job announces the next one. So even the longest queue sends no useless messages.
     """
     wanted = min(max(idle_slots(session), 1), PUBLISH_LIMIT)
     ids = session.scalars(
@@ -201,7 +203,7 @@ def _reopen(session: Session, row: Row[Any]) -> bool:
 
 
 def _never_wound_down(session: Session, clock: ColumnElement[float]) -> Rows:
-    """Cancelled jobs without a holder that no worker came to end."""
+    """Cancelled jobs without a holder that no worker has ended."""
     cancelling = jobs.c.status == JobStatus.CANCELLING.value
     rows = session.execute(
         select(jobs.c.id, jobs.c.fence)

@@ -1,4 +1,4 @@
-"""What the job store hands out: plain frozen values, detached from any session."""
+"""Values returned by the job store: plain and frozen, detached from any session."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class JobStatus(StrEnum):
 
     QUEUED = "queued"
     RUNNING = "running"
-    CANCELLING = "cancelling"  # a running job that was asked to wind down
+    CANCELLING = "cancelling"  # a running job whose cancellation was requested
     SUCCEEDED = "succeeded"
     FAILED = "failed"
     CANCELLED = "cancelled"
@@ -61,7 +61,7 @@ class Job:
     started_at: datetime | None
     updated_at: datetime
     finished_at: datetime | None
-    deadline_at: datetime | None  # of a job that never began: until when it must
+    deadline_at: datetime | None  # latest start of a job that has not started
     label: str | None = None
     replayed: bool = False  # this answer repeats an earlier one with the same idempotency key
 
@@ -82,7 +82,7 @@ class Claim:
     attempt: int
     max_attempts: int
     worker: str
-    request_id: str | None = None  # of the call that posted the job: leads from its logs to the worker's
+    request_id: str | None = None  # of the call that posted the job, to connect its logs with the worker's
     traceparent: str | None = None
     waited_s: float = 0.0  # since the job was made
 
@@ -109,15 +109,15 @@ class ChunkClaim(Claim):
 class StopReason(Enum):
     """Why running work should stop."""
 
-    CANCEL = "cancel"  # the user wants no more of it
-    DEADLINE = "deadline"  # its time is over: finish as `expired`, with the best so far
-    SHUTDOWN = "shutdown"  # this worker ends; another will go on from the checkpoint
-    LOST = "lost"  # another claim or the reaper took it: nothing that this worker writes counts
+    CANCEL = "cancel"  # the user cancelled it
+    DEADLINE = "deadline"  # its time is over: finish as `expired`, with the best result so far
+    SHUTDOWN = "shutdown"  # this worker shuts down; another will continue from the checkpoint
+    LOST = "lost"  # another claim or the reaper took it: writes of this worker are void
 
 
 @dataclass(frozen=True, slots=True)
 class ReapReport:
-    """What one round of the reaper did; each entry is a job id."""
+    """The result of one round of the reaper; each entry is a job id."""
 
     requeued: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()

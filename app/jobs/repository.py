@@ -27,22 +27,22 @@ from app.tables import (
 
 EVENT_PAGE = 500
 EVERY_STATUS = (None,)
-ROUNDED_S = 0.5e-6  # moments are shown in whole microseconds: one that was shown means the job it came from
+ROUNDED_S = 0.5e-6  # times are shown in whole microseconds; a shown time must match the job it came from
 
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Which jobs a list shows; what is empty or None does not narrow it."""
+    """Filter of a list of jobs; empty or None fields do not restrict it."""
 
     statuses: tuple[str, ...] = ()  # any of these
     operation: str | None = None
     label: str | None = None
-    created_after: datetime | None = None  # or at that moment
+    created_after: datetime | None = None  # inclusive
     created_before: datetime | None = None
 
     @property
     def ranges(self) -> tuple[str | None, ...]:
-        """Statuses to list and merge; None where jobs of all statuses lie in one order."""
+        """Statuses to list and merge; None if jobs of all statuses are read in one order."""
         if self.label is not None or (not self.statuses and self.operation is None):
             return EVERY_STATUS
         return tuple(dict.fromkeys(self.statuses)) or STATUSES
@@ -54,7 +54,7 @@ class JobFilter:
                 yield jobs.c.operation == self.operation
             return
         yield jobs.c.label == self.label
-        # few jobs have the label: the other conditions are put so that no other index seems to fit as well
+        # few jobs have the label: the other conditions are written so that no other index is chosen
         if self.operation is not None:
             yield func.lower(jobs.c.operation) == self.operation
         if self.statuses:
@@ -80,7 +80,7 @@ def list_jobs(
         ).one()
         if ends[0] is None:
             return [], None
-        # ids rise with time but for what two hosts' clocks differ: between these there is hardly another job
+        # ids rise with time except for clock differences between hosts: hardly any job lies in between
         places = [jobs.c.id.between(*ends), *times]
     matches = [jobs.c.owner == owner, *wanted.kinds(), *places]
     if len(wanted.ranges) > 1:
@@ -129,7 +129,7 @@ def result_json(session: Session, owner: str, job_id: str) -> bytes | None:
 
 
 def required_result_json(session: Session, owner: str, job_id: str) -> bytes:
-    """Return the JSON text of a job's result; raise `ResultNotReady`, which says why, where there is none."""
+    """Return the JSON text of a job's result; raise `ResultNotReady`, with the reason, if there is none."""
     text = result_json(session, owner, job_id)
     if text is not None:
         return text
@@ -167,7 +167,7 @@ def list_artifacts(session: Session, owner: str, job_id: str) -> ArtifactList:
 
 
 def artifact_data(session: Session, owner: str, job_id: str, name: str) -> bytes:
-    """Return the content of one file; raise `ArtifactNotFound` where the owner has no such job or file."""
+    """Return the content of one file; raise `ArtifactNotFound` if the owner has no such job or file."""
     data = session.execute(
         select(artifacts.c.data)
         .join(jobs, jobs.c.id == artifacts.c.job_id)

@@ -1,6 +1,6 @@
-"""What is deleted after a time: old jobs, flights, delivered messages, audit entries. Models are kept.
+"""Deletion of old jobs, flights, delivered messages and audit entries. Models are kept.
 
-In rounds of a few rows, so that no transaction is long; any number of processes may make rounds at once.
+It runs in rounds of a few rows, so that transactions are short; several processes may do so at once.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ ROUND_LIMIT = 100  # rows of a table in one round: their files may be megabytes 
 
 @dataclass(frozen=True, slots=True)
 class Keep:
-    """For how many days things are kept; 0: for ever."""
+    """Retention in days; 0: for ever."""
 
     jobs: float = 0.0  # with events, results and files, counted from their end
-    trajectories: float = 0.0  # uploaded flights; jobs have copies of their own
+    trajectories: float = 0.0  # uploaded flights; jobs have their own copies
     deliveries: float = 0.0  # webhook messages, counted from their end
     audit: float = 0.0  # entries of the audit log
 
     @classmethod
     def of(cls, settings: Settings) -> Keep:
-        """What the operator has set."""
+        """Read the operator's settings."""
         return cls(**{field.name: getattr(settings, f"keep_{field.name}_days") for field in fields(cls)})
 
 
 @dataclass(frozen=True, slots=True)
 class Forgotten:
-    """How many rows one round deleted."""
+    """Numbers of rows deleted in one round."""
 
     jobs: int = 0
     trajectories: int = 0
@@ -46,12 +46,12 @@ class Forgotten:
 
     @property
     def more(self) -> bool:
-        """Whether another round would find more."""
+        """Whether another round may find more."""
         return ROUND_LIMIT in (self.jobs, self.trajectories)
 
 
 def forget(session: Session, keep: Keep) -> Forgotten:
-    """Make one round."""
+    """Run one round."""
     return Forgotten(
         jobs=forget_jobs(session, keep.jobs) if keep.jobs else 0,
         trajectories=_forget_trajectories(session, keep.trajectories) if keep.trajectories else 0,
@@ -61,7 +61,7 @@ def forget(session: Session, keep: Keep) -> Forgotten:
 
 
 def forget_jobs(session: Session, days: float) -> int:
-    """Delete finished jobs that are older, with all that hangs on them but their models."""
+    """Delete older finished jobs with everything that belongs to them except their models."""
     ended = jobs.c.status.in_(FINISHED) & (jobs.c.finished_at < database_time() - days * DAY_S)
     ids = _some(session, jobs, ended)
     if ids:
@@ -78,6 +78,6 @@ def _forget_trajectories(session: Session, days: float) -> int:
 
 
 def _some(session: Session, table: Table, old: ColumnElement[bool]) -> list[str]:
-    """Ids of some old rows that no other process is just deleting."""
+    """Ids of some old rows that no other process is deleting at the moment."""
     query = select(table.c.id).where(old).limit(ROUND_LIMIT).with_for_update(skip_locked=True)
     return list(session.scalars(query))

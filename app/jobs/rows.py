@@ -1,8 +1,8 @@
 """Jobs and chunks as leased work, the conditions that select them, and job rows as values.
 
-A spread job is running and its work lies in `job_chunks`. While workers fly its chunks the job itself has no
-holder and no lease. The worker that stored the last chunk, or learns that the job was cancelled or ran out of
-time, takes it over like any claim.
+A spread job is in state running and its work is in `job_chunks`. While workers fly its chunks the job itself
+has no holder and no lease. The worker that stores the last chunk, or learns that the job was cancelled or ran
+out of time, claims it.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ CLAIM_COLUMNS = (jobs.c.fence, jobs.c.request_id, jobs.c.traceparent)
 QUOTA_COLUMNS = (jobs.c.key_id, jobs.c.flights_estimated, jobs.c.flights)
 
 FULL_HISTORY = 7200  # events: an hour of a worker that writes two a second
-SPARSE_STEP = 120  # of what is older, one event a minute stays
+SPARSE_STEP = 120  # of older events, one per minute is kept
 
 OPEN, RUNNING, DONE = "open", "running", "done"  # states of a chunk
-REST_S = 1.0  # workers take the next chunk within milliseconds; after this the job is at rest
+REST_S = 1.0  # s; workers take the next chunk within milliseconds; after this the job is at rest
 
 
 def write_event(session: Session, row: LeasedRow, note: Note) -> None:
@@ -73,16 +73,16 @@ HANDED_OUT = and_(jobs.c.status.in_(HELD), jobs.c.lease_until.is_(None), jobs.c.
 
 
 class UnitKind(Enum):
-    """What a worker can take."""
+    """Kinds of work that a worker can take."""
 
     JOB = "job"  # a queued job
     CHUNK = "chunk"  # an open chunk of a running job
-    SPREAD = "spread"  # a spread job whose chunks are all stored, or which must end
+    SPREAD = "spread"  # a spread job whose chunks are all stored, or that must end
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """The next piece of work; ``generation`` and ``number`` are those of a chunk."""
+    """The next piece of work; ``generation`` and ``number`` identify a chunk."""
 
     kind: UnitKind
     job_id: str
@@ -97,24 +97,24 @@ class Unit:
 
 
 def deadline_passed() -> ColumnElement[bool]:
-    """Whether a job's time is over, by the database's clock."""
+    """Whether a job's deadline has passed, by the database's clock."""
     return jobs.c.deadline_at < database_time()
 
 
 def in_time() -> ColumnElement[bool]:
-    """Whether a job's time is not over."""
+    """Whether a job's deadline has not passed."""
     return or_(jobs.c.deadline_at.is_(None), jobs.c.deadline_at > database_time())
 
 
 def must_go_on() -> ColumnElement[bool]:
-    """Whether a spread job without a holder waits for a worker to advance or to end it."""
+    """Whether a spread job without a holder is waiting for a worker to advance or end it."""
     unfinished = job_chunks.c.status.in_((OPEN, RUNNING))
     flown = ~exists().where(job_chunks.c.job_id == jobs.c.id, job_chunks.c.owner == jobs.c.owner, unfinished)
     return and_(HANDED_OUT, or_(jobs.c.status == JobStatus.CANCELLING.value, deadline_passed(), flown))
 
 
 def at_rest() -> ColumnElement[bool]:
-    """Whether a spread job has no holder and no worker flies, or just flew, one of its chunks."""
+    """Whether a spread job has no holder and no worker is flying, or has just flown, one of its chunks."""
     lately = exists().where(
         job_chunks.c.job_id == jobs.c.id,
         or_(job_chunks.c.status == RUNNING, job_chunks.c.at > database_time() - REST_S),
@@ -131,7 +131,7 @@ def job_from_row(row: Row[*tuple[Any, ...]], *, replayed: bool = False) -> Job:
 
 
 def get_job(session: Session, owner: str, job_id: str) -> Job:
-    """Read one job; raise `JobNotFound` where this owner has none with this id."""
+    """Read one job; raise `JobNotFound` if this owner has none with this id."""
     row = session.execute(
         select(*JOB_COLUMNS).where(jobs.c.id == job_id, jobs.c.owner == owner)
     ).one_or_none()
@@ -141,7 +141,7 @@ def get_job(session: Session, owner: str, job_id: str) -> Job:
 
 
 def drop_state(session: Session, row: LeasedRow, _note: Note) -> None:
-    """Delete what is only needed to go on with a job, and add the size of its history to its stored bytes."""
+    """Delete the data needed only to continue a job, and add the size of its history to its stored bytes."""
     session.execute(delete(job_chunks).where(job_chunks.c.job_id == row.id))
     session.execute(delete(job_checkpoints).where(job_checkpoints.c.job_id == row.id))
     history = (

@@ -1,4 +1,4 @@
-"""Jobs on the wire."""
+"""Schemas of jobs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ else:
 
 
 class Progress(BaseModel):
-    """How far a running job is."""
+    """Progress of a running job."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -62,7 +62,7 @@ class SampleSummary(BaseModel):
 
 
 class RequestSummary(BaseModel):
-    """The small facts of a job's request; which there are depends on the operation."""
+    """Summary of a job's request; the fields present depend on the operation."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -71,6 +71,10 @@ class RequestSummary(BaseModel):
     compared_links: list[int] = Field(default=[], description="Numbers of links per wing of a study.")
     model: str | None = Field(default=None, description="The model that a simulation flies.")
     method: str | None = Field(default=None, description="Of the search.")
+    drives: list[str] = Field(
+        default=[],
+        description="The drives that move, both sides of a kind under its word; empty where it is the sweep.",
+    )
     samples: list[SampleSummary] = []
     duration_s: float | None = Field(default=None, description="Of the flight or of the morph.")
     final_rad: float | None = Field(default=None, description="Sweep at the end of the morph.")
@@ -78,26 +82,26 @@ class RequestSummary(BaseModel):
 
 
 class QueuePlace(BaseModel):
-    """Where a queued job stands; owners take turns, so another's long queue is not in the way."""
+    """Place of a queued job. Owners take turns, so another owner's long queue does not delay it."""
 
     position: int = Field(description="Place in the queue, 1 is next, assuming no further jobs are posted.")
     eta_s: float | None = Field(
-        description="Until it begins, from what jobs took lately and the workers there are; null while "
+        description="Time to its start, estimated from recent durations and the workers; null while "
         "nothing is known."
     )
 
 
 class Validation(BaseModel):
-    """The request is valid; each operation adds its name and what it would cost."""
+    """The request is valid; each operation adds its name and its cost."""
 
     valid: Literal[True] = True
     cost: Any
-    queue: QueuePlace = Field(description="The place that the job would have if it were posted now.")
-    quotas: Quotas | None = Field(description="Of your key; null where the service demands no keys.")
+    queue: QueuePlace = Field(description="The job's place in the queue if it were posted now.")
+    quotas: Quotas | None = Field(description="Of your key; null if the service requires no keys.")
 
 
 class JobLinks(BaseModel):
-    """Where the parts of a job are."""
+    """Links to the parts of a job."""
 
     self: str
     events: str
@@ -116,7 +120,7 @@ class Job(BaseModel):
     )
     progress: Progress | None
     error: JobError | None
-    partial: bool = Field(description="The result is the best so far of a job that did not run to its end.")
+    partial: bool = Field(description="The result is the best so far of a job that did not finish.")
     attempt: int = Field(description="Number of attempts; more than one after a worker was lost.")
     max_attempts: int
     priority: int
@@ -124,7 +128,7 @@ class Job(BaseModel):
     queue: QueuePlace | None = Field(description="While it is queued; null in lists.")
     request: RequestSummary
     model_id: str | None = Field(
-        description="The identified (of a study: the recommended) model, once there is one: "
+        description="The identified model (for a study: the recommended one), once there is one: "
         "GET /models/{model_id}."
     )
     last_event: int = Field(description="Number of the newest event.")
@@ -140,7 +144,7 @@ class Job(BaseModel):
 
     @classmethod
     def of(cls, job: StoredJob, place: QueuePlace | None = None) -> Job:
-        """Show a stored job, and where it stands in the queue."""
+        """Show a stored job with its place in the queue."""
         at = f"/jobs/{job.id}"
         parts = ("events", "result", "artifacts", "cancel")
         shown = {name: getattr(job, name) for name in cls.model_fields if hasattr(job, name)}
@@ -172,15 +176,15 @@ class JobEvent(BaseModel):
 
 
 class JobEventPage(BaseModel):
-    """Events, oldest first; of what is older than some thousand events one progress in 120 is kept."""
+    """Events, oldest first; beyond the latest few thousand, one progress event in 120 is kept."""
 
     events: list[JobEvent]
-    last_seq: int = Field(description="Pass as `after` to go on from here.")
+    last_seq: int = Field(description="Pass as `after` to continue from here.")
     finished: bool = Field(description="No more events will follow.")
 
 
 class Artifact(BaseModel):
-    """A file that a job left."""
+    """A file produced by a job."""
 
     name: str = Field(examples=["attitude_rate_0.5.svg"])
     media_type: str = Field(examples=["image/svg+xml"])

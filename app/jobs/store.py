@@ -1,8 +1,8 @@
-"""The life of a job as rows: created, claimed, kept alive, finished.
+"""The life cycle of a job as rows: created, claimed, kept alive, finished.
 
-The row is the truth, messages are hints. Every function takes a `Session` and leaves the commit to its caller
-(a worker, or an endpoint's transaction). Jobs are leased work (`app.leases`): every change of state is a
-compare-and-set that writes its event in the same transaction. Writes of a worker carry its claim's fence; a
+The row is authoritative, messages are hints. Every function takes a `Session` and leaves the commit to its
+caller (a worker, or an endpoint's transaction). Jobs are leased work (`app.leases`): every change of state is
+a compare-and-set that writes its event in the same transaction. Writes of a worker carry its claim's fence; a
 stale one changes nothing and returns False.
 """
 
@@ -47,22 +47,22 @@ from app.tables import (
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Which call a job comes from."""
+    """The call that posted a job."""
 
-    key_id: str | None = None  # the API key, whose quota the job uses
-    request_id: str | None = None  # leads from the call's logs to the worker's
+    key_id: str | None = None  # the API key whose quota the job uses
+    request_id: str | None = None  # connects the call's logs with the worker's
     traceparent: str | None = None  # W3C trace context
 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """How a job is run."""
+    """Conditions under which a job is run."""
 
-    priority: int = 0  # inside its owner the highest runs first
-    label: str | None = None  # the owner's own word for it
-    max_attempts: int = 3  # claims before a job whose workers are lost is given up
+    priority: int = 0  # among the owner's jobs the highest runs first
+    label: str | None = None  # chosen by the owner
+    max_attempts: int = 3  # number of claims after which a job whose workers are lost fails
     max_seconds: float | None = None  # deadline, counted from the first claim
-    expires_in_s: float | None = None  # a job that has not begun after this time is not begun any more
+    expires_in_s: float | None = None  # a job that has not started after this time is not started any more
 
 
 NO_ORIGIN = Origin()
@@ -88,9 +88,9 @@ def create_job(
     request : dict or Sealed
         The whole request, every sample inline: what `load_request` gives the worker.
     summary : dict, optional
-        The few small facts of the request that listings show.
+        Summary of the request for listings.
     flights_estimated : int
-        Charged to the key until the job has ended and its flights are known.
+        Charged to the key until the job ends and its number of flights is known.
     idempotency_key : str, optional
         With a key seen before and the same request, the earlier job is returned with ``replayed`` set.
 
@@ -99,7 +99,7 @@ def create_job(
     IdempotencyConflict
         The key was used for another request.
     QuotaExceeded
-        The API key may not have another such job.
+        The API key's quota does not allow another such job.
     """
     job_id = new_identifier("job")
     document = request if isinstance(request, Sealed) else sealed(request)
@@ -144,7 +144,7 @@ def create_job(
 def _take_idempotency_key(
     session: Session, owner: str, key: str, operation: str, fingerprint: str, job_id: str
 ) -> Job | None:
-    """Write the key, or return the job that holds it. The unique key decides between two racing requests.
+    """Write the key, or return the job that has it. The unique constraint decides between racing requests.
 
     A job is deleted together with its key, and on Postgres that may be committed between any two statements
     here: then the key is free, and is written after all. A job that is returned is there until the commit.
@@ -167,7 +167,7 @@ def _take_idempotency_key(
         if (earlier.operation, earlier.sha256) != (operation, fingerprint):
             raise IdempotencyConflict(key)
         kept = select(*JOB_COLUMNS).where(jobs.c.id == earlier.job_id, jobs.c.owner == owner)
-        # waits for whoever is deleting the job, and for nobody else
+        # waits only for a transaction that is deleting the job
         row = session.execute(kept.with_for_update(read=True, key_share=True)).one_or_none()
         if row is not None:
             return job_from_row(row, replayed=True)
@@ -186,10 +186,9 @@ def load_request(session: Session, job_id: str) -> Document:
 
 
 def claim_job(session: Session, job_id: str, worker_name: str, lease_s: float = 60.0) -> Claim | None:
-    """Take a queued job: fence and attempt rise by one, the lease runs from now, another owner is next.
+    """Claim a queued job: fence and attempt rise by one, the lease runs from now, another owner is next.
 
-    Returns None when the job is not queued any more (someone else was first, or it was cancelled) or its time
-    is over.
+    Returns None if the job is no longer queued (claimed by another worker, or cancelled) or its time is over.
     """
     now = database_time()
     first = jobs.c.started_at.is_(None)
@@ -232,7 +231,7 @@ def renew_lease(session: Session, claim: Claim, lease_s: float = 60.0) -> StopRe
 
 
 def look_at_lease(session: Session, claim: Claim) -> StopReason | None:
-    """Return why the work should stop, writing nothing: cheap enough to ask several times a second.
+    """Return why the work should stop, without writing: cheap enough to call several times a second.
 
     The database's clock judges deadlines: a worker's may be an hour wrong.
     """
@@ -296,7 +295,7 @@ def finish_job(
     error: Document | None = None,
     artifacts: Mapping[str, bytes] | None = None,
 ) -> bool:
-    """End a claimed job, with what it leaves behind; return False for a stale claim.
+    """End a claimed job with its result and files; return False for a stale claim.
 
     Parameters
     ----------
@@ -321,7 +320,7 @@ def finish_job(
         values["error"] = finite(error)
     payload = {"error": values["error"]} if error is not None else None
     if ending == JobStatus.SUCCEEDED.value:
-        # work that counts no flights has flown once
+        # work that counts no flights counts as one
         values["flights"] = case((jobs.c.flights > 0, jobs.c.flights), else_=1)
     document = None if result is None else packed({**result, "partial": True} if partial else result)
     files = artifacts or {}
@@ -339,7 +338,7 @@ def finish_job(
 
 
 def release_job(session: Session, claim: Claim) -> bool:
-    """Give a running job back to the queue with its checkpoint (graceful stop); the attempt is not counted.
+    """Return a running job to the queue with its checkpoint (graceful stop); the attempt is not counted.
 
     A job that was being cancelled ends as cancelled instead. Publish the id after the commit.
     """
@@ -356,10 +355,10 @@ def release_job(session: Session, claim: Claim) -> bool:
 
 
 def request_cancel(session: Session, owner: str, job_id: str) -> Job:
-    """Ask a job to end: a queued one does at once, a running one winds down, a finished one stays as it is.
+    """Request the end of a job: a queued one ends at once, a running one winds down, a finished one stays.
 
-    A spread job that no worker is at just now ends at once as well: there is nobody to wind it down.
-    Otherwise publish the id after the commit, so that some worker does.
+    A spread job on which no worker is working also ends at once. Otherwise publish the id after the commit,
+    so that a worker winds it down.
     """
     mine = (jobs.c.id == job_id, jobs.c.owner == owner)
     row = JOBS.change(

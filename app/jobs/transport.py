@@ -1,6 +1,6 @@
-"""How Celery reaches the broker: kombu's Redis transport with the address read by redis-py, as everywhere.
+"""Celery's connection to the broker: kombu's Redis transport with the address parsed by redis-py.
 
-`celery_broker` is the one place that says so to Celery, for the API, the workers and the beat.
+`celery_broker` configures this for the API, the workers and the beat.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from redis.connection import parse_url
 
 from app.broker import canonical, is_redis
 
-CONNECT_TIMEOUT_S = 0.5  # a broker on the same network answers in a millisecond, or is away
+CONNECT_TIMEOUT_S = 0.5  # s; a broker on the same network answers in a millisecond, or is unavailable
 SOCKET_TIMEOUT_S = 2.0
-# Celery prefers these to its settings; whoever has them set means another application
+# Celery prefers these to its settings; if they are set, they are meant for another application
 CELERY_VARIABLES = ("BROKER_URL", "BROKER_READ_URL", "BROKER_WRITE_URL", "RESULT_BACKEND", "LOADER")
 
 
 def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> dict[str, Any]:
-    """Return Celery's settings of a broker; variables of Celery's own (`CELERY_BROKER_URL`) no longer count.
+    """Return Celery's settings of a broker; Celery's own variables (`CELERY_BROKER_URL`) are then ignored.
 
     ``transport`` is the import path of the transport for Redis and Valkey.
     """
-    # Celery puts the working folder first on the import path while it loads modules of its own; what another
-    # thread imports in that moment would come from there
+    # Celery puts the working folder first on the import path while it loads its own modules; imports by
+    # another thread at that moment would come from there
     imports.cwd_in_path = nullcontext
     for name in CELERY_VARIABLES:
         os.environ.pop(f"CELERY_{name}", None)
@@ -41,17 +41,17 @@ def celery_broker(url: str, transport: str = "app.jobs.transport:Transport") -> 
             "max_retries": 0,
         },
         "task_ignore_result": True,  # results belong in our tables
-        "task_publish_retry": False,  # a lost message is repeated, and nobody waits for a broker
+        "task_publish_retry": False,  # a lost message is repeated, so there is no need to wait for a broker
     }
     if is_redis(url):
         settings |= {"broker_url": canonical(url), "broker_transport": transport}
-        # a hint that was taken is gone: jobs are rows, and what is not kept cannot come back to do harm
+        # a hint is gone once taken: jobs are rows, and hints that are not kept cannot come back
         settings["broker_transport_options"]["ack_emulation"] = False
     return settings
 
 
 class Channel(redis.Channel):
-    """A channel to the server that redis-py reads out of the address."""
+    """A channel to the server at the address as parsed by redis-py."""
 
     def _connparams(self, asynchronous: bool = False) -> dict[str, Any]:  # noqa: FBT001, FBT002 - kombu's
         given: dict[str, Any] = dict(parse_url(self.connection.client.hostname))  # type: ignore[no-untyped-call]
@@ -64,7 +64,7 @@ class Channel(redis.Channel):
         return parameters
 
     def _queue_bind(self, *_binding: Any) -> None:
-        """Write no table of bindings: each message names its queue, and a full server refuses writes."""
+        """Write no bindings table: each message names its queue, and a full server refuses writes."""
 
 
 class Transport(redis.Transport):

@@ -1,9 +1,9 @@
-"""Whose turn it is: owners take turns, and inside an owner the most urgent job goes first, then the oldest.
+"""The order of work: owners take turns; an owner's most urgent job goes first, then the oldest.
 
-Among the owners with waiting work the one with the fewest workers is next, then the one that was served
-least recently: however many jobs one owner has queued, another waits for one turn and not for all of them.
-Work is a queued job or an open chunk of a running one; an owner's chunks go before queued jobs that are not
-more urgent. Each question is a few steps down an index, whatever the length of the queue.
+Among the owners with waiting work the one with the fewest workers is next, then the one that was served least
+recently: however many jobs one owner has queued, another owner waits for one turn only. Work is a queued job
+or an open chunk of a running one; an owner's chunks go before queued jobs that are not more urgent. Each
+query takes a few steps in an index, whatever the length of the queue.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ from app.jobs.rows import HANDED_OUT, OPEN, RUNNING, Unit, UnitKind, in_time, mu
 from app.tables import job_chunks, jobs, owners
 
 QUEUED = jobs.c.status == JobStatus.QUEUED.value
-OWNERS_LOOKED_AT = 64  # in one turn; the others' jobs would all have to be locked by other workers
+OWNERS_LOOKED_AT = (
+    64  # owners per query; more are needed only if the jobs of all these are locked by other workers
+)
 
 
 def _owners(column: Column[str], condition: ColumnElement[bool], name: str) -> CTE:
-    """Owners of some rows, each found by one step down an index."""
+    """Owners of some rows, each found by one step in an index."""
     first = select(func.min(column).label("owner")).where(condition)
     found = first.cte(name, recursive=True)
     following = select(func.min(column)).where(condition, column > found.c.owner)
@@ -30,7 +32,7 @@ def _owners(column: Column[str], condition: ColumnElement[bool], name: str) -> C
 
 
 def running(*owner: ColumnElement[str]) -> ColumnElement[int]:
-    """Number of jobs, and chunks of spread ones, in workers' hands: of one owner, or of all."""
+    """Number of jobs, and chunks of spread jobs, that are being worked on: of one owner, or of all."""
     held = select(func.count()).select_from(jobs).where(jobs.c.status.in_(HELD), ~HANDED_OUT)
     flown = select(func.count()).select_from(job_chunks).where(job_chunks.c.status == RUNNING)
     for each in owner:
@@ -57,7 +59,7 @@ def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]
 def next_job_of(session: Session, owner: str, *, above: int | None = None) -> str | None:
     """Id of the owner's next job, of a higher priority than ``above`` if that is given.
 
-    A job that another worker is taking is passed over.
+    A job that another worker is taking is skipped.
     """
     urgent = () if above is None else (jobs.c.priority > above,)
     return session.execute(
@@ -65,19 +67,19 @@ def next_job_of(session: Session, owner: str, *, above: int | None = None) -> st
         .where(QUEUED, jobs.c.owner == owner, in_time(), *urgent)
         .order_by(jobs.c.priority.desc(), jobs.c.id)
         .limit(1)
-        .with_for_update(skip_locked=True)  # SQLite has one writer at a time and knows no such words
+        .with_for_update(skip_locked=True)  # SQLite has one writer at a time and no such clause
     ).scalar_one_or_none()
 
 
 def _next_spread_job(session: Session) -> str | None:
-    """Id of a spread job that must go on; one that another worker is taking is passed over."""
+    """Id of a spread job that must continue; one that another worker is taking is skipped."""
     return session.execute(
         select(jobs.c.id).where(must_go_on()).order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True)
     ).scalar_one_or_none()
 
 
 def _next_chunk_of(session: Session, owner: str) -> Row[*tuple[Any, ...]] | None:
-    """The owner's open chunk that should be flown next: of the most urgent job, then of the oldest."""
+    """The owner's next open chunk: of the most urgent job, then of the oldest."""
     return session.execute(
         select(job_chunks.c.job_id, job_chunks.c.generation, job_chunks.c.number, jobs.c.priority)
         .join(jobs, jobs.c.id == job_chunks.c.job_id)
@@ -94,9 +96,9 @@ def _next_chunk_of(session: Session, owner: str) -> Row[*tuple[Any, ...]] | None
 
 
 def next_unit(session: Session) -> Unit | None:
-    """The work that should be done next, None when there is none to be had.
+    """The next work to be done; None if there is none.
 
-    A spread job that must go on comes before all turns: many workers wait for that moment's work.
+    A spread job that must continue takes precedence over turns: many workers are waiting for it.
     """
     spread = _next_spread_job(session)
     if spread is not None:
@@ -112,7 +114,7 @@ def next_unit(session: Session) -> Unit | None:
 
 
 def note_served(session: Session, owner: str) -> None:
-    """Remember that a worker took a job of this owner; workers that do so at once wait for nobody."""
+    """Record that a worker took a job of this owner; concurrent records do not block each other."""
     mine = select(owners.c.owner).where(owners.c.owner == owner).with_for_update(skip_locked=True)
     session.execute(
         update(owners).where(owners.c.owner.in_(mine.scalar_subquery())).values(served_at=database_time())

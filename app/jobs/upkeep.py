@@ -1,4 +1,4 @@
-"""Reaper, retention and disk space inside the API process: they go on while every worker is busy for hours.
+"""Reaper, retention and disk space inside the API process: they run even if all workers are busy for hours.
 
 Workers reap too, whenever one is free. Each change is a compare-and-set, so they do not interfere.
 """
@@ -22,14 +22,14 @@ from app.settings import Settings
 REAP_EVERY_S = 10.0
 FORGET_EVERY_S = 300.0
 STOP_S = 5.0
-GIVE_BACK_SLICES = 20  # of free pages in one round, with a pause for other writers after each
+GIVE_BACK_SLICES = 20  # slices of free pages per round, with a pause for other writers after each
 PAUSE_S = 0.05
 
 log = logging.getLogger(__name__)
 
 
 class Upkeep:
-    """One thread that makes a round every `reap_every_s`."""
+    """One thread that runs a round every `reap_every_s`."""
 
     def __init__(
         self,
@@ -55,18 +55,18 @@ class Upkeep:
 
     @property
     def alive(self) -> bool:
-        """Whether rounds are still made."""
+        """Whether the thread is still running."""
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """End, after the round that is being made."""
+        """Stop after the current round."""
         self._stopping.set()
         self._thread.join(STOP_S)
 
     def _run(self) -> None:
         forget_in_s = 0.0
-        # not all processes at once after a common start
-        pause_s = self._reap_every_s * random.uniform(0.5, 1.0)  # noqa: S311 - no secret hangs on it
+        # so that processes started together do not all run at once
+        pause_s = self._reap_every_s * random.uniform(0.5, 1.0)  # noqa: S311 - not security-relevant
         while not self._stopping.wait(pause_s):
             forget_in_s -= pause_s
             pause_s = self._reap_every_s
@@ -80,7 +80,7 @@ class Upkeep:
                 log.warning("maintenance skipped, the database does not answer: %s", error)
 
     def tidy_disk(self) -> None:
-        """Keep the reserve whole, and give back what deleted rows have left."""
+        """Refill the reserve, and release the space of deleted rows."""
         if self._database.reserve is not None:
             self._database.reserve.fill()
         for _ in range(GIVE_BACK_SLICES):
@@ -88,7 +88,7 @@ class Upkeep:
                 return
 
     def reap(self) -> ReapReport:
-        """Make one round of the reaper."""
+        """Run one round of the reaper."""
         with self._database.write() as session:
             report = reap(session, republish_after_s=self._republish_after_s)
         log_ends(report)
@@ -97,7 +97,7 @@ class Upkeep:
         return report
 
     def forget(self) -> bool:
-        """Make one round of retention; return whether there is more to delete."""
+        """Run one round of retention; return whether there is more to delete."""
         if self._keep == Keep():
             return False
         with self._database.write() as session:

@@ -1,6 +1,6 @@
-"""How long the queue is: the place of a job in the order of turns, and about when it will begin.
+"""The length of the queue: a job's place in the order of turns, and its approximate start.
 
-Counts go over indexes alone: with 10,000 queued jobs they take some milliseconds.
+Counts use indexes only: with 10,000 queued jobs they take a few milliseconds.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from app.jobs.schemas import QueuePlace
 from app.jobs.turns import running
 from app.tables import jobs, owners, workers
 
-ALIVE_S = 60.0  # a worker that was not seen for so long does not count
-FRESH_S = 1.0  # the queue is counted again after this; a job's place among its owner's jobs always is
-RECENT = 50  # finished jobs, from which follows how long jobs take
+ALIVE_S = 60.0  # s; a worker that was not seen for this long does not count
+FRESH_S = 1.0  # s between counts of the queue; a job's place among its owner's jobs is always counted
+RECENT = 50  # number of finished jobs from which durations are estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,33 +36,33 @@ class Line:
 class Census:
     """The queue at one moment."""
 
-    lines: Mapping[str, Line]  # of each owner with jobs that wait or run
+    lines: Mapping[str, Line]  # of each owner with waiting or running jobs
     took_s: Mapping[str | None, float]  # mean time of recent jobs of each operation; None: of all
     slots: int  # jobs that the live workers can run at once, at least 1
 
 
 class QueueView:
-    """The queue as one process sees it: counted once a second, however many ask."""
+    """The queue as seen by one process: counted once a second, whatever the number of requests."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._counted: tuple[float, Census] | None = None
 
     def census(self, session: Session) -> Census:
-        """The queue as it is, or was less than `FRESH_S` ago."""
+        """The queue as counted less than `FRESH_S` ago."""
         counted = self._counted
         if counted is None or self._clock() - counted[0] >= FRESH_S:
             counted = self._counted = (self._clock(), count_queue(session))
         return counted[1]
 
     def place(self, session: Session, job: Job) -> QueuePlace | None:
-        """Find the place of a job; None for one that does not wait."""
+        """Find the place of a job; None if it is not waiting."""
         if job.status is not JobStatus.QUEUED:
             return None
         return queue_place(session, job, self.census(session))
 
     def place_of_next(self, session: Session, owner: str, operation: str, priority: int) -> QueuePlace:
-        """Find the place that a job would have which this owner posted now."""
+        """Find the place of a job that this owner would post now."""
         ahead = _mine_ahead(session, owner, priority, None)
         return _place(self.census(session), owner, operation, ahead)
 
@@ -73,7 +73,7 @@ def queue_place(session: Session, job: Job, census: Census) -> QueuePlace:
 
 
 def count_queue(session: Session) -> Census:
-    """Count what waits and runs."""
+    """Count waiting and running jobs."""
     queued = _by_owner(session, JobStatus.QUEUED.value)
     held = _by_owner(session, *HELD)
     served = {row.owner: row.served_at for row in session.execute(select(owners))}
@@ -116,7 +116,7 @@ def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None)
     older = jobs.c.priority == priority
     if job_id is not None:
         older = and_(older, jobs.c.id < job_id)
-    # two counts, each a stretch of the index; with "or" SQLite would look at all that the owner has queued
+    # two counts, each over an index range; with "or" SQLite would scan all queued jobs of the owner
     urgent, before = (
         select(func.count()).select_from(jobs).where(mine, part).scalar_subquery()
         for part in (jobs.c.priority > priority, older)
@@ -125,11 +125,11 @@ def _mine_ahead(session: Session, owner: str, priority: int, job_id: str | None)
 
 
 def _others_ahead(lines: Mapping[str, Line], owner: str, mine_ahead: int) -> int:
-    """Count the other owners' jobs that have their turn before the owner's job number `mine_ahead`.
+    """Count the other owners' jobs whose turn comes before the owner's job number `mine_ahead`.
 
-    An owner's job number k (from 0) has its turn when running + k jobs of that owner have begun. In turns of
-    the same number the owner who runs more comes first, since he was not served in the turns before, then the
-    one who was served least recently.
+    The turn of an owner's job number k (from 0) comes when running + k jobs of that owner have started.
+    Within the same turn number the owner with more running jobs comes first, having skipped the turns before,
+    then the one served least recently.
     """
     mine = lines.get(owner, Line())
     turn = mine.running + mine_ahead
@@ -142,7 +142,7 @@ def _others_ahead(lines: Mapping[str, Line], owner: str, mine_ahead: int) -> int
 
 
 def _usual_durations(session: Session) -> dict[str | None, float]:
-    """Mean times that recent jobs took, s: of each operation, and of all."""
+    """Mean durations of recent jobs, s: by operation, and of all."""
     recent = session.execute(
         select(jobs.c.operation, (jobs.c.finished_at - jobs.c.started_at).label("took_s"))
         .where(jobs.c.status == JobStatus.SUCCEEDED.value, jobs.c.finished_at.is_not(None))

@@ -1,4 +1,4 @@
-"""Waiting for news of jobs: one query per tick for all watched jobs, however many clients wait."""
+"""Watches jobs for waiting clients: one query per tick for all watched jobs, for any number of clients."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from app.database import Database
 from app.tables import jobs
 
 CHUNK = 500  # ids per query
-GONE = 2**62  # number of the last event of a job that is not there: after all that anybody has seen
+GONE = 2**62  # number of the last event of a missing job: greater than any number seen
 
-PAUSE_FACTOR = 4.0  # a look at thousands of jobs is given a fifth of the time: requests come first
+PAUSE_FACTOR = 4.0  # share of the time for queries over thousands of jobs: requests come first
 
 logger = logging.getLogger(__name__)
 
@@ -51,35 +51,35 @@ class Subscription:
 
 
 class JobWatcher:
-    """Looks at the watched jobs every `poll_s` seconds and wakes those who wait for them.
+    """Checks the watched jobs every `poll_s` seconds and wakes the clients that wait for them.
 
-    The cost of a look grows with the jobs that are watched and the clients that are woken, not with those
-    that wait. A look that takes a quarter of `poll_s` or more makes the next one later.
+    The cost of a check grows with the number of watched jobs and woken clients, not with that of waiting
+    clients. A check that takes a quarter of `poll_s` or more delays the next one.
     """
 
     def __init__(self, database: Database, poll_s: float) -> None:
         self._database = database
         self._poll_s = poll_s
         self._subscriptions: dict[str, set[Subscription]] = {}
-        self._numbers: dict[str, int] = {}  # of the last event of each watched job, at the last look
-        self._late: set[Subscription] = set()  # these had news to read when they began to wait
+        self._numbers: dict[str, int] = {}  # number of the last event of each watched job, at the last check
+        self._late: set[Subscription] = set()  # these already had news when they began to wait
         self._someone = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self.closed = False
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start watching."""
         self._task = asyncio.create_task(self._run(), name="job-watcher")
 
     def close(self) -> None:
-        """Wake everyone for good: the process ends."""
+        """Wake all clients permanently: the process ends."""
         self.closed = True
         for subscriptions in self._subscriptions.values():
             for subscription in subscriptions:
                 subscription.wake()
 
     async def stop(self) -> None:
-        """Stop looking."""
+        """Stop watching."""
         self.close()
         if self._task is not None:
             self._task.cancel()
@@ -103,7 +103,7 @@ class JobWatcher:
                 self._numbers.pop(job_id, None)
 
     def expect(self, subscription: Subscription) -> None:
-        """Note that a client begins to wait; the next look wakes it if an earlier one has seen its news."""
+        """Note that a client starts to wait; the next check wakes it if an earlier one has seen its news."""
         if self._numbers.get(subscription.job_id, -1) > subscription.seen:
             self._late.add(subscription)
 
@@ -119,14 +119,14 @@ class JobWatcher:
             try:
                 numbers = await asyncio.to_thread(self._event_numbers, ids)
             except SQLAlchemyError as error:
-                logger.warning("cannot look at the watched jobs: %s", error)
+                logger.warning("cannot check the watched jobs: %s", error)
                 continue
             finally:
                 took_s = time.monotonic() - began
             self._wake(ids, numbers)
 
     def _wake(self, ids: list[str], numbers: dict[str, int]) -> None:
-        """Wake whoever has not seen the last event of a job, or follows one that is gone."""
+        """Wake clients that have not seen the last event of a job, or follow a deleted one."""
         woken, self._late = self._late, set()
         for job_id in ids:
             number = numbers.get(job_id, GONE)

@@ -1,1 +1,1 @@
-"""API keys: who calls, what they may do, and how much of it."""
+"""API keys: identity, permissions and quotas of callers."""

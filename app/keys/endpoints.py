@@ -1,4 +1,4 @@
-"""What a caller may know of its own key. Keys are made and revoked on the command line only."""
+"""Information on the caller's own key. Keys are made and revoked on the command line only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ router = APIRouter(tags=["keys"])
 
 @router.get("/me", operation_id="get_me", summary="Who am I, and what may I do?", dependencies=[demands()])
 def get_me(app: ServiceDep, caller: CallerDep) -> Me:
-    """Tell the caller's owner, and its key's scopes, quotas and use."""
+    """Return the caller's owner, and the scopes, quotas and use of its key."""
     scopes = sorted(caller.scopes)
     if caller.key_id is None:
         return Me(owner=caller.owner, scopes=scopes, key=None, quotas=None)

@@ -1,4 +1,4 @@
-"""Checking keys: a digest per request, an indexed read per key every two seconds, never a write."""
+"""Checks keys: one digest per request, one indexed read per key every two seconds, never a write."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Refusal(StrEnum):
 
 
 class KeyRing:
-    """The keys of the database, remembered for a moment; their last use is written in the background."""
+    """The keys of the database, cached briefly; their last use is written in the background."""
 
     def __init__(
         self, database: Database, background: BackgroundWriter, clock: Callable[[], float] = time.monotonic
@@ -39,12 +39,12 @@ class KeyRing:
         self._remembered: OrderedDict[str, StoredKey] = OrderedDict()
 
     def is_fresh(self, text: KeyText) -> bool:
-        """Whether `check` needs no look at the database."""
+        """Whether `check` does not need the database."""
         known = self._remembered.get(text.prefix)
         return known is not None and self._clock() - known.read_at < FRESH_S
 
     def check(self, text: KeyText) -> ApiKey | Refusal:
-        """Return whose key it is, or why it is not valid; reads the database unless it `is_fresh`."""
+        """Return the key's record, or why it is not valid; reads the database unless it `is_fresh`."""
         known = self._remembered.get(text.prefix)
         if known is None or self._clock() - known.read_at >= FRESH_S:
             known = self._read(text.prefix)
@@ -61,15 +61,17 @@ class KeyRing:
         return key
 
     def forget(self, key: ApiKey) -> None:
-        """Read a key anew at its next use: it is known to have changed."""
+        """Drop a key from the cache because it has changed."""
         self._remembered.pop(key.prefix, None)
 
     def _read(self, prefix: str) -> StoredKey | None:
-        read_at = self._clock()  # before the read: what is remembered is never younger than it seems
+        read_at = (
+            self._clock()
+        )  # taken before the read, so that cached entries are never younger than assumed
         with self._database.read() as session:
             known = find_key(session, prefix)
         if known is None:
-            # unknown prefixes are not remembered: guesses must not push out keys that are in use
+            # unknown prefixes are not cached: guesses must not displace keys in use
             self._remembered.pop(prefix, None)
         else:
             known.read_at = read_at

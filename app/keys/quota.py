@@ -1,7 +1,7 @@
 """Quotas of a key, counted in the transaction that uses them: two posts at the limit cannot both pass.
 
-SQLite transactions that write hold the only write lock from their beginning; on Postgres the key's row is
-locked until the commit. Both make charges of one key wait for one another, and nobody else.
+SQLite write transactions hold the only write lock from their beginning; on Postgres the key's row is locked
+until the commit. In both cases charges of one key wait for one another, and only for those.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from app.tables import (
 
 DAY_S = 86_400
 IN_FLIGHT = tuple(status for status in STATUSES if status not in FINISHED)
-SOON_S = 30  # when to ask again for room that other jobs of the key give back
+SOON_S = 30  # s after which to retry, when other jobs of the key may have released their share
 
 
 def usage_day(at_s: float) -> int:
-    """Day that a moment of database time is counted to, days since 1970 UTC."""
+    """Day to which a database time belongs, days since 1970 UTC."""
     return int(at_s // DAY_S)
 
 
 def charge(
     session: Session, key_id: str | None, *, new_jobs: int = 0, flights: int = 0, size_bytes: int = 0
 ) -> None:
-    """Take a share of a key's quota; call it before the rows are written that use it.
+    """Take a share of a key's quota; call it before writing the rows that use it.
 
     Rows count jobs and bytes by themselves; flights are an estimate that `settle` corrects when the job has
-    ended. Where keys are off (`key_id` is None) nothing is limited.
+    ended. If keys are off (`key_id` is None) nothing is limited.
 
     Raises
     ------
     QuotaExceeded
-        With limit and use.
+        Contains limit and use.
     """
     if key_id is None:
         return
@@ -69,7 +69,7 @@ def charge(
 
 
 def settle(session: Session, job: LeasedRow, _note: Note) -> None:
-    """Replace the estimate of a job that has ended by what it flew, on the day that it was charged to."""
+    """Replace the estimate of an ended job by its actual flights, on the day to which it was charged."""
     if job.key_id is None or job.flights_estimated == job.flights:
         return
     corrected = key_usage.c.flights + (job.flights - job.flights_estimated)
@@ -82,7 +82,7 @@ def settle(session: Session, job: LeasedRow, _note: Note) -> None:
 
 
 def usage(session: Session, key_id: str) -> Usage:
-    """Count what a key uses now."""
+    """Count the present use of a key."""
     today = usage_day(current_time(session))
     return Usage(_jobs_in_flight(session, key_id), _flights(session, key_id, today), _stored(session, key_id))
 

@@ -1,4 +1,4 @@
-"""What the key store hands out: plain frozen values. No web framework here: workers settle quotas too."""
+"""Values returned by the key store, plain and frozen. No web framework here: workers settle quotas too."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import StrEnum
 
 
 class Scope(StrEnum):
-    """What a key may be allowed to do; every route demands one of these."""
+    """Permissions of a key; every route requires one of these."""
 
     JOBS_READ = "jobs:read"
     JOBS_WRITE = "jobs:write"
@@ -22,7 +22,7 @@ EVERY_SCOPE = frozenset(Scope)
 USUAL_SCOPES = EVERY_SCOPE - {Scope.METRICS}  # metrics cover all owners: for the operator
 
 SCOPE_MEANINGS = {
-    Scope.JOBS_READ: "look at jobs, their events, results and files",
+    Scope.JOBS_READ: "view jobs, their events, results and files",
     Scope.JOBS_WRITE: "start, cancel and delete jobs; validate requests",
     Scope.DATA_READ: "read uploaded flights and identified models",
     Scope.DATA_WRITE: "upload flights; delete flights and identified models",
@@ -33,7 +33,7 @@ SCOPE_MEANINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """How much a key may use; None: no limit."""
+    """Limits of a key's use; None: no limit."""
 
     max_jobs_in_flight: int | None = None
     max_flights_per_day: int | None = None
@@ -45,7 +45,7 @@ NO_QUOTA = Quota()
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a key uses now."""
+    """Present use of a key."""
 
     jobs_in_flight: int
     flights_today: int

@@ -1,8 +1,8 @@
 """A rate limit on invalid keys: an address that keeps sending them has to wait.
 
-Nobody finds 256 random bits by trying; the limit keeps broken and hostile clients from filling the database's
-time and the audit log. Addresses often stand for many people (an office, a proxy), so a key that was valid
-from an address before is never delayed there.
+256 random bits cannot be found by trying; the limit keeps broken and hostile clients from loading the
+database and filling the audit log. An address often stands for many people (an office, a proxy), so a key
+that was valid from an address before is never delayed there.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-BURST = 10  # refusals that an address has free
-REFILL_S = 6.0  # and one more after each such time
-NOTES_BURST = 200  # refusals that are written down, from all addresses together
+BURST = 10  # refusals that an address has initially
+REFILL_S = 6.0  # s for each further one
+NOTES_BURST = 200  # refusals that are recorded, from all addresses together
 NOTES_REFILL_S = 1.0
 REMEMBERED = 10_000  # addresses, and valid keys; the longest unused are forgotten first
 
@@ -41,7 +41,7 @@ def network_of(address: str) -> str:
 
 @dataclass(slots=True)
 class TokenBucket:
-    """So many at once, then one more after each `refill_s`; it begins full."""
+    """A token bucket: a burst, then one more after each `refill_s`; it starts full."""
 
     burst: int
     refill_s: float
@@ -54,7 +54,7 @@ class TokenBucket:
         return 0 if left >= 1.0 else math.ceil((1.0 - left) * self.refill_s)
 
     def take(self, now: float) -> bool:
-        """Take one; False when there is none."""
+        """Take one token; False if there is none."""
         left = self._left(now)
         self.left, self.at = max(left - 1.0, 0.0), now
         return left >= 1.0
@@ -81,23 +81,23 @@ class RefusalLimit:
         return bucket.wait_s(self._clock())
 
     def note_refused(self, address: str) -> bool:
-        """Count an invalid key; False when there were so many that this one should not be written down."""
+        """Count an invalid key; False if there were so many that this one should not be recorded."""
         place, now = network_of(address), self._clock()
         bucket = self._buckets.get(place) or TokenBucket(BURST, REFILL_S, now)
         remember(self._buckets, place, bucket)
         return bucket.take(now) and self._notes.take(now)
 
     def note_valid(self, address: str, prefix: str) -> None:
-        """Remember a valid key, so that others' guesses from the same address do not delay it."""
+        """Remember a valid key, so that guesses from the same address do not delay it."""
         remember(self._valid, (network_of(address), prefix), None)
 
     def forget(self, address: str, prefix: str) -> None:
-        """Treat a key like any other again: it has expired or was revoked."""
+        """Forget a key that has expired or was revoked."""
         self._valid.pop((network_of(address), prefix), None)
 
 
 def remember(known: OrderedDict[Key, Value], key: Key, value: Value) -> None:
-    """Put a value into a cache of bounded size; the longest unused one gives way."""
+    """Put a value into a cache of bounded size, evicting the least recently used one."""
     known[key] = value
     known.move_to_end(key)
     if len(known) > REMEMBERED:

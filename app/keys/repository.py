@@ -17,7 +17,7 @@ from app.keys.secret import KeyText
 from app.tables import api_keys
 
 IDS_IN_ONE_QUERY = 500
-USE_NOTED_EVERY_S = 60.0  # the last use is for people who tidy up: a minute is exact enough
+USE_NOTED_EVERY_S = 60.0  # s; the last use only serves to find unused keys: a minute is precise enough
 
 COLUMNS = (
     *(column for column in api_keys.c if column.name != "secret_sha256"),
@@ -30,7 +30,7 @@ USE_IS_DUE = or_(
 
 @dataclass(slots=True)
 class StoredKey:
-    """A key with what is needed to check it."""
+    """A key with the data needed to check it."""
 
     key: ApiKey
     secret_sha256: str
@@ -44,7 +44,7 @@ def _key(row: Row[*tuple[Any, ...]]) -> ApiKey:
         owner=row.owner,
         name=row.name,
         prefix=row.prefix,
-        # a later version may have stored scopes of its own
+        # a later version may have stored unknown scopes
         scopes=frozenset(scope for scope in Scope if scope.value in row.scopes),
         quota=Quota(row.max_jobs_in_flight, row.max_flights_per_day, row.max_stored_bytes),
         created_at=moment(row.created_at),
@@ -91,7 +91,7 @@ def keys_by_id(session: Session, ids: Sequence[str]) -> Iterator[ApiKey]:
 
 
 def list_keys(session: Session, *, owner: str | None = None) -> list[ApiKey]:
-    """All keys, or those of one owner, oldest first."""
+    """List all keys, or those of one owner, oldest first."""
     query = select(*COLUMNS).order_by(api_keys.c.id)
     if owner is not None:
         query = query.where(api_keys.c.owner == owner)
@@ -99,7 +99,7 @@ def list_keys(session: Session, *, owner: str | None = None) -> list[ApiKey]:
 
 
 def revoke_key(session: Session, name: str) -> ApiKey | None:
-    """Revoke the key with this id or prefix; a revoked one stays as it is. None when there is none."""
+    """Revoke the key with this id or prefix, unless already revoked. None if there is none."""
     chosen = or_(api_keys.c.id == name, api_keys.c.prefix == name)
     session.execute(
         update(api_keys).where(chosen, api_keys.c.revoked_at.is_(None)).values(revoked_at=database_time())
@@ -109,6 +109,6 @@ def revoke_key(session: Session, name: str) -> ApiKey | None:
 
 
 def note_use(session: Session, key_id: str) -> None:
-    """Write down that the key is in use, unless another process just did."""
+    """Record that the key is in use, unless another process just did."""
     used = update(api_keys).where(api_keys.c.id == key_id, USE_IS_DUE)
     session.execute(used.values(last_used_at=database_time()))

@@ -1,4 +1,4 @@
-"""The caller's own key on the wire."""
+"""Schemas of the caller's own key."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.keys.records import Quota, Scope, Usage
 
 
 class KeyAbout(BaseModel):
-    """The key that the request was made with."""
+    """The key used for the request."""
 
     id: str = Field(examples=["key_01k0c3v9fh8x2m4n6p8q0r2s4t"])
     name: str = Field(examples=["laboratory"])
@@ -19,14 +19,14 @@ class KeyAbout(BaseModel):
 
 
 class LimitAndUse(BaseModel):
-    """One quota: what is used of it; no limit when `limit` is null."""
+    """Limit and use of one quota; no limit if `limit` is null."""
 
     used: int
     limit: int | None
 
 
 class Quotas(BaseModel):
-    """How much the key may use, and uses now."""
+    """Limits and present use of the key."""
 
     jobs_in_flight: LimitAndUse
     flights_per_day: LimitAndUse = Field(description="Since midnight UTC; running jobs by their estimate.")
@@ -43,9 +43,9 @@ class Quotas(BaseModel):
 
 
 class Me(BaseModel):
-    """Who the caller is, what it may do, and how much."""
+    """Identity, permissions and quotas of the caller."""
 
-    owner: str = Field(description="Keys of one owner see the same things.", examples=["aeroelastics"])
+    owner: str = Field(description="Keys of one owner see the same data.", examples=["aeroelastics"])
     scopes: list[Scope]
     key: KeyAbout | None = Field(description="Null if the service requires no keys.")
     quotas: Quotas | None = Field(description="Null if the service requires no keys.")

@@ -1,7 +1,7 @@
 """The text of a key: ``mid_<prefix>_<secret>``.
 
-The secret is 256 random bits, so nobody finds it by trying: a plain SHA-256 of it is enough. Slow hashes are
-for passwords, which people choose; here one would only cost every request a tenth of a second.
+The secret is 256 random bits and cannot be guessed, so a plain SHA-256 of it is sufficient. Slow hashes are
+for passwords chosen by people; here one would only cost a tenth of a second per request.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from app.identifiers import base32
 
 PREFIX_BITS, PREFIX_CHARACTERS = 40, 8
 SECRET_BITS, SECRET_CHARACTERS = 256, 52
-# the first letters let scanners of repositories and logs find keys that leaked
+# the fixed beginning lets scanners of repositories and logs find leaked keys
 FORM = re.compile(rf"mid_([0-9a-z]{{{PREFIX_CHARACTERS}}})_([0-9a-z]{{{SECRET_CHARACTERS}}})")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class KeyText:
-    """A key as its user holds it; only `prefix` may be shown or logged."""
+    """The full text of a key; only `prefix` may be shown or logged."""
 
     prefix: str  # finds the row
-    secret: str  # proves that the key is held
+    secret: str  # proves possession of the key
 
     @classmethod
     def new(cls) -> Self:
@@ -38,7 +38,7 @@ class KeyText:
 
     @classmethod
     def parsed(cls, text: str) -> Self | None:
-        """Take a key apart; None when it has not the form of one."""
+        """Parse a key; None if it does not have the form of one."""
         match = FORM.fullmatch(text)
         return None if match is None else cls(match[1], match[2])
 
@@ -47,11 +47,11 @@ class KeyText:
         return f"mid_{self.prefix}_{self.secret}"
 
     def digest(self) -> str:
-        """What is stored of the secret."""
+        """The stored digest of the secret."""
         return hashlib.sha256(self.secret.encode()).hexdigest()
 
     def matches(self, digest: str) -> bool:
-        """Whether `digest` is this secret's; takes the same time wherever they differ."""
+        """Whether `digest` belongs to this secret, compared in constant time."""
         return hmac.compare_digest(self.digest(), digest)
 
     def __repr__(self) -> str:

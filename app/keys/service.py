@@ -1,4 +1,4 @@
-"""Making and revoking keys, for the operator's command line; each is noted in the audit log."""
+"""Creates and revokes keys for the operator's command line, recorded in the audit log."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ NAME_LENGTH = 64
 
 
 class KeyRefused(ValueError):
-    """No such key can be made; the message says why."""
+    """The key cannot be created; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class NewKey:
-    """A key that was just made; `text` is shown now or never."""
+    """A newly created key; `text` is shown only once."""
 
     key: ApiKey
     text: str

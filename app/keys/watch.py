@@ -1,7 +1,7 @@
-"""Keys of requests that are under way: a waiting request is ended when its key is no longer valid.
+"""Watches the keys of open requests: a waiting request is ended when its key is no longer valid.
 
-A request is let in by its key once, and may then wait for a minute or stream for hours. One query a second
-looks at the keys of all requests under way, however many there are.
+A request is admitted by its key once, and may then wait for a minute or stream for hours. One query a second
+checks the keys of all open requests, however many there are.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from app.errors import Unauthorized
 from app.keys.records import ApiKey
 from app.keys.repository import keys_by_id
 
-LOOK_S = 1.0  # between two looks: a waiting request outlives its key by little more
+LOOK_S = 1.0  # s between checks: a waiting request outlives its key by little more
 
 logger = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ class KeyInUse:
     Parameters
     ----------
     key : ApiKey or None
-        As it was when the request was let in; None where no keys are required.
+        As it was when the request was admitted; None if no keys are required.
     """
 
     def __init__(self, key: ApiKey | None = None) -> None:
@@ -44,7 +44,7 @@ class KeyInUse:
 
     @asynccontextmanager
     async def while_valid(self) -> AsyncIterator[None]:
-        """Wait for something in the block; as soon as the key is not valid, raise as `require_valid` does."""
+        """Run the waiting block; as soon as the key is not valid, raise as `require_valid` does."""
         self.require_valid()
         try:
             async with asyncio.timeout(None) as wait:
@@ -67,7 +67,7 @@ class KeyInUse:
         return began.scopes <= now.scopes
 
     def lose(self) -> None:
-        """End whatever the request waits for."""
+        """End the request's wait."""
         self.lost = True
         now = asyncio.get_running_loop().time()
         for wait in self._waits:
@@ -75,7 +75,7 @@ class KeyInUse:
 
 
 class KeyWatch:
-    """Looks at the keys of all requests that are under way.
+    """Checks the keys of all open requests.
 
     Parameters
     ----------
@@ -91,11 +91,11 @@ class KeyWatch:
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start watching."""
         self._task = asyncio.create_task(self._run(), name="key-watch")
 
     async def stop(self) -> None:
-        """Stop looking."""
+        """Stop watching."""
         if self._task is not None:
             self._task.cancel()
             with suppress(asyncio.CancelledError):
@@ -120,7 +120,7 @@ class KeyWatch:
         try:
             found = await asyncio.to_thread(self._read, ids)
         except SQLAlchemyError as error:
-            logger.warning("cannot look at the keys of waiting requests: %s", error)
+            logger.warning("cannot check the keys of waiting requests: %s", error)
             return
         for key_id in ids:
             for in_use in tuple(self._in_use.get(key_id, ())):

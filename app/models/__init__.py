@@ -1,1 +1,1 @@
-"""Identified models as things of their own."""
+"""Identified models as resources."""

@@ -44,10 +44,10 @@ EXPORTED: dict[int | str, dict[str, Any]] = {
     },
     202: {
         "model": Job,
-        "description": "The job that writes the file; ask again.",
+        "description": "The job that writes the file; retry later.",
         "headers": {
             "Location": {"description": "The job.", "schema": {"type": "string"}},
-            "Retry-After": {"description": "When to ask again, s.", "schema": {"type": "string"}},
+            "Retry-After": {"description": "When to retry, s.", "schema": {"type": "string"}},
         },
     },
 }

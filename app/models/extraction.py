@@ -1,7 +1,7 @@
-"""Model extraction: which identified model a finished job leaves.
+"""Model extraction: finds the identified model of a finished job.
 
-That of an identification, the recommended one of a study. A model that does not fly the samples it was fitted
-to is none.
+It is the model of an identification, or the recommended one of a study. A model that cannot fly the samples
+it was fitted to does not count.
 """
 
 from __future__ import annotations

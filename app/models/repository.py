@@ -20,7 +20,7 @@ SUMMARY_COLUMNS = (models.c.id, models.c.name, models.c.job_id, models.c.links_p
 
 
 def insert_model(session: Session, job: LeasedRow, identified: Document) -> None:
-    """Store the model that a job has identified, with all that is needed to fly it again.
+    """Store the model that a job has identified, with all data needed to fly it again.
 
     It counts in the stored bytes of the job's key until it is deleted. ``identified`` has the ``model`` and
     its ``fit``; aircraft, flight and options are those of the job's request.
@@ -73,7 +73,7 @@ def delete_model(session: Session, owner: str, model_id: str) -> None:
 
 
 def get_model(session: Session, owner: str, model_id: str) -> tuple[ModelSummary, Document]:
-    """Read one model with its document; raise `ModelNotFound` where the owner has none with this id."""
+    """Read one model with its document; raise `ModelNotFound` if the owner has none with this id."""
     row = session.execute(
         select(*SUMMARY_COLUMNS, models.c.document).where(models.c.id == model_id, models.c.owner == owner)
     ).one_or_none()

@@ -1,4 +1,4 @@
-"""Identified models on the wire."""
+"""Schemas of identified models."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ModelSummary(BaseModel):
     id: str = Field(examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"])
     name: str
     links_per_wing: int | None
-    job_id: str | None = Field(description="The job that identified it, null when that was deleted.")
+    job_id: str | None = Field(description="The job that identified it; null if deleted.")
     created_at: datetime
 
 
@@ -30,7 +30,7 @@ class ModelPage(BaseModel):
 
 
 class IdentifiedModel(ModelSummary):
-    """An identified model with all that is needed to fly it."""
+    """An identified model with all data needed to fly it."""
 
     model: IdentifiedParameters
     fit: list[SampleFit]

@@ -1,4 +1,4 @@
-"""An identified model's file: the job that writes it, and what becomes of the job."""
+"""Export of an identified model: the job that writes the file, and its outcome."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ GIVEN_UP = frozenset({JobStatus.CANCELLED, JobStatus.EXPIRED})
 async def export_job(
     app: Service, caller: Caller, model_id: str, file_format: ExportFormat, wait_s: float
 ) -> Job:
-    """Find or make the job that exports a model, and wait for its end.
+    """Find or create the job that exports a model, and wait for its end.
 
-    There is one such job for each model, format and version of the program, as long as it is kept. Where it
-    was cancelled or has expired, another takes its place.
+    There is one such job for each model, format and version of the program, as long as it is kept. If it was
+    cancelled or has expired, it is replaced by a new one.
 
     Raises
     ------
     ModelNotFound
         The caller has no such model.
     InvalidInput
-        What is stored of the model cannot be exported by this version.
+        This version cannot export the stored model.
     QuotaExceeded
-        The caller's key may not have another job.
+        The quota of the caller's key does not allow another job.
     """
     request = await run_in_threadpool(_request, app, caller, model_id, file_format)
     words = f"export {VERSION} {model_id} {file_format.name}"

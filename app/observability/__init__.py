@@ -1,1 +1,1 @@
-"""What the service reports about itself: logs, metrics, traces. Shared by the API and the workers."""
+"""Logs, metrics and traces, shared by the API and the workers."""

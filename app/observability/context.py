@@ -1,4 +1,4 @@
-"""Facts that every log line of a piece of work carries: request id, job id, attempt ..."""
+"""Facts attached to every log line of a piece of work: request id, job id, attempt ..."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _facts: ContextVar[dict[str, str | int]] = ContextVar("morphid_facts")
 
 @contextmanager
 def bound(**facts: str | int | None) -> Iterator[dict[str, str | int]]:
-    """Let every line that is logged within the block carry `facts` (None is left out).
+    """Attach `facts` to every line logged within the block (None values are omitted).
 
-    Threads that begin within the block need ``contextvars.copy_context().run`` to carry them too; tasks of
-    asyncio and the framework's thread pool do so by themselves.
+    Threads started within the block need ``contextvars.copy_context().run`` to inherit them; tasks of asyncio
+    and the framework's thread pool do so by themselves.
     """
     token = _facts.set(current_facts() | {name: fact for name, fact in facts.items() if fact is not None})
     try:
@@ -24,10 +24,10 @@ def bound(**facts: str | int | None) -> Iterator[dict[str, str | int]]:
 
 
 def current_facts() -> dict[str, str | int]:
-    """What the lines that are logged here carry; a copy."""
+    """Return a copy of the facts attached here."""
     return dict(_facts.get({}))
 
 
 def current_request_id() -> str:
-    """Id of the request that is being served here; empty outside of requests."""
+    """Id of the current request; empty outside requests."""
     return str(_facts.get({}).get("request_id", ""))

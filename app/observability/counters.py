@@ -1,7 +1,7 @@
-"""Counters that survive restarts: rows that rise in the transaction of what they count.
+"""Persistent counters: rows that are incremented in the transaction of the counted event.
 
-Two workers that end their jobs at the same moment must not wait for one another's commit, so each counter is
-spread over `SHARDS` rows and a process writes to one of them; readers add them up.
+Workers that end jobs simultaneously must not wait for each other's commit, so each counter is spread over
+`SHARDS` rows and a process writes to one of them; readers add them up.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SHARDS = 16
 SHARD_MARK = "#"
 Labels = Mapping[str, str]
 
-# both databases know these words; their dialects' own INSERT would have to be imported first
+# valid in both databases; the dialects' own INSERT would have to be imported first
 RISE = text(
     "INSERT INTO counters (name, value) VALUES (:name, :by) "
     "ON CONFLICT (name) DO UPDATE SET value = counters.value + excluded.value"
@@ -36,19 +36,19 @@ class Counted:
 
 
 def written(name: str, labels: Labels | None = None) -> str:
-    """Write a counter as its rows name it: ``jobs_finished{operation=identify,status=failed}``."""
+    """Write a counter as named in its rows: ``jobs_finished{operation=identify,status=failed}``."""
     if not labels:
         return name
     return name + "{" + ",".join(f"{key}={value}" for key, value in sorted(labels.items())) + "}"
 
 
 def count(session: Session, name: str, labels: Labels | None = None, by: int = 1) -> None:
-    """Let one counter rise, in the caller's transaction."""
+    """Increment one counter, in the caller's transaction."""
     count_all(session, {written(name, labels): by})
 
 
 def count_all(session: Session, rises: Mapping[str, int]) -> None:
-    """Let several counters rise, always in the same order: transactions never wait for each other in a ring.
+    """Increment several counters, always in the same order, so that transactions cannot deadlock.
 
     Parameters
     ----------

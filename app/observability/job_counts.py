@@ -1,7 +1,7 @@
-"""What changes of jobs add to the counters, in their transaction.
+"""Counts changes of jobs, in their transaction.
 
-How long jobs wait and take are histograms over all processes, kept as counters: one per bucket, not yet added
-up.
+Waiting times and durations are histograms over all processes, stored as one counter per bucket, not yet
+cumulative.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MILLISECONDS = "_milliseconds"
 
 
 def count_change(session: Session, row: LeasedRow, note: Note) -> None:
-    """Count a change of a job; progress counts for nothing."""
+    """Count a change of a job; progress is not counted."""
     event = note.event
     if event == "progress":
         return
@@ -39,7 +39,7 @@ def count_change(session: Session, row: LeasedRow, note: Note) -> None:
     rises: dict[str, int] = {}
     if event == "started":
         rises[written(ATTEMPTS, labels)] = 1
-        if row.fence == 1:  # a job that was handed back begins its first attempt again
+        if row.fence == 1:  # a job that was handed back starts its first attempt again
             rises |= _observed(WAIT_TIME, labels, row.started_at - row.created_at)
     if event == "released":
         rises[RELEASED] = 1

@@ -1,8 +1,8 @@
-"""Log lines of the API and the workers: one event, one line, for eyes or as JSON for machines.
+"""Log lines of the API and the workers: one line per event, as readable text or as JSON.
 
-``MORPHID_LOG_FORMAT=text|json`` and ``MORPHID_LOG_LEVEL`` choose. What a line says in addition to its
-message is passed as ``extra={"facts": {...}}``; what a whole piece of work has in common comes from
-`app.observability.context`. Secrets that slip into a message are masked.
+``MORPHID_LOG_FORMAT=text|json`` and ``MORPHID_LOG_LEVEL`` select the format. Facts beyond the message are
+passed as ``extra={"facts": {...}}``; those shared by a whole piece of work come from
+`app.observability.context`. Secrets in messages are masked.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from app.documents import finite
 from app.observability.context import current_facts
 from app.observability.tracing import current_trace_id
 
-# those of others have handlers of their own: they go through ours instead
+# loggers with their own handlers: they use ours instead
 GATHERED = (
     *("uvicorn", "uvicorn.error", "uvicorn.access"),
     *("celery", "celery.task", "celery.redirected", "alembic"),
@@ -26,12 +26,12 @@ GATHERED = (
 NOISY = {
     "uvicorn.access": logging.WARNING,  # ours has route, owner and duration, and no query strings
     "celery.worker.strategy": logging.WARNING,  # "received": a message is only a hint
-    "celery.app.trace": logging.WARNING,  # "succeeded": the runner logs what became of the job
+    "celery.app.trace": logging.WARNING,  # "succeeded": the runner logs the outcome of the job
     "kombu": logging.WARNING,
     "httpx": logging.WARNING,
     "opentelemetry": logging.WARNING,
 }
-MAX_MESSAGE = 8_000  # characters; a line must not be a megabyte because somebody's field name was one
+MAX_MESSAGE = 8_000  # characters; a client's field name of a megabyte must not make a line that long
 SECRETS = (
     (re.compile(r"\b(mid_[0-9A-Za-z]+_)[0-9A-Za-z_-]+"), r"\1***"),  # API keys
     (re.compile(r"\b(whsec_)[0-9A-Za-z+/=_-]+"), r"\1***"),  # webhook secrets
@@ -48,7 +48,7 @@ def masked(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return `text` with escapes for what would move a terminal's cursor or begin a line of its own."""
+    """Return `text` with control characters and line breaks escaped."""
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
@@ -70,7 +70,7 @@ def _message(record: logging.LogRecord) -> str:
     try:
         message = record.getMessage()
     except (TypeError, ValueError):
-        message = f"{record.msg} {record.args}"  # a line with a mistake is worth more than none
+        message = f"{record.msg} {record.args}"  # a faulty line is better than none
     return masked(message)[:MAX_MESSAGE]
 
 
@@ -118,7 +118,7 @@ def make_handler(kind: str, stream: IO[str] | None = None) -> logging.Handler:
 
 
 def configure_logging(kind: str, level: str) -> None:
-    """Make this process log `kind` ("text" or "json") from `level` up, whichever library logs."""
+    """Log as `kind` ("text" or "json") from `level` up in this process, for all libraries."""
     root = logging.getLogger()
     for handler in root.handlers[:]:
         root.removeHandler(handler)

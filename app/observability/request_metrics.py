@@ -13,13 +13,13 @@ REGISTRY = CollectorRegistry()
 
 LATENCY = Histogram(
     "morphid_http_request_seconds",
-    "Time until an answer begins. waited: the caller asked to wait for a job's end (Prefer: wait).",
+    "Time until a response starts. waited: the caller chose to wait for a job's end (Prefer: wait).",
     ("method", "route", "status", "waited"),
     buckets=LATENCY_BUCKETS_S,
     registry=REGISTRY,
 )
 IN_FLIGHT = Gauge(
     "morphid_http_requests_in_flight",
-    "Requests that are being served, open event streams among them.",
+    "Requests in progress, including open event streams.",
     registry=REGISTRY,
 )

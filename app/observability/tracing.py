@@ -1,7 +1,7 @@
-"""Traces from the request to the worker (OpenTelemetry), where the operator configures them.
+"""Traces from the request to the worker (OpenTelemetry), if the operator configures them.
 
-``MORPHID_TRACES=http://collector:4318`` or OpenTelemetry's own ``OTEL_EXPORTER_OTLP_ENDPOINT`` does so.
-Otherwise nothing of OpenTelemetry's SDK is imported, and its API's tracer records nothing.
+Set ``MORPHID_TRACES=http://collector:4318`` or OpenTelemetry's own ``OTEL_EXPORTER_OTLP_ENDPOINT``. Otherwise
+OpenTelemetry's SDK is not imported, and its API's tracer records nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from app.loopback import is_loopback
 
 ENDPOINT_VARIABLES = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
 TRACES_PATH = "/v1/traces"
-FLUSH_MS = 3_000  # at the end of a process; a collector that is away must not hold it up
+FLUSH_MS = 3_000  # ms at the end of a process; an unreachable collector must not delay it
 
 Kind = Literal["server", "consumer", "internal"]
 Attributes = Mapping[str, str | int | float | bool]
@@ -48,7 +48,7 @@ def collector_address(traces: str) -> str:
 
 
 def start_tracing(service: str, traces: str, *, exporter: Any = None) -> bool:
-    """Begin to trace in this process, if configured; in a forked child, after the fork.
+    """Start tracing in this process, if configured; in a forked child, after the fork.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _session_for(address: str) -> Any:
 
 
 def stop_tracing() -> None:
-    """Send what waits, for `FLUSH_MS` at most, and trace no more."""
+    """Send what is waiting, for `FLUSH_MS` at most, and stop tracing."""
     provider = _tracing.provider
     forget_tracing()
     if provider is not None:
@@ -113,7 +113,7 @@ def stop_tracing() -> None:
 
 
 def forget_tracing() -> None:
-    """Leave a parent's tracing alone in its forked child: its threads do not live here."""
+    """Discard the parent's tracing in a forked child, where its threads do not exist."""
     _tracing.provider, _tracing.tracer = None, NoOpTracer()
 
 
@@ -138,7 +138,7 @@ def past_span(name: str, *, seconds: float, ago_s: float = 0.0, traceparent: str
 
 
 def current_traceparent() -> str | None:
-    """W3C trace context of the span that is current here, to be handed to another process."""
+    """W3C trace context of the current span, to be passed to another process."""
     carrier: dict[str, str] = {}
     TraceContextTextMapPropagator().inject(carrier)
     return carrier.get("traceparent")
@@ -151,7 +151,7 @@ def current_trace_id() -> str | None:
 
 
 def _context_of(traceparent: str | None) -> Context | None:
-    # the tracer that records nothing would pass a caller's trace on all the same
+    # even a tracer that records nothing would pass on a caller's trace
     if not traceparent or _tracing.provider is None:
         return None
     return TraceContextTextMapPropagator().extract({"traceparent": traceparent})

@@ -1,1 +1,1 @@
-"""The operations at the API: a call each, made of their descriptors."""
+"""The operations of the API: one call each, built from their descriptors."""

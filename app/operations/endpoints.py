@@ -37,7 +37,7 @@ ACCEPTED: dict[str, Any] = {
     "headers": {
         "Location": {"description": "The job.", "schema": {"type": "string"}},
         "Idempotency-Replayed": {
-            "description": "`true` when the answer repeats an earlier one.",
+            "description": "`true` if the response repeats an earlier one.",
             "schema": {"type": "string"},
         },
         "Preference-Applied": {
@@ -50,7 +50,7 @@ ACCEPTED: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """One call that starts a job: who calls, with which preferences, and the answer's headers."""
+    """One call that starts a job: the caller, its preferences, and the response headers."""
 
     app: Service
     caller: Caller
@@ -59,7 +59,7 @@ class Submission:
     wait_s: float
 
     async def accept(self, operation: Operation[Any], request: Request) -> Job:
-        """Check the request, write its job, wake a worker, and wait for the end as far as requested."""
+        """Check the request, write its job, wake a worker, and wait for the end if requested."""
         job = await run_in_threadpool(self._write, operation, request)
         headers = self.response.headers
         if job.replayed:
@@ -67,7 +67,7 @@ class Submission:
         else:
             self.app.publisher.publish(job.id)
         headers["Location"] = f"/jobs/{job.id}"
-        # the job is made: an owner with too many waiting requests is answered at once and not refused
+        # the job exists: an owner with too many waiting requests gets a response at once, not a refusal
         wait_s = self.wait_s if self.app.waits.has_room(self.caller.owner) else 0.0
         if wait_s > 0.0:
             headers["Preference-Applied"] = f"wait={wait_s:g}"
@@ -76,7 +76,7 @@ class Submission:
     def _write(self, operation: Operation[Any], request: Request) -> StoredJob:
         with self.app.database.read() as session:
             request = resolved(session, self.caller.owner, request)
-        # nothing is computed while the write transaction lasts: on SQLite everybody else waits for it
+        # nothing is computed during the write transaction: on SQLite all other writers wait for it
         document, summary = sealed(request.document()), operation.summary(request)
         flights = getattr(operation.cost(request), "flights", 1)
         terms = self._terms(operation.deadline_s(request), request.execution)
@@ -123,7 +123,7 @@ SubmissionDep = Annotated[Submission, Depends(_submission)]
 
 
 def validated(app: Service, caller: Caller, operation: Operation[Any], request: Request) -> Document:
-    """Make the checks of a submission and start nothing; report cost, place in the queue and quotas."""
+    """Check a submission without starting it; report cost, place in the queue and quotas."""
     with app.database.read() as session:
         request = resolved(session, caller.owner, request)
         place = app.queue.place_of_next(session, caller.owner, operation.name, request.execution.priority)

@@ -1,6 +1,6 @@
-"""What a request refers to by an id becomes part of it: uploaded flights, identified models, jobs' models.
+"""Resolves ids in requests to their content: uploaded flights, identified models, jobs' models.
 
-One step for all operations: wherever in a request an id stands, what it names takes its place.
+One step for all operations: every id in a request is replaced by the object it refers to.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class Reference(NamedTuple):
 
 
 def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
-    """Return the request with everything inline that it refers to.
+    """Return the request with all references inline.
 
-    Raises `InvalidInput`, which names every fault, where something does not exist or does not fit.
+    Raises `InvalidInput`, with all faults, if something does not exist or does not fit.
     """
     found = list(_references(request))
     if not found:
@@ -75,7 +75,7 @@ def resolved(session: Session, owner: str, request: AnyRequest) -> AnyRequest:
 
 
 def _references(value: object, pointer: str = "") -> Iterator[Reference]:
-    """Find every id in a request, in its order."""
+    """Find every id in a request, in order."""
     if isinstance(value, BaseModel):
         for name in type(value).model_fields:
             part = getattr(value, name)
@@ -89,7 +89,7 @@ def _references(value: object, pointer: str = "") -> Iterator[Reference]:
 
 
 def _put(document: Document, reference: Reference, found: Document) -> None:
-    """Put what was found in the place of an id; what the request itself says there has priority."""
+    """Replace an id by the object found; fields in the request itself take precedence."""
     place: Any = document
     for key in reference.at.split("/")[1:]:
         place = place[int(key)] if isinstance(place, list) else place[key]
@@ -98,7 +98,7 @@ def _put(document: Document, reference: Reference, found: Document) -> None:
 
 
 def _at_its_id(fault: Fault, references: list[Reference]) -> Fault:
-    """Name the id instead of a model that the client has not sent."""
+    """Point an error to the id instead of a model that the client has not sent."""
     for item in references:
         if item.field != "trajectory_id" and f"{fault.pointer}/".startswith(f"{item.at}/parameters/"):
             return Fault(fault.code, fault.detail, item.pointer, fault.hint)
@@ -106,9 +106,9 @@ def _at_its_id(fault: Fault, references: list[Reference]) -> Fault:
 
 
 def _require_rows(session: Session, owner: str, uploads: list[Reference], request: Request) -> None:
-    """Look whether the flights exist and are not too long, before any row is read.
+    """Check that the flights exist and are not too long, before reading any rows.
 
-    A short request may name a flight of 100,000 rows many times.
+    A short request may refer to a flight of 100,000 rows many times.
     """
     rows = trajectories.row_counts(session, owner, [item.id for item in uploads])
     faults = [
@@ -135,7 +135,7 @@ def _flight(session: Session, owner: str, reference: Reference) -> Document:
 
 
 def _of_aircraft(flight: Document, aircraft: Aircraft, pointer: str) -> Document:
-    """Leave out of a file's columns those that are no drives of the aircraft."""
+    """Omit columns of a file that are not drives of the aircraft."""
     columns = dict(flight)
     unreadable = columns.pop("unreadable", {})
     fields = {
@@ -157,13 +157,13 @@ def _model(session: Session, owner: str, reference: Reference) -> Document:
 
 
 def _model_of_job(session: Session, owner: str, reference: Reference) -> Document:
-    """Find the model that a job left, whole or as its best so far."""
+    """Find the model of a job, final or best so far."""
     job = get_job(session, owner, reference.id)
     text = jobs.result_json(session, owner, job.id)
     left = None if text is None else extracted_model(job.operation, json.loads(text))
     if left is None:
         state = "has ended" if job.finished else f"is {job.status.value}"
-        hint = "Wait for its end, or cancel it: what it has found by then is its result."
+        hint = "Wait for its end, or cancel it; its best model so far is then its result."
         fault = Fault(
             "no_model",
             f"Job {job.id} ({job.operation}) {state} and has left no model.",
@@ -175,10 +175,10 @@ def _model_of_job(session: Session, owner: str, reference: Reference) -> Documen
 
 
 def _as_given(model: Document) -> Document:
-    """Give a stored model in the form that the same parameters get when a request holds them outright.
+    """Return a stored model in the form that the same parameters have when given inline.
 
-    So a job's request, in which references are resolved, makes the same job when it is posted again. A model
-    that no request could hold any more, of an earlier version say, stays as it is.
+    So a job's request, in which references are resolved, gives the same job when posted again. A model that a
+    request can no longer contain, for example of an earlier version, stays as it is.
     """
     try:
         return Parameters.parse(model).model_dump(exclude_none=True)

@@ -1,1 +1,1 @@
-"""What strangers send, read in processes with limits; the API process sees numbers and short texts only."""
+"""Parsing of untrusted input in processes with limits; the API process sees only numbers and short texts."""

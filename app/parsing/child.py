@@ -1,6 +1,6 @@
 """The parser process: ``python -m app.parsing.child KIND MEMORY CPU WALL ROWS``, a file on its stdin.
 
-It reads one file, writes one frame (`app.parsing.frame`) and ends. Its parent is `app.parsing.pool`.
+It reads one file, writes one frame (`app.parsing.frame`) and exits. Its parent is `app.parsing.pool`.
 """
 
 from __future__ import annotations
@@ -18,18 +18,25 @@ from morphdata.samplefiles.columns import MAX_DRIVES, Wanted
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.reading import read_columns
 
-BODY = "body"  # the JSON body of a request; any other kind is a file's, from `morphdata.samplefiles.reading`
+BODY = (
+    "body"  # the JSON body of a request; other kinds are those of files, from `morphdata.samplefiles.reading`
+)
 LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("scipy.io", "scipy.io.matlab")}
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
-    """Return a file's document or columns, or what is wrong with it."""
+    """Return a file's document or columns, or its fault."""
     try:
         if kind == BODY:
             return {"document": parse_json(stream.read())}
         read = read_columns(stream, kind, wanted)
         unreadable = {name: _words(fault) for name, fault in list(read.unreadable.items())[:MAX_DRIVES]}
-        return {"columns": read.values, "candidates": read.candidates, "unreadable": unreadable}
+        return {
+            "columns": read.values,
+            "candidates": read.candidates,
+            "channels": read.channels,
+            "unreadable": unreadable,
+        }
     except MalformedBody as error:
         return {"malformed": [error.detail, error.pointer, error.hint]}
     except FileFault as fault:
@@ -51,7 +58,7 @@ def main(arguments: list[str]) -> None:
         try:
             importlib.import_module(module)
         except ImportError:
-            break  # the reader says what to install
+            break  # the reader's message says what to install
     confine(limits)
     try:
         frame = pack(answer(kind, sys.stdin.buffer, Wanted(max_rows=int(rows))))

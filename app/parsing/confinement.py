@@ -1,4 +1,4 @@
-"""What a parser process may use: memory, time, nothing to write to, nobody to call."""
+"""Limits of a parser process: memory and time; no files to write, no network."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from dataclasses import dataclass
 MIB = 2**20
 LIBRARIES_BYTES = 2**30  # address space for code and what allocators reserve without using it
 OPEN_FILES = 64
-GRACE_S = 5  # beyond the parent's patience: a parser whose parent died ends by itself
-NICE = 5  # answering requests comes first
+GRACE_S = 5  # s beyond the parent's limit: a parser whose parent died ends by itself
+NICE = 5  # niceness: responding to requests comes first
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Limits of one parser process."""
 
-    memory_bytes: int = 512 * MIB  # data of the process, libraries' own included
+    memory_bytes: int = 512 * MIB  # data of the process, including those of libraries
     cpu_s: int = 10
     wall_s: int = 20  # until the parent gives up
 
 
 def confine_time(limits: Limits) -> None:
-    """Before anything else: the process ends by itself, whatever becomes of its parent."""
+    """Limit the time of this process, even if its parent dies; call it before anything else."""
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(limits.wall_s + GRACE_S)
     _limit("RLIMIT_CPU", limits.cpu_s)
@@ -35,7 +35,7 @@ def confine_time(limits: Limits) -> None:
 
 
 def confine(limits: Limits) -> None:
-    """When the libraries are loaded and before the first byte from outside is read."""
+    """Apply the limits, after the libraries are loaded and before any input is read."""
     # data counts what is used; address space is the rough limit where the kernel does not count data
     _limit("RLIMIT_DATA", limits.memory_bytes)
     _limit("RLIMIT_AS", limits.memory_bytes + LIBRARIES_BYTES)

@@ -1,7 +1,7 @@
-"""What a parser process answers: a JSON text followed by its long lists of numbers as plain bytes.
+"""The output of a parser process: a JSON text followed by its long lists of numbers as plain bytes.
 
-The reader of a frame trusts nothing in it: every length is checked, and no more is made of it than JSON
-values and lists of numbers.
+The reader does not trust the frame: every length is checked, and only JSON values and lists of numbers are
+made from it.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ HEAD = struct.Struct("<4sII")  # magic, bytes of the JSON text, count of arrays
 ARRAY = struct.Struct("<cQ")  # type code, bytes
 WIDTHS = {b"d": 8, b"q": 8}  # float64, int64
 MIN_ARRAY = 64  # items; shorter lists stay in the JSON text
-MAX_EXCEPTIONS = 20  # of a list: items that are no numbers, kept apart so that their place can be named
-MARK = "\x00"  # key of a place holder; no text from outside holds this character
-MAX_TEXT_BYTES = 4 * 2**20  # of everything that is no number; our requests need some kilobytes
-MAX_EXACT = 2**53  # integers beyond it are no exact floats
+MAX_EXCEPTIONS = 20  # non-numeric items of a list, kept separately so that errors can name their position
+MARK = "\x00"  # key of a placeholder; input cannot contain this character
+MAX_TEXT_BYTES = 4 * 2**20  # limit for everything except numbers; our requests need a few kilobytes
+MAX_EXACT = 2**53  # larger integers are not exact as floats
 
 
 class BadFrame(ValueError):
-    """A parser's answer is not one."""
+    """A parser's output is not a valid frame."""
 
 
 def pack(value: Any) -> bytes:
-    """Make a frame of a JSON value, which may have `array` objects in the place of lists.
+    """Make a frame from a JSON value, which may have `array` objects in place of lists.
 
-    Raises `BadFrame` when what is not numbers takes more than `MAX_TEXT_BYTES`.
+    Raises `BadFrame` if the non-numeric part exceeds `MAX_TEXT_BYTES`.
     """
     arrays: list[tuple[bytes, bytes]] = []
     text = json.dumps(_skeleton(value, arrays), separators=(",", ":")).encode()
@@ -42,7 +42,7 @@ def pack(value: Any) -> bytes:
 
 
 def unpack(frame: bytes) -> Any:
-    """Read a frame; raise `BadFrame` when it is anything else."""
+    """Read a frame; raise `BadFrame` if it is invalid."""
     try:
         magic, text_bytes, count = HEAD.unpack_from(frame)
         at = HEAD.size + text_bytes
@@ -68,6 +68,8 @@ def _restored(found: dict[str, Any], arrays: list[list[Any]]) -> Any:
     if MARK not in found:
         return found
     numbers = arrays[found[MARK]]
+    for position in arrays[found["null"]] if "null" in found else ():
+        numbers[position] = None
     for position, item in found["else"]:
         numbers[position] = item
     return numbers
@@ -80,28 +82,44 @@ def _skeleton(value: Any, arrays: list[tuple[bytes, bytes]]) -> Any:
         return {key: _skeleton(item, arrays) for key, item in value.items()}
     if isinstance(value, list):
         if len(value) >= MIN_ARRAY and (found := _numbers(value)) is not None:
-            return _placed(*found, arrays)
+            numbers, nulls, exceptions = found
+            return _placed(numbers, exceptions, arrays, nulls)
         return [_skeleton(item, arrays) for item in value]
     return value
 
 
-def _placed(numbers: array[Any], exceptions: list[Any], arrays: list[tuple[bytes, bytes]]) -> dict[str, Any]:
+def _placed(
+    numbers: array[Any],
+    exceptions: list[Any],
+    arrays: list[tuple[bytes, bytes]],
+    nulls: array[Any] | None = None,
+) -> dict[str, Any]:
+    holder: dict[str, Any] = {MARK: len(arrays), "else": exceptions}
     arrays.append((numbers.typecode.encode(), numbers.tobytes()))
-    return {MARK: len(arrays) - 1, "else": exceptions}
+    if nulls:
+        holder["null"] = len(arrays)
+        arrays.append((nulls.typecode.encode(), nulls.tobytes()))
+    return holder
 
 
-def _numbers(items: list[Any]) -> tuple[array[Any], list[Any]] | None:
-    """A list as an array and the few items that are no numbers with their places; None when it is no such."""
+def _numbers(items: list[Any]) -> tuple[array[Any], array[Any], list[Any]] | None:
+    """A list as an array, the places of its nulls, and the few items that are neither with their places.
+
+    None when it is no such list.
+    """
     kinds = set(map(type, items))
+    nulls = array("q")
     if kinds == {float}:
-        return array("d", items), []
+        return array("d", items), nulls, []
     exceptions: list[Any] = []
     numbers = array("d" if float in kinds else "q")
     for position, item in enumerate(items):
         number = type(item) is float or (type(item) is int and abs(item) <= MAX_EXACT)
-        if not number:
+        if item is None:
+            nulls.append(position)
+        elif not number:
             if len(exceptions) == MAX_EXCEPTIONS or isinstance(item, (dict, list)):
                 return None
             exceptions.append([position, item])
         numbers.append(item if number else 0)
-    return numbers, exceptions
+    return numbers, nulls, exceptions

@@ -1,4 +1,4 @@
-"""Reading JSON texts: bounded work, no duplicate keys, and a sentence for whatever is wrong."""
+"""Parses JSON texts: bounded work, no duplicate keys, and a message for every error."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ MAX_VALUES = 3_000_000  # 500,000 rows of samples
 MAX_KEYS = 100  # of one object; none of ours has more than twenty
 UTF8 = "Encode the body as UTF-8, without a byte order mark."
 UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # those of UTF-32 begin with them or with zeros
-SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")  # what a text must not hold can only stand so in JSON
+SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")  # the only spellings of forbidden characters in JSON
 UNSTORABLE = re.compile(r"[\x00\ud800-\udfff]")
 
 
 def parse_json(body: bytes) -> Any:
-    """Parse a JSON text, with NaN and Infinity, which the schema refuses by the name of their field.
+    """Parse a JSON text. NaN and Infinity are accepted here; the schema refuses them by field.
 
-    Raises `MalformedBody` when it is not JSON in UTF-8, is nested too deeply, repeats a key, holds far too
-    many items, or holds a text that no database stores (half a surrogate pair, the character zero).
+    Raises `MalformedBody` if it is not JSON in UTF-8, is nested too deeply, repeats a key, has far too many
+    items, or contains text that databases cannot store (an unpaired surrogate, a null character).
     """
     if not body:
         raise MalformedBody("There is no body.", hint="Send a JSON object; /docs shows examples.")
@@ -31,7 +31,7 @@ def parse_json(body: bytes) -> Any:
     if objects > MAX_OBJECTS or lists > MAX_LISTS or values > MAX_VALUES:
         raise MalformedBody(
             f"The body holds {objects} objects, {lists} lists and {values} further values.",
-            "/samples" if b'"samples"' in body else "",  # nothing else can be that large but schedules
+            "/samples" if b'"samples"' in body else "",  # besides samples only schedules can be that large
             f"At most {MAX_VALUES} numbers a body: leave out rows (10 ms steps suffice) or upload flights.",
         )
     try:
@@ -74,7 +74,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse_unstorable(document: Any) -> None:
-    """Name the text that no database stores and no UTF-8 answer could repeat."""
+    """Refuse text that databases cannot store and UTF-8 responses cannot repeat."""
     waiting: list[tuple[str, Any]] = [("", document)]
     while waiting:
         pointer, value = waiting.pop()
@@ -83,7 +83,7 @@ def _refuse_unstorable(document: Any) -> None:
             raise MalformedBody(
                 "A string contains a null character or an unpaired surrogate.",
                 pointer,
-                "Leave it out; write characters beyond U+FFFF as they are or as a whole pair.",
+                "Remove it; write characters beyond U+FFFF directly or as a complete pair.",
             )
         if isinstance(value, dict):
             waiting += [(f"{pointer}/{token(key)}", item) for key, item in value.items()]

@@ -1,4 +1,4 @@
-"""The parsers of an API process: one process a file, a few at once, killed and reaped whatever happens."""
+"""The parser processes of an API process: one per file, a few at once, always killed and reaped."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from morphdata.samplefiles.flight import MAX_ROWS
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
 PIECE = 2**18
-QUEUE_S = 30.0  # a client that waits longer should come again later
+QUEUE_S = 30.0  # s; a client that has to wait longer should retry later
 FORMAT_FAULTS = frozenset({"unknown_format", "needs_pyarrow", "matlab_v73", "matlab_object"})
 
 logger = logging.getLogger(__name__)
 
 
 class _Unanswered(Exception):
-    """The process ended or was ended without an answer; the argument says why."""
+    """The process ended or was ended without an answer; the argument is the reason."""
 
 
 class ParserPool:
     """Starts parser processes; owners take turns.
 
-    A request that waits for a process longer than `queue_s` gets the answer that the service is busy.
+    A request that waits for a process longer than `queue_s` is refused because the service is busy.
     """
 
     def __init__(self, turns: OwnerTurns, limits: Limits, queue_s: float = QUEUE_S) -> None:
@@ -63,7 +63,7 @@ class ParserPool:
         return answer["document"]
 
     async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> FlightColumns:
-        """Read the columns of a flight and those that could be drives, SI units, by their standard names.
+        """Read the columns of a flight, its channels and what could be drives, SI units, by standard names.
 
         Parameters
         ----------
@@ -72,19 +72,24 @@ class ParserPool:
         file : binary file
             With a descriptor.
         pointer : str
-            Where faults point to: ``{pointer}/{row}/{column}``.
+            Prefix of the pointers of faults: ``{pointer}/{row}/{column}``.
         """
         try:
             answer = await self._read(owner, kind, file)
         except _Unanswered as why:
-            hint = "Send a plain file of time, drives and attitude; leave out everything else."
+            hint = "Send a plain file of time, drives and attitude only."
             raise InvalidRequest.of(
                 [Fault("unreadable_file", f"The file cannot be read: {why}.", pointer, hint)]
             ) from None
         if "fault" in answer:
             raise refusal(FileFault(*answer["fault"]), pointer)
         unreadable = {name: FileFault(*words) for name, words in answer["unreadable"].items()}
-        return FlightColumns(answer["columns"], candidates=answer["candidates"], unreadable=unreadable)
+        return FlightColumns(
+            answer["columns"],
+            candidates=answer["candidates"],
+            unreadable=unreadable,
+            channels=answer["channels"],
+        )
 
     async def _read(self, owner: str, kind: str, file: BinaryIO) -> dict[str, Any]:
         try:
@@ -100,7 +105,7 @@ class ParserPool:
 
 
 def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMediaType:
-    """Turn a file's fault into a problem of the request."""
+    """Convert a file's fault to an error of the request."""
     detail, hint = as_sentence(fault.detail), as_sentence(fault.hint)
     if fault.code in FORMAT_FAULTS:
         return UnsupportedMediaType(detail, pointer, hint)
@@ -111,7 +116,7 @@ def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMedia
 
 
 def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
-    """Run one process on `file` (any position: it is read from its beginning)."""
+    """Run one process on `file`, which is read from its beginning whatever its position."""
     file.flush()
     file.seek(0)
     os.lseek(file.fileno(), 0, os.SEEK_SET)
@@ -125,15 +130,15 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
         stderr=subprocess.DEVNULL,
         env=_environment(),
         cwd="/",
-        start_new_session=True,  # Ctrl-C is the parent's; and one signal ends whatever it started
+        start_new_session=True,  # Ctrl-C goes to the parent only, and one signal ends all descendants
     ) as process:
-        assert process.stdout is not None  # noqa: S101 - a pipe was asked for
+        assert process.stdout is not None  # noqa: S101 - a pipe was requested
         try:
             frame = _drained(process.stdout, started + limits.wall_s)
             process.wait(max(0.1, started + limits.wall_s - time.monotonic()))
             found: dict[str, Any] = unpack(frame)
         except (BadFrame, TimeoutError, subprocess.TimeoutExpired) as error:
-            exit_code = process.poll()  # None: it lives, and is ended below
+            exit_code = process.poll()  # None: it is alive, and is ended below
             logger.warning(
                 "a parser of %s gave no answer: %s, exit %s", kind, type(error).__name__, exit_code
             )
@@ -148,7 +153,7 @@ def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
 
 
 def _drained(pipe: Any, deadline: float) -> bytes:
-    """Read a pipe to its end; raise BadFrame when it is too much, TimeoutError when it takes too long."""
+    """Read a pipe to its end; raise BadFrame if it is too long, TimeoutError if it takes too long."""
     found = bytearray()
     ready = select.poll()
     ready.register(pipe, select.POLLIN | select.POLLHUP)
@@ -178,7 +183,7 @@ def _reason(error: Exception, exit_code: int | None) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """No secret of the service, and libraries that keep to one thread and the system's own allocator."""
+    """Environment without secrets, with single-threaded libraries and the system's allocator."""
     return {
         "PATH": os.defpath,
         "LC_ALL": "C.UTF-8",

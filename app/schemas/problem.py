@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 
 class ProblemFault(BaseModel):
-    """One thing that is wrong in the request."""
+    """One fault of the request."""
 
     code: str = Field(description="Stable, for programs.", examples=["sweep_out_of_range"])
     detail: str = Field(description="For people.")
@@ -18,7 +18,7 @@ class ProblemFault(BaseModel):
 
 
 class QuotaUse(BaseModel):
-    """The quota that has no room."""
+    """The exhausted quota."""
 
     name: str = Field(examples=["jobs_in_flight"])
     limit: int
@@ -27,7 +27,7 @@ class QuotaUse(BaseModel):
 
 
 class Problem(BaseModel):
-    """What went wrong, where, and what to do."""
+    """What went wrong, where, and how to fix it."""
 
     type: str = Field(
         description="Identifies the kind of problem.", examples=["urn:morphid:problem:invalid_request"]
@@ -38,7 +38,8 @@ class Problem(BaseModel):
     code: str = Field(description="Stable, for programs.", examples=["invalid_request"])
     instance: str = Field(description="Path of the request.")
     request_id: str = Field(
-        default="", description="As in the header `X-Request-ID`: leads to this request in the service's log."
+        default="",
+        description="As in the header `X-Request-ID`; identifies the request in the log.",
     )
     pointer: str = Field(default="", description="The first field at fault, as in `errors`.")
     hint: str = Field(default="", description="What to do about it.")

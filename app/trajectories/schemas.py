@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.base import SampleName
+from morphdata.channels import document_name
 from morphdata.drives import SWEEPS
 from morphdata.faults import Fault
 from morphdata.samplefiles.columns import MAX_DRIVES
@@ -18,8 +19,8 @@ from morphdata.samples import EXAMPLE_SAMPLE, TrajectoryColumns
 UNREADABLE: Any = Field(
     default={},
     max_length=MAX_DRIVES,
-    description="Columns of the file that could be drives and could not be read, and why: a request whose "
-    "aircraft has such a drive is refused.",
+    description="Columns of the file that could be drives, or are channels, and could not be read, and why: "
+    "a request whose aircraft has such a drive is refused.",
 )
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,45}$")]
 Reason = Annotated[str, Field(max_length=500)]
@@ -50,11 +51,14 @@ class TrajectoryUpload(TrajectoryColumns):
             )
 
     def columns(self) -> dict[str, Any]:
-        """Return what is stored: the columns in s and rad, and what could not be read."""
+        """Return what is stored: the columns in SI units, and what could not be read."""
         fields = self.model_dump(exclude={"name", "unreadable"}, exclude_none=True)
         for key, field in self.drive_fields.items():
             del fields[field]
             fields[f"{key}_rad"] = self.drives[key]
+        for column, field in self.channel_fields.items():
+            del fields[field]
+            fields[document_name(column)] = self.channels[column]
         return fields | ({"unreadable": self.unreadable} if self.unreadable else {})
 
 
@@ -80,12 +84,13 @@ class TrajectoryPage(BaseModel):
 class Trajectory(TrajectorySummary):
     """An uploaded flight with its rows.
 
-    Every further column that could be a drive has its own field, `fold_left_rad`.
+    Every further column that could be a drive has its own field, `fold_left_rad`, and every measured channel,
+    `p_rad_s`, with null where a value is missing.
     """
 
     model_config = ConfigDict(extra="allow")
 
-    __pydantic_extra__: dict[str, list[float]] = Field(init=False)
+    __pydantic_extra__: dict[str, list[float | None]] = Field(init=False)
 
     time_s: list[float]
     sweep_left_rad: list[float] | None = None

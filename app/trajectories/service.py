@@ -15,7 +15,9 @@ from app.keys.quota import charge
 from app.parsing.pool import refusal
 from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
+from morphdata.channels import document_name
 from morphdata.faults import Fault, InvalidInput
+from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.columns import MAX_DRIVES, FlightColumns
 from morphdata.samplefiles.fault import FileFault, as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
@@ -41,6 +43,7 @@ def upload_of(flight: FlightColumns, filename: str, name: str | None) -> Traject
     if faults:
         raise InvalidRequest.of(faults)
     named: dict[str, Any] = {_field(key): values for key, values in columns.items()}
+    named |= {document_name(key): with_gaps(values) for key, values in flight.channels.items()}
     unreadable = list(flight.unreadable.items())[:MAX_DRIVES]
     try:
         return TrajectoryUpload(

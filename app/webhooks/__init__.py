@@ -1,1 +1,1 @@
-"""Webhooks: messages to an address of the owner when a job ends."""
+"""Webhooks: messages to a URL of the owner when a job ends."""

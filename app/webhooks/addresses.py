@@ -1,7 +1,7 @@
-"""Which addresses a webhook may have: nothing inside this machine or its networks is ever connected to.
+"""Permitted webhook addresses: this machine and its networks are never contacted.
 
-A name is looked up once per try and the connection goes to the address that was checked, so that a name whose
-address changes between check and use gains nothing.
+A name is resolved once per try and the connection goes to the checked address, so that changing the address
+between check and use has no effect.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Resolver = Callable[[str, int], list[str]]
 
 MAX_URL = 2000
 DEFAULT_PORTS = {"https": 443, "http": 80}
-LOWEST_PORT = 1024  # below are mail, SSH and the like; of those only HTTPS's own
-LOOKUP_S = 3.0  # at creation; the sender has its own limit
-MAX_LOOKUPS = 32  # at once; a name server that does not answer must not eat the process's threads
+LOWEST_PORT = 1024  # lower ports are for mail, SSH and the like; only HTTPS is allowed there
+LOOKUP_S = 3.0  # s at creation; the sender has its own limit
+MAX_LOOKUPS = 32  # concurrent look-ups; an unresponsive name server must not use up the threads
 HOST = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9._-]{0,251}[A-Za-z0-9_])?\.?")
-# as a last label: an address in disguise, 127.1 or 0x7f000001
+# as a last label: a disguised address, 127.1 or 0x7f000001
 NUMBER = re.compile(r"(?:\d+|0[xX][0-9A-Fa-f]*)")
 NAT64 = ipaddress.ip_network("64:ff9b::/96")
 GLOBAL_UNICAST_6 = ipaddress.ip_network("2000::/3")
@@ -44,15 +44,15 @@ NEVER = tuple(
 
 
 class AddressRefused(Exception):
-    """The address is not one that webhooks are sent to; the message says why."""
+    """Webhooks are not sent to this address; the message says why."""
 
     hint = "Give an https address that can be reached from the public internet."
 
 
 class HostNotListed(AddressRefused):
-    """The operator has listed the hosts that webhooks may go to, and this is not one of them."""
+    """The host is not on the operator's list of webhook hosts."""
 
-    hint = "Ask the operator to name the host in MORPHID_WEBHOOK_DIAL_ONLY."
+    hint = "Ask the operator to add the host to MORPHID_WEBHOOK_DIAL_ONLY."
 
 
 def is_public(address: Address) -> bool:
@@ -74,7 +74,7 @@ def is_public(address: Address) -> bool:
 
 
 def look_up(host: str, port: int) -> list[str]:
-    """Every address of `host` that the system's resolver knows."""
+    """Return all addresses of `host` from the system's resolver."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return list(dict.fromkeys(str(entry[4][0]) for entry in found))
 
@@ -83,7 +83,7 @@ _lookups = threading.BoundedSemaphore(MAX_LOOKUPS)
 
 
 def destination_of(url: str) -> str:
-    """Scheme, host and port of a URL that was checked: what is reached or not, whatever the path."""
+    """Scheme, host and port of a checked URL, which determine reachability, whatever the path."""
     parts = urlsplit(url)
     return f"{parts.scheme}://{(parts.hostname or '').rstrip('.')}:{_port(parts)}"
 
@@ -103,7 +103,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class AddressPolicy:
-    """What addresses webhooks may have.
+    """Rules for webhook addresses.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class AddressPolicy:
     resolve : callable
         ``(host, port) -> addresses``; raises OSError for a name that is not known.
     dial_only : frozenset of str
-        ``host`` or ``host:port``, as a URL names them: no other host is contacted. Empty: any.
+        ``host`` or ``host:port``, as written in URLs; no other host is contacted. Empty: any.
     """
 
     allow_private: bool = False
@@ -120,7 +120,7 @@ class AddressPolicy:
     dial_only: frozenset[str] = frozenset()
 
     def check_url(self, url: str) -> SplitResult:
-        """Check what can be seen without a look-up."""
+        """Check everything that does not need name resolution."""
         if len(url) > MAX_URL or not url.isascii() or re.search(r"[\x00-\x20\x7f\\]", url):
             raise AddressRefused(f"A URL has at most {MAX_URL} characters, all ASCII, without spaces.")
         try:
@@ -179,16 +179,16 @@ class AddressPolicy:
         return Target(parts.geturl(), (parts.hostname or "").rstrip("."), tuple(addresses))
 
     def check_now(self, url: str) -> None:
-        """Check a URL with what its name resolves to now; a name that is not known yet passes."""
+        """Check a URL with its present addresses; a name that cannot be resolved yet passes."""
         parts = self.check_url(url)
         try:
             found = self._look_up(parts).result(LOOKUP_S)
-        except OSError:  # also that it took too long
-            return  # the first try will show: see the webhook's deliveries
+        except OSError:  # also raised on a timeout
+            return  # the first try will show it in the webhook's deliveries
         self._checked(parts, found)
 
     async def target(self, url: str) -> Target:
-        """Look the name up, once, and return where to connect to.
+        """Resolve the name, once, and return the target of the connection.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class AddressPolicy:
         return self._checked(parts, await asyncio.wrap_future(self._look_up(parts)))
 
     def _look_up(self, parts: SplitResult) -> Future[list[str]]:
-        """Look up in a daemon thread, which nobody waits for: the system's resolver has no time limit."""
+        """Resolve in a daemon thread that is never joined: the system's resolver has no time limit."""
         future: Future[list[str]] = Future()
         if not _lookups.acquire(blocking=False):
             future.set_exception(OSError("too many names are being looked up"))
@@ -215,7 +215,7 @@ class AddressPolicy:
             finally:
                 _lookups.release()
             if not future.set_running_or_notify_cancel():
-                return  # nobody waits for it any more
+                return  # the caller has given up
             if isinstance(found, OSError):
                 future.set_exception(found)
             else:

@@ -1,11 +1,12 @@
-"""SQL of the sender: claims with a fence and a lease, and what became of a try.
+"""SQL of the sender: claims with a fence and a lease, and the outcomes of tries.
 
-A claim takes a delivery and, with it, its destination: scheme, host and port, of one owner. There is one try
-under way for each, and after a failure it is left alone for a while, whatever else waits for it. Another
-owner's deliveries to the same place go their own way: nobody can silence another's receiver.
+A claim takes a delivery together with its destination: scheme, host and port, per owner. There is one try at
+a time for each destination, and after a failure it pauses for a while, whatever else is waiting for it. Other
+owners' deliveries to the same place are independent, so no owner can block another's receiver.
 
-Any number of senders may share the table: a claim is a compare-and-set on the fence, and a stale claim writes
-nothing but a success. Locks are taken in one order, the webhooks of a destination before their deliveries.
+Any number of senders may share the table: a claim is a compare-and-set on the fence, and a stale claim can
+only record a success. Locks are always taken in the same order, the webhooks of a destination before their
+deliveries.
 """
 
 from __future__ import annotations
@@ -26,19 +27,23 @@ from app.webhooks.outbox import CHALLENGE_EVENT, DELIVERED, GIVEN_UP, WAITING
 from app.webhooks.posting import Answer
 from app.webhooks.retries import MAX_TRIES, next_delay_s
 
-Clock = Callable[[], ColumnElement[float]]  # an SQL expression: the database's time unless a test says other
+Clock = Callable[
+    [], ColumnElement[float]
+]  # an SQL expression: the database's time, unless a test replaces it
 
-LEASE_S = 60.0  # far beyond the patience with one receiver and one commit
+LEASE_S = 60.0  # s; far longer than one try and one commit can take
 GONE_REASON = "The receiver answered 410 Gone: it refuses further messages."
 DISABLED = "The webhook was disabled."
-NEVER_SETTLED = "Every sender stopped before the outcome of its try was known."
-MAX_CLAIMS = MAX_TRIES + 5  # more: senders die over this delivery
+NEVER_SETTLED = "All senders stopped before the outcome of their try was known."
+MAX_CLAIMS = (
+    MAX_TRIES + 5
+)  # after more tries without an outcome, the delivery itself is assumed to kill senders
 MAX_ERROR = 300
 
 DELIVERIES = LeasedTable(
     webhook_deliveries,
     key=(webhook_deliveries.c.id,),
-    lease=webhook_deliveries.c.next_at,  # a delivery whose lease has ended is due again: nobody need reap it
+    lease=webhook_deliveries.c.next_at,  # a delivery whose lease has ended is due again; no reaper is needed
     waiting=WAITING,
     held=(WAITING,),
     ends=(DELIVERED, GIVEN_UP),
@@ -54,7 +59,7 @@ DELIVERIES = LeasedTable(
 
 @dataclass(frozen=True, slots=True)
 class Due:
-    """A delivery whose time has come, as a sender saw it."""
+    """A due delivery, as read by a sender."""
 
     id: str
     fence: int
@@ -73,7 +78,7 @@ class Dispatch:
     url: str
     secret: str
     payload: Document
-    tries: int  # with the one that this claim is for
+    tries: int  # including the one of this claim
     fence: int
     at: float  # of the claim, s since 1970 UTC
 
@@ -84,7 +89,7 @@ class Dispatch:
 
     @property
     def challenge(self) -> str | None:
-        """What the receiver must answer with; None where any 2xx will do."""
+        """The value that the receiver must return; None if any 2xx is sufficient."""
         if self.payload["type"] != CHALLENGE_EVENT:
             return None
         return str(self.payload["data"]["challenge"])
@@ -97,14 +102,14 @@ def due(
     under_way: Mapping[str, int] | None = None,
     clock: Clock = database_time,
 ) -> list[Due]:
-    """Deliveries whose time has come, the longest waiting of each free destination.
+    """Due deliveries: the longest waiting one of each free destination.
 
-    There are at most `per_owner` of one owner, those `under_way` (number by owner) included: many slow
-    receivers do not hold up the others.
+    At most `per_owner` of one owner, including those `under_way` (number by owner), so that many slow
+    receivers do not delay other owners.
     """
     table, now = webhook_deliveries, clock()
     its_time = (table.c.status == WAITING, table.c.next_at <= now)
-    # one step down an index for each webhook, however much waits for it, and one in all when nothing does
+    # one index step for each webhook, however much is waiting, and one in all if nothing is
     first = select(table.c.id).where(table.c.webhook_id == webhooks.c.id, *its_time)
     first = first.order_by(table.c.next_at, table.c.id).limit(1).correlate(webhooks)
     free = (
@@ -132,8 +137,8 @@ def due(
 def claim(
     session: Session, chosen: Collection[Due], lease_s: float = LEASE_S, clock: Clock = database_time
 ) -> list[Dispatch]:
-    """Take those of the chosen deliveries that no other sender has taken since, and their destinations."""
-    # in one order for all senders: none waits for another in a ring
+    """Claim those of the chosen deliveries that no other sender has taken since, with their destinations."""
+    # in the same order for all senders, to avoid deadlocks
     inorder = sorted(chosen, key=lambda item: (item.owner, item.destination))
     return [taken for seen in inorder if (taken := _claim(session, seen, lease_s, clock)) is not None]
 
@@ -154,7 +159,7 @@ def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatc
     hook = hooks[row.webhook_id]
     closed = hook.disabled_at is not None or (hook.verified_at is None and row.type != CHALLENGE_EVENT)
     if closed or row.attempt > MAX_CLAIMS:
-        # closed: its job ended in the moment in which the webhook was disabled
+        # closed: its job ended just as the webhook was disabled
         _give_up(session, webhook_deliveries.c.id == seen.id, DISABLED if closed else NEVER_SETTLED, clock)
         return None
     _set_hooks(session, hooks, sending_until=now + lease_s)
@@ -175,9 +180,9 @@ def _claim(session: Session, seen: Due, lease_s: float, clock: Clock) -> Dispatc
 def settle(
     session: Session, dispatch: Dispatch, answer: Answer, *, rng: Random, clock: Clock = database_time
 ) -> str | None:
-    """Write what became of a try: delivered, to be tried again, or given up; and free the destination.
+    """Record the outcome of a try: delivered, to be tried again, or given up; and free the destination.
 
-    Returns the delivery's status now; None when the claim is stale, and nothing was written.
+    Returns the delivery's new status; None if the claim is stale and nothing was written.
     """
     hooks = _locked(session, dispatch.owner, dispatch.destination)
     hook = hooks.get(dispatch.webhook_id)
@@ -185,7 +190,7 @@ def settle(
         *DELIVERIES.at(dispatch.key), webhook_deliveries.c.fence == dispatch.fence
     )
     if hook is not None and session.scalar(held) is None:
-        return None  # the destination, too, is another sender's now
+        return None  # the destination also belongs to another sender now
     _set_hooks(session, hooks, sending_until=0.0)
     if hook is None:
         return None  # deleted, and its deliveries with it
@@ -207,7 +212,7 @@ def settle(
 
 
 def _locked(session: Session, owner: str, destination: str) -> dict[str, Row[Any, Any]]:
-    """An owner's webhooks to a destination, by id, locked but for jobs that end at this moment."""
+    """An owner's webhooks to a destination, by id, locked, but not against jobs that are just ending."""
     rows = session.execute(
         select(webhooks)
         .where(webhooks.c.owner == owner, webhooks.c.destination == destination)
@@ -218,7 +223,7 @@ def _locked(session: Session, owner: str, destination: str) -> dict[str, Row[Any
 
 
 def release(session: Session, dispatch: Dispatch, clock: Clock = database_time) -> None:
-    """Give a claim back: the sender stops before it knows the answer. The try is not counted."""
+    """Release a claim because the sender stops before it knows the outcome. The try is not counted."""
     hooks = _locked(session, dispatch.owner, dispatch.destination)
     if DELIVERIES.give_back(session, dispatch, next_at=clock()) is not None:
         _set_hooks(session, hooks, sending_until=0.0)
@@ -232,7 +237,7 @@ def _write(
     next_at: ColumnElement[float] | None,
     clock: Clock,
 ) -> bool:
-    # a success counts even where the delivery was given up meanwhile: the receiver has it
+    # a success counts even if the delivery was given up meanwhile: the receiver has it
     former = (WAITING, GIVEN_UP) if status == DELIVERED else (WAITING,)
     changed = DELIVERIES.settle(
         session,
@@ -250,10 +255,11 @@ def _write(
 def _count_failure(
     session: Session, hooks: dict[str, Row[Any, Any]], tried: Row[Any, Any], answer: Answer, clock: Clock
 ) -> None:
-    """Count a failed try, and disable whose count is full.
+    """Count a failed try, and disable webhooks that reach the limit.
 
-    An answer is one webhook's own. Where there was none, the destination failed, and with it every webhook
-    that has something to send there: a dead host with twenty webhooks is tried no oftener than with one.
+    A response concerns one webhook only. Without a response the destination failed, and with it every webhook
+    that has something to send there, so a dead host with twenty webhooks is tried no more often than with
+    one.
     """
     failed = {tried.id}
     if answer.status is None:
@@ -272,13 +278,13 @@ def _count_failure(
 
 
 def disable(session: Session, webhook_id: str, reason: str, clock: Clock = database_time) -> None:
-    """Send nothing more to a webhook; what waits for it is given up."""
+    """Send nothing more to a webhook; its waiting deliveries are given up."""
     _set_hooks(session, [webhook_id], disabled_at=clock(), disabled_reason=reason[:200])
     give_up_waiting(session, webhook_id, DISABLED, clock)
 
 
 def give_up_waiting(session: Session, webhook_id: str, why: str, clock: Clock = database_time) -> None:
-    """Give up what waits for a webhook."""
+    """Give up the waiting deliveries of a webhook."""
     lock_waiting(session, webhook_id)
     _give_up(session, webhook_deliveries.c.webhook_id == webhook_id, why, clock)
 

@@ -50,9 +50,9 @@ WebhookId = Annotated[str, Path(pattern=ID_PATTERN, examples=[EXAMPLE_WEBHOOK])]
     responses=documented(MalformedBody, BodyTooLarge, UnsupportedMediaType, InvalidRequest, TooManyWebhooks),
 )
 def create_webhook(app: ServiceDep, caller: CallerDep, request: WebhookRequest) -> NewWebhook:
-    """Register an address; the answer holds the secret that signs every message, this once.
+    """Register an address; only this response contains the secret that signs every message.
 
-    The webhook is `pending` until its receiver has answered the `webhook.challenge` that it is sent at once.
+    The webhook is `pending` until its receiver answers the `webhook.challenge`, which is sent at once.
     Messages follow Standard Webhooks. Each end of a job is sent at least once, in no fixed order.
     """
     service.check_address(app.webhook_policy, request.url)
@@ -76,7 +76,7 @@ def list_webhooks(app: ServiceDep, owner: OwnerDep) -> WebhookList:
     responses=documented(InvalidRequest, WebhookNotFound),
 )
 def get_webhook(app: ServiceDep, owner: OwnerDep, webhook_id: WebhookId) -> Webhook:
-    """Address, events, and why it is disabled if it is."""
+    """Address, events and, if it is disabled, the reason."""
     with app.database.read() as session:
         return repository.get_webhook(session, owner, webhook_id)
 
@@ -102,7 +102,7 @@ def delete_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) ->
     responses=documented(InvalidRequest, WebhookNotFound),
 )
 def enable_webhook(app: ServiceDep, caller: CallerDep, webhook_id: WebhookId) -> Webhook:
-    """Challenge the receiver of a disabled or pending webhook anew; with its answer the webhook is enabled.
+    """Challenge the receiver of a disabled or pending webhook again; its answer enables the webhook.
 
     Jobs that ended meanwhile are not reported: list them.
     """
@@ -143,7 +143,7 @@ def list_webhook_deliveries(
         return repository.list_deliveries(session, owner, webhook_id, cursor=cursor, limit=limit)
 
 
-messages = APIRouter(tags=["webhooks"])  # not served: what receivers are sent, for the OpenAPI document
+messages = APIRouter(tags=["webhooks"])  # not served: messages to receivers, for the OpenAPI document
 
 
 @messages.post(

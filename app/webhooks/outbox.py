@@ -24,13 +24,13 @@ TEST_EVENT = "webhook.test"
 CHALLENGE_EVENT = "webhook.challenge"
 CHALLENGE_BYTES = 24
 ERROR_MEMBERS = ("code", "detail", "hint")
-MAX_DETAIL = 1000  # characters of an error's sentence; the job itself has all of it
+MAX_DETAIL = 1000  # characters of an error message; the job itself keeps the whole
 
 
 def note_end(session: Session, row: LeasedRow, _note: Note) -> None:
     """Write one delivery for each of the owner's webhooks that has subscribed to this end of a job."""
     event = f"job.{row.status}"
-    # key share: a webhook that is being deleted at this moment must not take the job's end down with it
+    # key share: a webhook that is just being deleted must not make the job's end fail
     hooks = session.execute(
         select(webhooks.c.id, webhooks.c.events)
         .where(
@@ -51,7 +51,7 @@ def note_end(session: Session, row: LeasedRow, _note: Note) -> None:
 
 
 def new_delivery(webhook_id: str, event: str, payload: Document, *, job_id: str | None = None) -> Document:
-    """Columns of a delivery that waits to be sent at once."""
+    """Columns of a delivery to be sent at once."""
     return {
         "id": new_identifier("msg"),
         "webhook_id": webhook_id,
@@ -82,7 +82,7 @@ def note_message(session: Session, webhook_id: str, event: str, **data: str) -> 
 
 
 def forget_ended(session: Session, older_than_s: float) -> int:
-    """Delete deliveries that ended longer ago; return how many there were."""
+    """Delete deliveries that ended longer ago; return their number."""
     return session.execute(
         delete(webhook_deliveries).where(
             webhook_deliveries.c.status.in_((DELIVERED, GIVEN_UP)),

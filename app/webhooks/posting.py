@@ -1,4 +1,4 @@
-"""One POST to a receiver that may be anybody: pinned address, verified name, no redirect, little patience."""
+"""One POST to an untrusted receiver: pinned address, verified name, no redirects, short timeouts."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from morphdata.version import VERSION
 if TYPE_CHECKING:
     import httpx
 
-MAX_ANSWER_BYTES = 64 * 1024  # read so that the receiver can finish its sentence, and thrown away
-MAX_ADDRESSES = 3  # of a name, tried one after the other
+MAX_ANSWER_BYTES = 64 * 1024  # bytes read, so that the receiver can finish its response, and discarded
+MAX_ADDRESSES = 3  # addresses of a name, tried one after the other
 GONE = 410
 NOT_ECHOED = "The receiver did not answer with the challenge."
 
@@ -37,15 +37,15 @@ class Timeouts:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of one try."""
+    """The outcome of one try."""
 
-    status: int | None  # of HTTP; None when there was no answer
-    error: str | None = None  # why the try failed, in a sentence that holds nothing of what the receiver said
+    status: int | None  # of HTTP; None if there was no response
+    error: str | None = None  # why the try failed, without quoting the receiver
     retry_after_s: float | None = None  # as the receiver requested
 
     @property
     def delivered(self) -> bool:
-        """Whether the receiver took the message."""
+        """Whether the receiver accepted the message."""
         return self.status is not None and self.error is None
 
     @property
@@ -59,7 +59,7 @@ NO_ANSWER = Answer(None, "No address was tried.")
 
 @dataclass(slots=True)
 class _Heard:
-    """What a receiver has said so far."""
+    """The response received so far."""
 
     answer: Answer = NO_ANSWER
     content: bytearray = field(default_factory=bytearray)
@@ -78,16 +78,16 @@ class Poster:
 
     @cached_property
     def _trust(self) -> ssl.SSLContext:
-        import httpx  # lazy, here and below: most processes have nothing to send
+        import httpx  # lazy, here and below: most processes never send webhooks
 
-        # its lines would hold the receivers' addresses, with what is secret in their queries
+        # its lines would contain the receivers' addresses, with secrets in their queries
         logging.getLogger("httpx").setLevel(logging.WARNING)
         return self.trust or httpx.create_ssl_context()
 
     async def post(
         self, url: str, headers: Mapping[str, str], body: bytes, *, challenge: str | None = None
     ) -> Answer:
-        """Send one message; every failure is an answer, never an exception.
+        """Send one message; every failure is returned, never raised.
 
         A message with a `challenge` is delivered only to a receiver that answers ``{"challenge": "..."}``.
         """
@@ -100,7 +100,7 @@ class Poster:
         except (AddressRefused, OSError, ValueError, httpx.HTTPError, httpx.InvalidURL) as error:
             if heard.answer is NO_ANSWER:
                 return Answer(None, _why(error))
-        # also of a receiver that sent its status, and then dripped or broke off
+        # also for a receiver that sent its status and then trickled or broke off
         if challenge is not None and heard.answer.delivered and not _echoes(heard.content, challenge):
             return replace(heard.answer, error=NOT_ECHOED)
         return heard.answer
@@ -110,9 +110,9 @@ class Poster:
         import httpx
 
         url = httpx.URL(target.url)
-        client = httpx.AsyncClient(  # for this message only: the next one is looked up and checked anew
+        client = httpx.AsyncClient(  # for this message only: the next one is resolved and checked again
             verify=self._trust,
-            trust_env=False,  # a proxy would connect to an address that nobody checked
+            trust_env=False,  # a proxy would connect to an unchecked address
             follow_redirects=False,
             timeout=httpx.Timeout(self.timeouts.read_s, connect=self.timeouts.connect_s),
             headers={
@@ -156,7 +156,7 @@ def _echoes(content: bytearray, challenge: str) -> bool:
 
 
 def _why(failure: Exception) -> str:
-    """Say why there was no answer, with nothing of what the receiver said."""
+    """Explain why there was no response, without quoting the receiver."""
     import httpx
 
     if isinstance(failure, AddressRefused):

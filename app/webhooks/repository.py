@@ -66,7 +66,7 @@ def insert_webhook(session: Session, owner: str, url: str, events: list[str], se
 
 
 def count_webhooks(session: Session, owner: str) -> int:
-    """Count the owner's webhooks; until the transaction ends nobody else counts or makes any of them."""
+    """Count the owner's webhooks; a lock blocks other counts and creations until the transaction ends."""
     session.execute(insert_new(session, owners).values(owner=owner).on_conflict_do_nothing())
     session.execute(select(owners.c.owner).where(owners.c.owner == owner).with_for_update())
     count = session.scalar(select(func.count()).select_from(webhooks).where(webhooks.c.owner == owner))
@@ -94,12 +94,12 @@ def delete_webhook(session: Session, owner: str, webhook_id: str) -> None:
     mine = (webhooks.c.id == webhook_id, webhooks.c.owner == owner)
     if session.scalar(select(webhooks.c.id).where(*mine).with_for_update()) is None:
         raise WebhookNotFound(webhook_id)
-    lock_waiting(session, webhook_id)  # as senders do it: no two wait for each other
+    lock_waiting(session, webhook_id)  # in the same order as senders, to avoid deadlocks
     session.execute(delete(webhooks).where(*mine))
 
 
 def reopen_webhook(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """Forget a webhook's failures and its receiver's answer; what still waits for it is given up."""
+    """Reset a webhook's failures and its receiver's answer; its waiting deliveries are given up."""
     row = session.execute(
         update(webhooks)
         .where(webhooks.c.id == webhook_id, webhooks.c.owner == owner)
@@ -123,7 +123,7 @@ def list_deliveries(
 
 
 def get_delivery(session: Session, delivery_id: str) -> Delivery:
-    """Read a delivery that this very transaction has written."""
+    """Read a delivery written in this transaction."""
     row = session.execute(select(webhook_deliveries).where(webhook_deliveries.c.id == delivery_id)).one()
     return _delivery(row)
 

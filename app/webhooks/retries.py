@@ -1,8 +1,8 @@
-"""When a delivery that failed is tried again, and how long its destination is left alone.
+"""When a failed delivery is tried again, and how long its destination pauses.
 
-Both wait by the same table, a delivery by its own tries and a destination by the failures in a row. Nothing
-is sent to a destination while it waits, so a dead one sees no more than `MAX_TRIES` tries, however many jobs
-end, and is given up after 18 minutes.
+Both use the same table of delays, a delivery by its own tries and a destination by its consecutive failures.
+Nothing is sent to a pausing destination, so a dead one sees at most `MAX_TRIES` tries, however many jobs end,
+and is given up after 18 minutes.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from email.utils import parsedate_to_datetime
 from random import Random
 
 DELAYS_S = (5.0, 30.0, 120.0, 300.0, 600.0)  # after the first try, the second, ...
-MAX_TRIES = len(DELAYS_S) + 1  # of a delivery; so many failures in a row disable a webhook
-JITTER = 0.2  # of the delay either way: a receiver that comes back is not met by all at once
-MAX_RETRY_AFTER_S = 600.0  # a receiver may ask for patience, but not for ever
+MAX_TRIES = len(DELAYS_S) + 1  # of a delivery; as many consecutive failures disable a webhook
+JITTER = 0.2  # random share of the delay, so that a recovering receiver is not hit by all at once
+MAX_RETRY_AFTER_S = 600.0  # upper limit for a delay requested by a receiver
 
 
 def next_delay_s(tries: int, retry_after_s: float | None, rng: Random) -> float | None:
     """Time to the next try, s, after `tries` tries (at least one); None when there is none.
 
-    What the receiver requested (`retry_after_s`) can only make the time longer.
+    The receiver's request (`retry_after_s`) can only increase the delay.
     """
     if tries >= MAX_TRIES:
         return None

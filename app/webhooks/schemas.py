@@ -1,4 +1,4 @@
-"""Webhooks on the wire."""
+"""Schemas of webhooks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EVERY_EVENT: list[JobEvent] = ["job.succeeded", "job.failed", "job.cancelled", "
 
 
 class WebhookRequest(Document):
-    """Where to report which ends of jobs."""
+    """Address and events of a new webhook."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"url": EXAMPLE_URL, "events": ["job.succeeded", "job.failed"]}]}
@@ -41,7 +41,7 @@ class WebhookRequest(Document):
 
 
 class Webhook(BaseModel):
-    """An address to which ends of jobs are reported."""
+    """An address that is notified when jobs end."""
 
     id: str = Field(examples=[EXAMPLE_WEBHOOK])
     url: str = Field(examples=[EXAMPLE_URL])
@@ -53,9 +53,9 @@ class Webhook(BaseModel):
     enabled: bool = Field(description="Whether `status` is `enabled`.")
     disabled_at: datetime | None
     disabled_reason: str | None = Field(
-        description="Why the webhook is disabled; enable it after the receiver is repaired."
+        description="Why the webhook is disabled; enable it once the receiver works again."
     )
-    failures: int = Field(description="Tries that failed since the last success.")
+    failures: int = Field(description="Failed tries since the last success.")
     created_at: datetime
 
 
@@ -108,7 +108,7 @@ class MessageError(BaseModel):
 
 
 class MessageLinks(BaseModel):
-    """Where the parts of the job are, from the root of this service."""
+    """Links to the parts of the job, relative to the root of this service."""
 
     self: str
     result: str
@@ -127,14 +127,14 @@ class MessageData(BaseModel):
 
 
 class ChallengeData(BaseModel):
-    """What the receiver must answer with."""
+    """The value that the receiver must return."""
 
     webhook_id: str = Field(examples=[EXAMPLE_WEBHOOK])
     challenge: str = Field(examples=[EXAMPLE_CHALLENGE])
 
 
 class Challenge(BaseModel):
-    """What a new or disabled webhook is sent before anything else."""
+    """The message sent to a new or disabled webhook before anything else."""
 
     type: Literal["webhook.challenge"]
     timestamp: datetime
@@ -148,7 +148,7 @@ class ChallengeAnswer(BaseModel):
 
 
 class Message(BaseModel):
-    """What a webhook is sent when a job has ended."""
+    """The message sent to a webhook when a job has ended."""
 
     type: JobEvent
     timestamp: datetime = Field(description="When the job ended.")

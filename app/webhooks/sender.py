@@ -1,6 +1,6 @@
-"""The sender: takes deliveries whose time has come and posts them, in a thread of the API process.
+"""The sender: claims due deliveries and posts them, in a thread of the API process.
 
-It has its own event loop: a slow receiver, a handshake or a busy database never holds up the API.
+It has its own event loop: a slow receiver, a handshake or a busy database never delays the API.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from app.webhooks.addresses import AddressPolicy
 from app.webhooks.deliveries import Clock, Dispatch
 from app.webhooks.posting import Answer, Poster, Timeouts
 
-STOP_S = 1.0  # what is under way may end; then it is given back and sent again by the next process
+STOP_S = 1.0  # s for tries in progress to end; the rest is released and sent again by the next process
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class SenderSettings:
-    """How a sender works."""
+    """Settings of a sender."""
 
     policy: AddressPolicy = field(default_factory=AddressPolicy)
     trust: ssl.SSLContext | None = None
     timeouts: Timeouts = field(default_factory=Timeouts)
-    poll_s: float = 1.0  # between two looks at the table
-    max_at_once: int = 16  # deliveries under way
-    max_per_owner: int = 4  # of these
+    poll_s: float = 1.0  # s between two checks of the table
+    max_at_once: int = 16  # concurrent deliveries
+    max_per_owner: int = 4  # of these, per owner
     lease_s: float = deliveries.LEASE_S
     clock: Clock = database_time
     rng: Random = field(default_factory=SystemRandom)
 
 
 def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) -> dict[str, str]:
-    """Headers by which the receiver knows sender, message and time (https://www.standardwebhooks.com).
+    """Headers that let the receiver verify sender, message and time (https://www.standardwebhooks.com).
 
     The message's id is the same in every try, so that the receiver can skip what it has seen; the timestamp
     (s since 1970 UTC) is that of the try.
@@ -59,7 +59,7 @@ def signed_headers(secret: str, message_id: str, timestamp: float, body: bytes) 
 
 
 class WebhookSender:
-    """Sends what waits in the outbox."""
+    """Sends the waiting deliveries of the outbox."""
 
     def __init__(self, database: Database, settings: SenderSettings) -> None:
         self._database = database
@@ -72,14 +72,14 @@ class WebhookSender:
         self._wake: asyncio.Event | None = None
 
     def start(self) -> None:
-        """Begin to send, in a thread of its own."""
+        """Start sending, in a separate thread."""
         self._thread = threading.Thread(
             target=asyncio.run, args=(self.run(),), name="webhook-sender", daemon=True
         )
         self._thread.start()
 
     def stop(self, patience_s: float = 2 * STOP_S + 1.0) -> None:
-        """End within a second or two; what is not done stays in the table."""
+        """Stop within a second or two; unfinished deliveries stay in the table."""
         self._stopping.set()
         loop, wake = self._loop, self._wake
         if loop is not None and wake is not None and not loop.is_closed():
@@ -104,7 +104,7 @@ class WebhookSender:
             await self._wind_down()
 
     async def send_due(self) -> int:
-        """Send what is due now, once each, and return how many tries were made."""
+        """Send the deliveries that are due now, once each, and return the number of tries."""
         tries = 0
         while begun := await self._begin():
             tries += begun
@@ -112,7 +112,7 @@ class WebhookSender:
         return tries
 
     async def _begin(self) -> int:
-        """Claim as many deliveries as there is room for, and begin to send them."""
+        """Claim as many deliveries as there are free slots, and start sending them."""
         room = self._settings.max_at_once - len(self._under_way)
         if room <= 0:
             return 0
@@ -134,7 +134,7 @@ class WebhookSender:
             logger.error("webhook delivery %s broke the sender", dispatch.id, exc_info=error)
 
     def _take(self, room: int, under_way: Counter[str]) -> list[Dispatch]:
-        """Look, and only when there is something to send, write."""
+        """Read, and write only if there is something to send."""
         chosen = self._settings
         with self._database.read() as session:
             found = deliveries.due(session, room, chosen.max_per_owner, under_way, chosen.clock)
@@ -150,8 +150,8 @@ class WebhookSender:
             answer = await self._poster.post(dispatch.url, headers, body, challenge=dispatch.challenge)
             status = await asyncio.to_thread(self._settle, dispatch, answer)
         except SQLAlchemyError as error:
-            # the claim's lease ends, and the delivery is sent again under the same id
-            logger.warning("cannot write what became of delivery %s: %s", dispatch.id, error)
+            # when the lease ends, the delivery is sent again under the same id
+            logger.warning("cannot record the outcome of delivery %s: %s", dispatch.id, error)
             return
         logger.info("webhook delivery %s, try %d: %s", dispatch.id, dispatch.tries, answer.error or status)
 
@@ -161,7 +161,7 @@ class WebhookSender:
             return deliveries.settle(session, dispatch, answer, rng=chosen.rng, clock=chosen.clock)
 
     async def _wind_down(self) -> None:
-        """Let what is under way end, for a moment; give the rest back."""
+        """Let tries in progress end, for a moment; release the rest."""
         if not self._under_way:
             return
         await asyncio.wait(set(self._under_way), timeout=STOP_S)

@@ -18,7 +18,7 @@ SECRET_BYTES = 32  # Standard Webhooks requires 24 to 64
 
 
 def check_address(policy: AddressPolicy, url: str) -> None:
-    """Refuse an address that nothing would be sent to; looks the name up, so not inside a transaction."""
+    """Refuse an address that webhooks may not use; resolves the name, so call it outside transactions."""
     try:
         policy.check_now(url)
     except AddressRefused as error:
@@ -26,7 +26,7 @@ def check_address(policy: AddressPolicy, url: str) -> None:
 
 
 def new_secret() -> str:
-    """Make a secret in the form that libraries of Standard Webhooks take."""
+    """Make a secret in the form used by libraries of Standard Webhooks."""
     return "whsec_" + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
 
 
@@ -41,7 +41,7 @@ def create(session: Session, owner: str, request: WebhookRequest) -> NewWebhook:
 
 
 def enable(session: Session, owner: str, webhook_id: str) -> Webhook:
-    """Challenge the receiver of a disabled or pending webhook anew; leave an enabled one as it is."""
+    """Challenge the receiver of a disabled or pending webhook again; an enabled one is unchanged."""
     hook = repository.get_webhook(session, owner, webhook_id)
     if not hook.enabled:
         hook = repository.reopen_webhook(session, owner, webhook_id)

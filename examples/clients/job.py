@@ -1,4 +1,4 @@
-"""What all clients share: post a request, poll its job, fetch the result."""
+"""Functions shared by all clients: post a request, poll its job, fetch the result."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLUMNS = {
 
 
 def service_at(url: str) -> httpx.Client:
-    """Open a client; a service that demands keys gets the one in MORPHID_API_KEY."""
+    """Open a client, with the key in MORPHID_API_KEY for a service that requires keys."""
     key = os.environ.get("MORPHID_API_KEY")
     headers = {"Authorization": f"Bearer {key}"} if key else {}
     # a service on this machine is never reached through a proxy, whatever http_proxy and ALL_PROXY say
@@ -47,11 +47,11 @@ def sample(name: str, role: str) -> dict[str, Any]:
 
 
 def run(service: httpx.Client, operation: str, body: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Start an operation and wait for its end; give the job and its result.
+    """Start an operation and wait for its end; return the job and its result.
 
     Raises
     ------
-    SystemExit : the request is refused or the job does not succeed; says why.
+    SystemExit : the request is refused or the job does not succeed; with the reason.
     """
     answer = service.post(f"/{operation}", json=body)
     if answer.is_error:

@@ -26,7 +26,7 @@ def main(url: str = "http://127.0.0.1:8000", folder: str = "client-output") -> N
             "morph": {"final_rad": 1.0, "duration_s": 2.0, "knots": 6, "settle_s": 2.0},
             "limits": {"max_rate_rad_s": 1.0},
             "search": search,
-            "verify": "none",  # leave it out to have the schedules flown in the flexible model too
+            "verify": "none",  # omit this to fly the schedules in the flexible model too
         }
         _, result = run(service, "optimize", optimisation)
     save(result, folder)

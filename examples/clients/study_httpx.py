@@ -1,4 +1,4 @@
-"""Ask how many links per wing a model should have. Usage: study_httpx.py [URL] [FOLDER]."""
+"""Find how many links per wing a model should have. Usage: study_httpx.py [URL] [FOLDER]."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ INDEX = "ix_webhook_deliveries_webhook_id_status_next_at_id"
 
 
 def upgrade() -> None:
-    """Apply; webhooks that are there already have shown that somebody wants their messages."""
+    """Apply; existing webhooks have already shown that their receivers want the messages."""
     op.add_column("webhooks", sa.Column("destination", sa.String(300), nullable=False, server_default=""))
     for name in ("sending_until", "paused_until"):
         column = sa.Column(name, sa.Double(), nullable=False, server_default=sa.text("0"))

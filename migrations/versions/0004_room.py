@@ -1,4 +1,4 @@
-"""Room: models count in quotas, ended jobs keep no state, lists have indexes, and SQLite gives pages back."""
+"""Storage: models count in quotas, ended jobs keep no state, lists have indexes, and SQLite frees pages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def upgrade() -> None:
 
 
 def _drop_state_of_ended_jobs() -> None:
-    """Nobody goes on with them; what they keep is counted anew, events included."""
+    """Delete the state of ended jobs, which never continue, and recount their sizes, events included."""
     ended = f"(SELECT id FROM jobs WHERE status IN {ENDED})"  # noqa: S608 - constants of this file
     for table in ("job_checkpoints", "job_chunks"):
         op.execute(f"DELETE FROM {table} WHERE job_id IN {ended}")  # noqa: S608 - as above

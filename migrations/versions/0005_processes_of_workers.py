@@ -1,4 +1,4 @@
-"""Which process a worker is, so that one that has died is not taken for one that hangs."""
+"""Process id of a worker, so that a dead one is not mistaken for one that hangs."""
 
 from __future__ import annotations
 

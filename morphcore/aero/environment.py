@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 FOOT_M = 0.3048
 LOW_ALTITUDE_FT = 1000.0  # MIL-F-8785C: below it the low-altitude model,
 HIGH_ALTITUDE_FT = 2000.0  # above this one isotropic turbulence, linear in between
-LOWEST_ALTITUDE_FT = 10.0  # the low-altitude scales shrink to nothing at the ground; the model begins here
+LOWEST_ALTITUDE_FT = 10.0  # m; the low-altitude scales shrink to zero at the ground, so the model starts here
 HIGH_SCALE_FT = 1750.0  # MIL-F-8785C, section 3.7.2.1: all three scales of the Dryden form
 LOW_INTENSITY = 0.1  # MIL-F-8785C, section 3.7.3.4: sigma_w over the mean wind at 20 ft
 SLOW, FAST = np.sqrt(3.0), 1.0 - np.sqrt(3.0)  # (1 + sqrt3 s) / (1 + s)^2 = SLOW / (1 + s) + FAST / (1 + s)^2
@@ -32,7 +32,7 @@ def air_velocity(
 
     Parameters
     ----------
-    times : (k,) rising, s.
+    times : (k,) increasing, s.
     rng : source of the turbulence; the same state gives the same air.
 
     Returns
@@ -41,11 +41,11 @@ def air_velocity(
 
     Raises
     ------
-    InvalidInput : the times do not rise, or turbulence is asked for without a generator.
+    InvalidInput : the times do not increase, or turbulence is requested without a generator.
     """
     t = np.asarray(times, dtype=np.float64)
     if t.ndim != 1 or not np.all(np.isfinite(t)) or np.any(np.diff(t) <= 0.0):
-        raise InvalidInput("times are not a rising list", hint="sort them and leave out doubles")
+        raise InvalidInput("times are not strictly increasing", hint="sort them and remove duplicates")
     velocity_N = np.tile(np.asarray(flight.wind_N, dtype=np.float64), (t.size, 1))
     if environment.gust is not None:
         velocity_N += gust_velocity(environment.gust, flight.airspeed_m_s, t)
@@ -95,7 +95,7 @@ def turbulence_velocity(
 
     u: sqrt(2 L / (pi V)) / (1 + s); v, w: sqrt(L / (pi V)) (1 + sqrt3 s) / (1 + s)^2, with s the frequency
     times L / V (MIL-F-8785C, section 3.7.1.2). The filters start in their stationary state and are stepped by
-    their exact discretisation, so that steps of any length, even or not, give the right spectrum.
+    their exact discretisation, so that the spectrum is right for steps of any length, even or not.
     """
     sigma, length = turbulence_scales(turbulence, flight.altitude_m)
     steps = np.diff(times)[:, None] * flight.airspeed_m_s / length  # in time constants
@@ -126,7 +126,7 @@ def _covariance(step: Array) -> Array:
 
 
 def _factor(covariance: Array) -> Array:
-    """Lower Cholesky factors (..., 2, 2), for tiny steps too, where rounding can spoil the last pivot."""
+    """Lower Cholesky factors (..., 2, 2); robust for tiny steps, where rounding can spoil the last pivot."""
     l11 = np.sqrt(covariance[..., 0, 0])
     l21 = covariance[..., 0, 1] / l11
     l22 = np.sqrt(np.maximum(covariance[..., 1, 1] - l21**2, 0.0))

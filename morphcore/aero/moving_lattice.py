@@ -1,8 +1,7 @@
 """Air loads of a lattice that rides on moving sections, with Jones' lag on every circulation.
 
-The lattice is placed where the sections are (`place`), which computes its influence afresh, and then answers
-to any velocities of the sections (`section_forces`): within the iterations of one time step they change, the
-place does not.
+The lattice is placed on the sections (`place`), which recomputes its influence. It then gives the forces for
+any velocities of the sections (`section_forces`): in the iterations of a time step only these change.
 """
 
 from __future__ import annotations
@@ -26,10 +25,11 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Riders:
-    """What of a lattice rides on which section (k sections, c ring corners, r panels, t strips).
+    """Which parts of a lattice ride on which section (k sections, c ring corners, r panels, t strips).
 
-    corner, control, drag : (c,), (r,), (t,) the section that each ring corner, control point and strip's drag
-    rides on. corner_arm, control_arm, drag_arm : (.., 3) their place in section axes, m. drag_area : (t,)
+    corner, control, drag : (c,), (r,), (t,) the section that carries each ring corner, control point and
+    strip's drag. corner_arm, control_arm, drag_arm : (.., 3) their positions in section axes, m. drag_area :
+    (t,)
     profile drag coefficient times area, m^2. lag_time : (2, r) both time constants of Jones' function, s.
     """
 
@@ -45,7 +45,7 @@ class Riders:
 
 
 class MovingLattice:
-    """A lattice on its sections; keeps the normal influence of its last place.
+    """A lattice on its sections; stores the normal influence of its last place.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class MovingLattice:
         self.parts = lattice_parts(table, riders, core, density, mach)
         self.at = lattice_place(self.parts, riders.sections, table.corners)
         self._rings = table.rings
-        self._factors: Any = None  # of `lu_factor`, once asked for in this place
+        self._factors: Any = None  # of `lu_factor`, computed on first use in this place
 
     def place(self, R_BS: Array, x_B: Array, stream_B: Array) -> None:
         """Put the lattice on its sections: R_BS (k, 3, 3) to B, x_B (k, 3) m; wake along stream_B (3,)."""
@@ -79,7 +79,7 @@ class MovingLattice:
         return np.asarray(lu_solve(self._factors, right, check_finite=False))
 
     def section_forces(self, lagged: Array, twists: Array, wind_B: Array) -> Array:
-        """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,)."""
+        """Force vectors (k, 6) on the sections, in their axes, for the acting circulations (r,)."""
         out = np.empty((self.at.R_BS.shape[0], 6))
         section_forces(self.parts, self.at, lagged, twists, wind_B, 0.0, out)
         return out
@@ -88,7 +88,7 @@ class MovingLattice:
 def lattice_parts(
     table: RingTable, riders: Riders, core: VortexCore, density: float, mach: float
 ) -> LatticeParts:
-    """What of a riding lattice never changes, as its kernels take it."""
+    """The constant parts of a riding lattice, in the form that its kernels take."""
     radius = table.core_radius_m(core)
     ring = (
         np.concatenate([table.edge_plus, table.leg_plus]),

@@ -1,16 +1,16 @@
-r"""The lattice of a whole aircraft, reduced to what the links feel of it.
+r"""The lattice of a whole aircraft, reduced to an operator on the links' motion.
 
 With the lattice frozen on the undeformed surfaces (at their hinge angles) and its wake along a fixed
 direction, the circulations are linear in the normal velocity of the structure, and on a flat link that
 velocity is ``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the
-strips to five numbers for each strip (the rows that aero/kernels/loads.py lists), from which the forces on
-all bound edges follow.
+strips to five numbers for each strip (rows as listed in aero/kernels/loads.py), from which the forces on all
+bound edges follow.
 
 Kutta-Joukowski on a ring of circulation G in the flow U = induced velocity - velocity of the structure:
 
-- In a flow that a rigid motion makes, a *closed* ring feels no net force but the moment rho G A (n x U). Only
-  the rings of the trailing edge are open there (wake and last edge cancel), which leaves the force rho G_te U
-  x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, ``S = sum G_i A_i`` and ``X =
+- In the flow of a rigid motion, a *closed* ring experiences no net force, only the moment rho G A (n x U).
+  Only the rings at the trailing edge are open (wake and last edge cancel), which leaves the force rho G_te U
+x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, ``S = sum G_i A_i`` and ``X =
   sum G_i A_i x_i``.
 - The normal velocity on the edges gives the forces in the plane of the surface. They are products of
   circulation and induced velocity, both distributed along the chord; here the induced velocity of a strip is
@@ -42,10 +42,10 @@ BODY_AFT = (-1.0, 0.0, 0.0)  # direction of the frozen wake in B: the free strea
 
 @dataclass(frozen=True)
 class AircraftLattice:
-    """The undeformed lattices of all surfaces, what was asked of them, and their numbering.
+    """The undeformed lattices of all surfaces, their settings and their numbering.
 
-    images : mirror images of the surfaces, where these are one half of a symmetric aircraft: they induce
-        velocities and have no outputs of their own. table : rings of the surfaces, then of the images.
+    images : mirror images of the surfaces if these are one half of a symmetric aircraft. They induce
+    velocities but have no outputs of their own. table : rings of the surfaces, then of the images.
     """
 
     aircraft: Aircraft
@@ -140,7 +140,7 @@ def lattice_operator(
     )
     induced = np.einsum("pa,arp->pr", normal, velocity)  # normal velocity, (points, rings)
     rings = lattice.rings
-    if lattice.images:  # an image's circulation is its original's
+    if lattice.images:  # an image has the circulation of its original
         induced = induced[:, :rings] + induced[:, rings:]
     circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
     downwash = induced[rings:] @ circulation

@@ -1,10 +1,10 @@
-"""Vortex-ring lattice of any number of surfaces in general position: numbering and influence.
+"""Vortex-ring lattice of any number of surfaces in any position: numbering and influence.
 
-The lattice takes ring corners, control points and local air velocities as they come, deformed or not; it
-knows nothing of links, beams or hinges. Conventions: all vectors in B (forward, right, down); *flow* is the
-velocity of the air relative to the structure without what the lattice itself induces, m/s (for a body at rest
-in a head wind V it is (-V, 0, 0)); the circulation of a ring (m^2/s) is positive where it lifts, toward -z of
-the wing, on both sides.
+The lattice takes any ring corners, control points and local air velocities, deformed or not; it is
+independent of links, beams and hinges. Conventions: all vectors in B (forward, right, down); *flow* is the
+velocity of the air relative to the structure, excluding the velocity induced by the lattice itself, m/s (for
+a body at rest in a head wind V it is (-V, 0, 0)); the circulation of a ring (m^2/s) is positive where it
+lifts, toward -z of the wing, on both sides.
 
 Source: Katz & Plotkin (2001), chapter 12.
 """
@@ -30,23 +30,23 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class RingTable:
-    """Which edge belongs to which rings and panels: all of a lattice that deformation leaves alone.
+    """Topology of a lattice, unaffected by deformation: which edge belongs to which rings and panels.
 
-    Corners, rings and edges of all surfaces are numbered through: surface by surface; within one, corners
-    ``i * (spanwise + 1) + j``, rings and panels ``i * spanwise + j`` (row i from the leading edge, strip j
-    from the root); edges first the rings' fronts (i, j) from root to tip, then the chordwise ones (i, j),
-    front to aft.
+    Corners, rings and edges of all surfaces are numbered consecutively, surface by surface. Within a surface,
+    corners are ``i * (spanwise + 1) + j``, rings and panels ``i * spanwise + j`` (row i from the leading
+    edge, strip j from the root); edges first the rings' fronts (i, j) from root to tip, then the chordwise
+    ones (i, j), front to aft.
 
     Attributes (c corners, r rings, e bound edges, l wake legs, s surfaces)
     ----------
     edge_start, edge_end : (e,) corners of each bound edge.
-    edge_plus, edge_minus : (e,) the ring whose circulation runs along the edge and the one against it; -1:
-        none.
-    edge_panel : (e, 2) the panels that carry the edge's force in equal parts (one panel twice at root, tip,
-        fronts).
+    edge_plus, edge_minus : (e,) the ring whose circulation runs along the edge, and the one against it; -1:
+    none.
+    edge_panel : (e, 2) the panels that carry the edge's force in equal parts (the same panel twice at root,
+    tip and fronts).
     leg_start, leg_plus, leg_minus : (l,) trailing-edge corner and rings of each wake leg.
     edge_surface, leg_surface : (e,), (l,) surface of each edge and leg.
-    panel_size_m, mean_chord_m : (s,) of each surface, to which the two laws of the core are referred.
+    panel_size_m, mean_chord_m : (s,) of each surface, the reference lengths of the two core laws.
     ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
     panel_surface, panel_row : (r,) surface and row of each panel.
     panel_side : (r,) +1 on right surfaces, -1 on left ones.
@@ -92,7 +92,7 @@ class RingTable:
 
 
 def ring_table(lattices: Sequence[SurfaceLattice]) -> RingTable:
-    """Number the corners, rings and edges of some surfaces through."""
+    """Number the corners, rings and edges of some surfaces consecutively."""
     parts: list[dict[str, NDArray[Any]]] = []
     corner, ring = 0, 0
     for index, lattice in enumerate(lattices):
@@ -111,7 +111,7 @@ def influence(
     core: VortexCore = DEFAULT_CORE,
     mach: float = 0.0,
 ) -> Array:
-    """Velocity that every ring of unit circulation, with its straight wake, induces at every point.
+    """Velocity induced at every point by every ring of unit circulation with its straight wake.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def influence(
     Raises
     ------
     UnsupportedRegime : the Mach number is beyond 0.7.
-    InvalidInput : the corners are not those of the table.
+    InvalidInput : the number of corners differs from the table's.
     """
     u_B = np.asarray(wake_direction_B, dtype=np.float64)
     u_B = u_B / np.sqrt(u_B @ u_B)
@@ -182,7 +182,7 @@ def prandtl_glauert(mach: float) -> float:
 
 
 def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) -> dict[str, NDArray[Any]]:
-    """The part of a RingTable that one surface contributes; ``corner`` and ``ring`` are its first numbers."""
+    """One surface's part of a RingTable; ``corner`` and ``ring`` are its first numbers."""
     rows, strips = lattice.chordwise, lattice.spanwise
     corners = corner + np.arange((rows + 1) * (strips + 1)).reshape(rows + 1, strips + 1)
     rings = ring + np.arange(rows * strips).reshape(rows, strips)
@@ -197,7 +197,7 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
     leg_plus, leg_minus = inboard[-1], outboard[-1]
     bordering = np.stack([inboard.ravel(), outboard.ravel()], axis=1)
     bordering = np.where(bordering < 0, bordering[:, ::-1], bordering)
-    if lattice.span_sign < 0:  # its strips run to the left: lifting circulation runs from tip to root
+    if lattice.span_sign < 0:  # the strips run to the left, so lifting circulation runs from tip to root
         plus, minus = minus, plus
         leg_plus, leg_minus = leg_minus, leg_plus
     start = np.concatenate([corners[:-1, :-1].ravel(), corners[:-1].ravel()])

@@ -13,12 +13,14 @@ from morphdata.samplefiles.csv_table import write_table
 Document = dict[str, Any]
 
 ANGLES = ("phi_rad", "theta_rad", "psi_rad")
-SWEEPS = ("sweep_left", "sweep_right")  # of documents that do not name their drives
+SWEEPS = ("sweep_left", "sweep_right")  # drives of documents that do not name them
 MODELS = ("measured", "rigid", "initial", "identified")
-LONGEST_STEM = 100  # characters: with prefix and ending a file name stays below the limits of file systems
+LONGEST_STEM = (
+    100  # characters: with prefix and extension a file name stays within the limits of file systems
+)
 DEFAULT_STEM = "sample"
 CURVE_DIGITS = 9  # a nanoradian of an attitude of one radian
-SCHEDULE_DIGITS = 12  # a schedule's second differences stay right when it is flown from the file
+SCHEDULE_DIGITS = 12  # keeps a schedule's second differences accurate when it is flown from the file
 STUDY_COLUMNS = (
     "links_per_wing",
     "bodies",
@@ -32,16 +34,16 @@ STUDY_COLUMNS = (
 
 
 def file_stems(names: Iterable[str]) -> list[str]:
-    """Parts of file names for samples: letters, digits, dots, dashes and underscores, all different.
+    """File name stems for samples: letters, digits, dots, dashes and underscores, all different.
 
-    Names that are plain already stay as they are, so that curves and plots are found under the sample's name.
+    Names that are already plain are kept, so that curves and plots are found under the sample's name.
     """
     stems: list[str] = []
     taken: set[str] = set()
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("._-")[:LONGEST_STEM] or DEFAULT_STEM
         stem, number = plain, 2
-        while stem.lower() in taken:  # some file systems take Sample and sample for one
+        while stem.lower() in taken:  # some file systems do not distinguish Sample from sample
             stem, number = f"{plain}-{number}", number + 1
         taken.add(stem.lower())
         stems.append(stem)
@@ -59,7 +61,7 @@ def curve_tables(curves: Document) -> dict[str, bytes]:
 
     Returns
     -------
-    Columns time_s, the drives, then ``<model>_<angle>_rad``. Where a flight diverged its cells are empty.
+    Columns time_s, the drives, then ``<model>_<angle>_rad``. Cells after a divergence are empty.
     """
     samples = curves["samples"]
     stems = file_stems(str(sample["name"]) for sample in samples)
@@ -111,13 +113,13 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
 
 def drive_columns(document: Document) -> list[str]:
-    """Names of the columns of a sample's or a flight's drives, those of which there are any."""
+    """Names of the columns of a sample's or a flight's drives, as far as they exist."""
     names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
     return [name for name in names if name in document]
 
 
 def study_table(document: Document) -> bytes:
-    """Write a study's rows with the units of the document; what is not known is empty."""
+    """Write a study's rows with the units of the document; unknown values are empty."""
     rows = document["rows"]
     recommended = (document.get("recommended") or {}).get("links_per_wing")
     columns = {name: [row.get(name) for row in rows] for name in STUDY_COLUMNS}

@@ -1,4 +1,4 @@
-"""Pieces that all figures share: panels over time, quiet axes, titles and numbers, files without dates."""
+"""Parts shared by all figures: panels over time, flat axes, titles and numbers, files without dates."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ Array = NDArray[np.float64]
 Document = dict[str, Any]
 
 ANGLES = (("phi_rad", "roll φ"), ("theta_rad", "pitch θ"), ("psi_rad", "yaw ψ"))
-# Okabe & Ito's palette: told apart by colour-blind eyes; line styles differ too, for print without colour
+# Okabe & Ito's palette, distinguishable for colour-blind readers; line styles differ too, for print
 BLUE, VERMILION, GREEN, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9"
 INK, GRID = "0.15", "0.88"
 
-SILENT_RAD = 1e-6  # an angle that stays below is round-off, not motion
+SILENT_RAD = 1e-6  # an angle that stays below this is round-off, not motion
 SILENT_SPAN_DEG = 0.1  # half the height of the axis on which it is drawn, as a flat line
-LEGEND_HEAD_IN, TITLE_HEAD_IN = 0.62, 0.36  # above the panels: for title and legend, for a title alone
+LEGEND_HEAD_IN, TITLE_HEAD_IN = 0.62, 0.36  # inches above the panels: for title and legend, for a title only
 PNG_DPI = 110
 LONGEST_TITLE = 70  # characters
-MAX_POINTS = 4000  # of a curve: more than the pixels of a page
-HASH_SALT = "morphid"  # element ids in SVG depend on nothing else
+MAX_POINTS = 4000  # points of a curve: more than the pixels of a page
+HASH_SALT = "morphid"  # the only input of element ids in SVG
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _drawing = threading.Lock()
@@ -48,9 +48,9 @@ _drawing = threading.Lock()
 
 
 def stack(figure: Figure, heights: Sequence[float], head_in: float = LEGEND_HEAD_IN) -> list[Axes]:
-    """Panels of the given relative heights, one above the other, with a common abscissa.
+    """Stack panels of the given relative heights with a common abscissa.
 
-    ``head_in`` is left free above them, inches.
+    ``head_in`` : free space above them, inches.
     """
     inches = float(figure.get_figheight())
     grid = figure.add_gridspec(
@@ -70,7 +70,7 @@ def stack(figure: Figure, heights: Sequence[float], head_in: float = LEGEND_HEAD
 
 
 def label_axis(axes: Axes, text: str) -> None:
-    """Name an ordinate (quantity, unit) and give it plain numbers, a light grid and no box."""
+    """Label an ordinate (quantity, unit), with plain numbers, a light grid and no box."""
     axes.set_ylabel(text, fontsize=9)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
     axes.ticklabel_format(axis="y", style="plain", useOffset=False)
@@ -80,14 +80,14 @@ def label_axis(axes: Axes, text: str) -> None:
 
 
 def light_grid(axes: Axes) -> None:
-    """A light grid behind the lines and no frame at the right and the top."""
+    """Draw a light grid behind the lines, and no frame on the right and at the top."""
     axes.grid(visible=True, which="major", linewidth=0.4, color=GRID)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
 
 
 def time_axis(figure: Figure, rows: Sequence[Axes], time_s: Array) -> None:
-    """The abscissa of a stack of panels, named below the last."""
+    """Set the abscissa of a stack of panels, labelled below the last."""
     for axes in rows[:-1]:
         axes.tick_params(labelbottom=False)
     rows[-1].set_xlabel("time, s", fontsize=9)
@@ -96,16 +96,16 @@ def time_axis(figure: Figure, rows: Sequence[Axes], time_s: Array) -> None:
 
 
 def draw(axes: Axes, time_s: Array, values: Array, **style: Any) -> None:
-    """Draw a curve with no more points than a page has pixels."""
+    """Draw a curve with no more points than a page can show."""
     every = -(-time_s.size // MAX_POINTS)
     axes.plot(time_s[::every], values[::every], **style)
 
 
 def drive_panels(columns: Document, drives: Sequence[str] = SWEEPS) -> list[tuple[str, Array, Array]]:
-    """What the panels of the drives show: of each word its label, and the left and the right angle, rad.
+    """Contents of the drives' panels: for each word its label, and the left and right angles, rad.
 
-    Columns are called ``<drive>_rad``; of a drive on one side alone both angles are its own, and its label
-    says which it is.
+    Columns are named ``<drive>_rad``. For a drive on one side only, both angles are its own, and the label
+    names the side.
     """
     pairs: dict[str, dict[str, Array]] = {}
     for name in drives:
@@ -123,14 +123,14 @@ def drive_panels(columns: Document, drives: Sequence[str] = SWEEPS) -> list[tupl
 
 
 def draw_drive(axes: Axes, time_s: Array, panel: tuple[str, Array, Array]) -> None:
-    """A drive in degrees, of both sides; one line if they are alike."""
+    """Draw a drive in degrees, both sides; one line if they are equal."""
     label, left, right = panel
     draw_sides(axes, time_s, np.degrees(left), np.degrees(right), np.degrees(SILENT_RAD))
     label_axis(axes, f"{label}, deg")
 
 
 def draw_sides(axes: Axes, time_s: Array, left: Array, right: Array, alike: float) -> None:
-    """A quantity of both wings: two lines with a legend, or one if they differ by no more than ``alike``."""
+    """Draw a quantity of both wings: two lines with a legend, or one if they differ by at most ``alike``."""
     draw(axes, time_s, right, color=INK, linewidth=1.2, label="right")
     if not np.nanmax(np.abs(left - right)) <= alike:
         draw(axes, time_s, left, color=INK, linewidth=1.2, linestyle=(0, (4, 2)), label="left")
@@ -138,13 +138,13 @@ def draw_sides(axes: Axes, time_s: Array, left: Array, right: Array, alike: floa
 
 
 def quiet(axes: Axes, span: float) -> None:
-    """An axis for an angle that does not move: round-off is a flat line on it."""
+    """Scale the axis of an angle that does not move, so that round-off is a flat line."""
     axes.set_ylim(-span, span)
     axes.set_yticks([-span, 0.0, span])
 
 
 def headline(figure: Figure, text: str) -> None:
-    """The figure's title, never read as a formula."""
+    """Set the figure's title, never interpreted as a formula."""
     inches = float(figure.get_figheight())
     figure.text(0.5, 1.0 - 0.1 / inches, text, ha="center", va="top", fontsize=10, parse_math=False)
 
@@ -152,7 +152,7 @@ def headline(figure: Figure, text: str) -> None:
 def legend_above(
     figure: Figure, handles: Sequence[Line2D], *, columns: int = 4, below_top_in: float = 0.27
 ) -> None:
-    """One legend for all panels, below the headline or, where there is none, at the very top."""
+    """Add one legend for all panels, below the title or, without one, at the very top."""
     inches = float(figure.get_figheight())
     figure.legend(
         handles=list(handles),
@@ -170,17 +170,17 @@ def legend_above(
 
 
 def series(values: Sequence[float | None]) -> Array:
-    """Numbers as an array, None as NaN, which no line crosses."""
+    """Numbers as an array, with None as NaN, which interrupts lines."""
     return np.array(values, dtype=np.float64)
 
 
 def is_silent(curves: Sequence[Array]) -> bool:
-    """Whether angles (rad) do not move beyond round-off."""
+    """Whether angles (rad) stay within round-off."""
     return all(np.all(np.isnan(values) | (np.abs(values) < SILENT_RAD)) for values in curves)
 
 
 def is_cost(value: object) -> bool:
-    """Whether a value can stand on a logarithmic axis."""
+    """Whether a value can be shown on a logarithmic axis."""
     return isinstance(value, int | float) and bool(np.isfinite(value)) and value > 0.0
 
 
@@ -199,7 +199,7 @@ def scientific(value: float) -> str:
 
 
 def printable(text: str) -> str:
-    """A name as the font can show it: on one line, no control characters, not too long."""
+    """A name in displayable form: on one line, no control characters, not too long."""
     known = get_font(findfont(FontProperties(family="DejaVu Sans"))).get_charmap()
     shown = "".join(
         (c if ord(c) in known else "?") if unicodedata.category(c)[0] != "C" else " "
@@ -214,11 +214,11 @@ def printable(text: str) -> str:
 def rendered(
     stem: str, figure: Figure, kinds: Sequence[Literal["svg", "png"]] = ("svg", "png")
 ) -> dict[str, bytes]:
-    """File name -> content for each kind; the same figure gives the same bytes.
+    """File name -> content for each format; the same figure gives the same bytes.
 
     Raises
     ------
-    Interrupted : the surrounding `stoppable` block is asked to stop; a picture takes a good second to draw.
+    Interrupted : the surrounding `stoppable` block was stopped; a figure takes over a second to draw.
     """
     check_stop()
     files: dict[str, bytes] = {}
@@ -239,7 +239,7 @@ def rendered(
 
 @contextmanager
 def _fixed_ids() -> Iterator[None]:
-    """Element ids that depend on the picture only; matplotlib reads the salt from its global settings."""
+    """Make element ids depend on the figure only; matplotlib reads the salt from its global settings."""
     former = mpl.rcParams["svg.hashsalt"]
     mpl.rcParams["svg.hashsalt"] = HASH_SALT
     try:

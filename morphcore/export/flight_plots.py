@@ -1,4 +1,4 @@
-"""The picture of one simulated flight: attitude, wing tips and drives over time."""
+"""The figure of one simulated flight: attitude, wing tips and drives over time."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from morphcore.export.figure import (
 )
 
 TIPS = ("tip_left_z_m", "tip_right_z_m")
-ROUND_OFF_M = 1e-6  # of tips that move together, or not at all
-STILL_SPAN_M = 0.1  # half the height of the axis on which tips are drawn that do not move
-ANGLE_HEIGHT, SILENT_HEIGHT, OTHER_HEIGHT = 1.0, 0.45, 0.6  # of the panels, relative
+ROUND_OFF_M = 1e-6  # m, difference of tips that move together, or not at all
+STILL_SPAN_M = 0.1  # half the height of the axis for tips that do not move
+ANGLE_HEIGHT, SILENT_HEIGHT, OTHER_HEIGHT = 1.0, 0.45, 0.6  # relative heights of the panels
 
 
 def flight_plots(document: Document) -> dict[str, bytes]:
@@ -42,9 +42,9 @@ def flight_plots(document: Document) -> dict[str, bytes]:
 
     Parameters
     ----------
-    document : the result; its ``trajectory`` holds the columns ``time_s``, those of the drives that it names
-        in ``drives`` (``sweep_left_rad``), ``phi_rad``, ``theta_rad``, ``psi_rad`` and, where the wings' tips
-        are known, ``tip_left_z_m`` and ``tip_right_z_m``.
+    document : the result; its ``trajectory`` holds the columns ``time_s``, those of the drives named in
+    ``drives`` (``sweep_left_rad``), ``phi_rad``, ``theta_rad``, ``psi_rad`` and, if the wings' tips are
+    known, ``tip_left_z_m`` and ``tip_right_z_m``.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def flight_figure(document: Document) -> Figure:
     rows = stack(figure, heights, TITLE_HEAD_IN)
     for axes, (key, label) in zip(rows, ANGLES, strict=False):
         label_axis(axes, f"{label}, deg")
-        axes.axhline(np.degrees(angles[key][0]), color="0.5", linewidth=0.6)  # how it started
+        axes.axhline(np.degrees(angles[key][0]), color="0.5", linewidth=0.6)  # values at the start
         draw(axes, time_s, np.degrees(angles[key]), color=BLUE, linewidth=1.5)
         if silent[key]:
             quiet(axes, SILENT_SPAN_DEG)
@@ -81,7 +81,7 @@ def flight_figure(document: Document) -> Figure:
 
 
 def _draw_tips(axes: Axes, time_s: Array, up_m: Sequence[Array]) -> None:
-    """Height of the tips above their roots, m: of both sides, or of the one that has a wing."""
+    """Draw the height of the tips above their roots, m: for both sides, or for the one that has a wing."""
     label_axis(axes, "tips up, m")
     draw_sides(axes, time_s, up_m[0], up_m[-1], ROUND_OFF_M)
     if all(np.abs(values).max() < ROUND_OFF_M for values in up_m):  # rigid wings

@@ -1,7 +1,7 @@
-"""Export of an identified model: one function writes each format.
+"""Export of an identified model; each format has one function that writes it.
 
-A format is an entry of ``morphdata/formats.py`` and one module here with the function that it names. What it
-may write of a model, computed once for all formats, is an `ExportedModel`.
+A format is an entry of ``morphdata/formats.py`` and one module here with the function that the entry names.
+The data available to all formats, computed once, are an `ExportedModel`.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ Write = Callable[["ExportedModel"], bytes]
 
 @dataclass(frozen=True, repr=False)
 class ExportedModel(Shown):
-    """All that a file of a model may hold.
+    """The data that the file of a model can contain.
 
     Attributes
     ----------
     file : ModelFile
         Aircraft, flight, parameters and origin as documents.
     chain : ChainModel
-        The model's links and lattice; all of its surfaces.
+        The model's links and lattice, with all surfaces.
     batch : ParameterBatch
-        Its one parameter set, as the surfaces have it.
+        Its single parameter set, by surface.
     start : {"trim", "given"}
-        Where the reference trim is from.
+        Source of the reference trim.
     """
 
     file: ModelFile
@@ -56,17 +56,17 @@ class ExportedModel(Shown):
 
     @classmethod
     def of(cls, request: ExportRequest) -> ExportedModel:
-        """Return what a request asks for.
+        """Return the exported model of a request.
 
         Raises
         ------
         InvalidInput
-            The model is named by the id that it has in a service, or is not of this aircraft.
+            The model is given by an id, which only a service can resolve, or belongs to another aircraft.
         """
         known, flown = request.model.known, flown_with(request.model)
         if known is None:
             raise InvalidInput(
-                "only a service knows a model by its id",
+                "a model id can only be resolved by the service",
                 pointer="/model/model_id",
                 hint="give the model's parameters instead",
             )
@@ -85,7 +85,7 @@ class ExportedModel(Shown):
 
     @cached_property
     def trim(self) -> Trim:
-        """Straight level flight with the hinges where they are held, or the flight's given start.
+        """Straight level flight with the hinges at their held angles, or the flight's given start.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class ExportedModel(Shown):
 
 
 class Export:
-    """One file of one model; written when its bytes are first asked for.
+    """One file of one model, written when its bytes are first requested.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Export:
     Raises
     ------
     InvalidInput
-        As of `ExportedModel.of`.
+        As in `ExportedModel.of`.
     """
 
     def __init__(self, request: ExportRequest) -> None:
@@ -148,7 +148,7 @@ def export(
     model: Given,
     aircraft: Aircraft,
     flight: Flight,
-    format: str,  # noqa: A002 - as the option and the field are called
+    format: str,  # noqa: A002 - the name of the option and of the field
     path: str | Path,
     *,
     origin: Origin | None = None,
@@ -160,15 +160,15 @@ def export(
     model : IdentifyResult, ParameterBatch, Parameters, WholeResult or dict
         The result of an identification, one parameter set (`physical_guess` too), or the document of either.
     aircraft : Aircraft
-        The aircraft that the model is of.
+        The aircraft that the model belongs to.
     flight : Flight
-        The flight condition, of the reference trim too.
+        The flight condition, also for the reference trim.
     format : str
         A name of `morphdata.formats.FORMATS`: "npz", "mat", "json".
     path : str or Path
         The file; it is replaced if it exists.
     origin : Origin, optional
-        Where the model comes from; of a result, its fit is the default.
+        Where the model comes from; for a result, its fit is the default.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def export(
     Raises
     ------
     InvalidInput
-        There is no such format, or the model is not of this aircraft.
+        There is no such format, or the model belongs to another aircraft.
     TrimNotFound
         The format holds the reference trim, and there is none.
 
@@ -212,7 +212,7 @@ def export(
 
 
 def _given(model: Given) -> tuple[Any, Origin | None]:
-    """The parameters as a request takes them, and what is known of their origin."""
+    """The parameters in the form of a request, and what is known of their origin."""
     if isinstance(model, IdentifyResult):
         model = model.to_document()
     if isinstance(model, ParameterBatch):

@@ -1,6 +1,6 @@
 """The export format ``mat``: the groups of `morphcore.export.model_tables` as structs, version 5.
 
-Vectors are columns, lists of names are cell arrays, and what ends in ``_index`` counts from 1::
+Vectors are columns, lists of names are cell arrays, and arrays named ``..._index`` count from 1::
 
     model = load('model.mat');
     model.links.mass_kg(model.joints.outboard_link_index)

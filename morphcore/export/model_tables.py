@@ -1,17 +1,17 @@
-"""A model as arrays: what the formats ``npz`` and ``mat`` hold.
+"""A model as arrays: the contents of the formats ``npz`` and ``mat``.
 
 Groups of arrays (s surfaces, l links, j joints, h hinges, f flexible surfaces, n links each), SI units and
 radians. B : body axes, forward, right, down, from the reference point. Link axes: origin on the elastic axis
-at the link's inboard end, parallel to B when no hinge is turned and nothing is bent. What ends in ``_index``
-counts from 0 here (in MATLAB files from 1).
+at the link's inboard end, parallel to B with all hinges and joints at zero. Arrays named ``..._index`` count
+from 0 here (in MATLAB files from 1).
 
 ``origin``
     ``notice``, ``morphid_version``, ``model_id`` and, as JSON text, ``fit`` and ``verdict``.
 ``documents``
-    ``aircraft``, ``flight`` and ``model`` as JSON text, in the form that requests take.
+    ``aircraft``, ``flight`` and ``model`` as JSON text, in the form used by requests.
 ``parameters``
     By their names, ``division`` (f, n), ``stiffness_nm_rad`` and ``damping_nms_rad`` (f, n - 1, 3) of flap,
-    torsion and edgewise, others (f,), or () of the whole aircraft; ``surface_index`` (f,).
+    torsion and edgewise, others (f,), or () for the whole aircraft; ``surface_index`` (f,).
 ``surfaces``
     ``name``, ``side`` (s,); ``root_m`` (s, 3) origin of the first link in B; ``first_link_index``, ``links``
     (s,).
@@ -58,7 +58,7 @@ Tables = Mapping[str, Table]
 
 
 def reference_trim(chain: ChainModel, batch: ParameterBatch, start: StartMode) -> Trim:
-    """Trim with every hinge where it is held when no history is given.
+    """Trim with every hinge at the angle that it holds without a history.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def _joints(chain: ChainModel, batch: ParameterBatch) -> Table:
 
 
 def _hinges(aircraft: Aircraft) -> Table:
-    """Of each surface from the fuselage outward; each carries those after it and the surface."""
+    """Hinges of each surface from the fuselage outward; each carries the following ones and the surface."""
     hinges = aircraft.hinges
     counts = [len(surface.hinges) for surface in aircraft.surfaces]
     return {

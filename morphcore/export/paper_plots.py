@@ -36,13 +36,13 @@ from morphcore.export.plots import STYLES, angle_error
 from morphcore.frames import wrap_angle
 
 WIDTH_IN = 7.2
-LEGEND_IN, TWO_ROWS_IN = 0.38, 0.56  # left free above the panels for names in one row, in two
+LEGEND_IN, TWO_ROWS_IN = 0.38, 0.56  # inches above the panels for names in one row, in two rows
 FLIGHT_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, "0.35")
 DASHED = (0, (5, 2))
 TRUTH, RIGID, EQUIVALENT = (STYLES[name] for name in ("measured", "rigid", "identified"))
 OTHERS: tuple[dict[str, Any], ...] = (EQUIVALENT, {"color": ORANGE, "linewidth": 1.5, "linestyle": DASHED})
-MRAD = 1e3  # of a radian
-MIN_ERROR_MRAD = 1e-3  # half the height of the axis of an error that is round-off
+MRAD = 1e3  # in a radian
+MIN_ERROR_MRAD = 1e-3  # half the height of the axis of an error within round-off
 
 
 def truth_figure(flights: Sequence[Document]) -> Figure:
@@ -51,7 +51,7 @@ def truth_figure(flights: Sequence[Document]) -> Figure:
     Parameters
     ----------
     flights : ``{"label", "sample": {"time_s", "theta_rad", "sweep_right_rad", "role"}, "tip_right_z_m"}``;
-        those held out are dashed.
+        held-out flights are dashed.
     """
     figure = Figure(figsize=(WIDTH_IN, 6.0))
     rows = stack(figure, (1.0, 0.7, 0.7), TWO_ROWS_IN)
@@ -76,7 +76,7 @@ def truth_figure(flights: Sequence[Document]) -> Figure:
 
 
 def verification_figure(curves: Document) -> Figure:
-    """One flight: the angles that move (deg) in all three models, the equivalent one's errors, the sweep.
+    """One flight: the moving angles (deg) in all three models, the equivalent model's errors, the sweep.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def verification_figure(curves: Document) -> Figure:
 
 
 def search_figure(searches: Mapping[str, Sequence[Document]]) -> Figure:
-    """Least cost J so far against flights flown, both logarithmic, of several searches.
+    """Minimum cost J so far against flights flown, both logarithmic, for several searches.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def front_figure(points: Sequence[Document]) -> Figure:
 
     Parameters
     ----------
-    points : ``{"duration_s", "constant_rad2", "optimum_rad2", "flown_rad2"}`` in rising order of durations.
+    points : ``{"duration_s", "constant_rad2", "optimum_rad2", "flown_rad2"}`` in ascending order of duration.
     """
     figure = Figure(figsize=(WIDTH_IN, 3.4))
     axes = figure.add_axes((0.115, 0.15, 0.865, 0.81))
@@ -168,7 +168,7 @@ def front_figure(points: Sequence[Document]) -> Figure:
 
 
 def independent_figure(samples: Sequence[Document], laws: Sequence[Document]) -> Figure:
-    """Another program's flights and ours: every angle that moves (deg) at the left, errors (mrad) right.
+    """Another program's flights and ours: moving angles (deg) on the left, errors (mrad) on the right.
 
     Parameters
     ----------
@@ -211,6 +211,6 @@ def independent_figure(samples: Sequence[Document], laws: Sequence[Document]) ->
 
 
 def _widened(axes: Axes, minimum: float) -> None:
-    """No narrower than ``least`` to both sides: round-off is a line, not a picture."""
+    """Axis limits at least ``least`` wide on both sides, so that round-off appears as a line."""
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -minimum), max(high, minimum))

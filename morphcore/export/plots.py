@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -39,6 +40,7 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
+from morphcore.export.uncertainty_plots import uncertainty_plots
 from morphcore.frames import wrap_angle
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -57,30 +59,35 @@ PHASES = {"swarm": ORANGE, "polish": BLUE}
 OTHER_PHASE = SKY
 ROLES = {"train": "fitted", "held_out": "held out"}
 
-SILENT_SPAN_MRAD = 0.01  # half the height of the axis of an error that is round-off
+BAND = "#BBD9EE"  # of probable attitudes
+SILENT_SPAN_MRAD = 0.01  # half the height of the axis of an error within round-off
 
 
 def identification_plots(document: Document, curves: Document) -> dict[str, bytes]:
-    """Draw everything that an identification's result has to show.
+    """Draw all plots of an identification's result.
 
     Parameters
     ----------
-    document : the result; its ``search.history`` gives the convergence.
+    document : the result; ``search.history`` provides the convergence.
     curves : ``{"samples": [{"name", "role", "time_s", "drives": ["sweep_left", "sweep_right"],
         "sweep_left_rad", "sweep_right_rad", "measured": {"phi_rad", "theta_rad", "psi_rad"}, "rigid": {...},
         "initial": {...}, "identified": {...}}]}``; the drives' columns bear their names; a value that a
-        diverged flight never reached is None.
+        diverged flight never reached is None. ``"band": {"phi_rad": {"low": [...], "high": [...]}, ...}`` of
+        a sample, where it is there, is drawn as a band of probable attitudes.
 
     Returns
     -------
-    File name -> content: ``attitude_<sample>``, ``residuals_<sample>`` and ``convergence``, each as ``.svg``
-    and ``.png``. The same input gives the same bytes.
+    File name -> content: ``attitude_<sample>``, ``residuals_<sample>``, ``autocorrelation_<sample>``,
+    ``intervals`` (where there are any) and ``convergence``, each as ``.svg`` and ``.png``. The same input
+    gives the same bytes.
     """
     samples = curves["samples"]
+    named = dict(zip(file_stems(str(s["name"]) for s in samples), samples, strict=True))
     files: dict[str, bytes] = {}
-    for stem, sample in zip(file_stems(str(s["name"]) for s in samples), samples, strict=True):
+    for stem, sample in named.items():
         files |= rendered(f"attitude_{stem}", attitude_figure(sample))
         files |= rendered(f"residuals_{stem}", residual_figure(sample))
+    files |= uncertainty_plots(document, named)
     return files | rendered("convergence", convergence_figure(document))
 
 
@@ -102,6 +109,7 @@ def attitude_figure(sample: Document) -> Figure:
         label_axis(axes, f"{label}, deg")
         for model, values in (("measured", measured), *flown.items()):
             draw(axes, time_s, np.degrees(values[key]), **_line(model))
+        _draw_band(axes, time_s, measured[key], (sample.get("band") or {}).get(key))
         if silent[key]:
             quiet(axes, SILENT_SPAN_DEG)
     for axes, panel in zip(rows[len(ANGLES) :], drives, strict=True):
@@ -112,7 +120,7 @@ def attitude_figure(sample: Document) -> Figure:
 
 
 def residual_figure(sample: Document) -> Figure:
-    """Errors of roll, pitch and yaw in mrad: all models at the left, the identified one at the right."""
+    """Errors of roll, pitch and yaw in mrad: all models on the left, the identified one on the right."""
     time_s = series(sample["time_s"])
     models = [model for model in ("rigid", "initial", "identified") if sample.get(model)]
     figure = Figure(figsize=(9.0, 6.2))
@@ -143,7 +151,7 @@ def residual_figure(sample: Document) -> Figure:
 
 
 def convergence_figure(document: Document) -> Figure:
-    """Least cost J so far against flights flown (or generations, if flights are not counted), logarithmic."""
+    """Minimum cost J so far against flights flown (or generations, if not counted), logarithmic."""
     history = [row for row in document.get("search", {}).get("history", []) if is_cost(row.get("best_cost"))]
     figure = Figure(figsize=(7.2, 3.8))
     axes = figure.add_axes((0.115, 0.13, 0.865, 0.77))
@@ -187,6 +195,16 @@ def convergence_figure(document: Document) -> Figure:
 # pieces of figures
 
 
+def _draw_band(axes: Axes, time_s: Array, measured: Array, band: Document | None) -> None:
+    """The band in which a predictive distribution sees an angle, on the branch of the measured one."""
+    if band is None:
+        return
+    low, high = (
+        np.degrees(measured + wrap_angle(series(band[end]) - wrap_angle(measured))) for end in ("low", "high")
+    )
+    axes.fill_between(time_s, low, high, color=BAND, linewidth=0, zorder=1.5, label="band")
+
+
 def _line(model: str) -> dict[str, Any]:
     return {"label": LABELS[model], **STYLES[model]}
 
@@ -207,7 +225,7 @@ def _title(sample: Document, subject: str) -> str:
 
 
 def angle_error(sample: Document, model: str, key: str) -> Array:
-    """Wrapped difference of a model's angle to the sample's, rad."""
+    """Wrapped difference between a model's angle and the sample's, rad."""
     return wrap_angle(series(sample[model][key]) - series(sample["measured"][key]))
 
 

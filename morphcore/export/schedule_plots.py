@@ -1,4 +1,4 @@
-"""An optimised morph as pictures: schedules, the attitude that they cause, time against variation."""
+"""Figures of an optimised morph: schedules, the resulting attitude, duration against variation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from morphcore.export.figure import (
     time_axis,
 )
 
-# Okabe & Ito's colours, told apart by line style too
+# Okabe & Ito's colours, also distinguished by line style
 STYLES: dict[str, dict[str, Any]] = {
     "constant": {"color": "0.55", "linewidth": 2.6, "linestyle": "-"},
     "rigid_optimum": {"color": VERMILION, "linewidth": 1.4, "linestyle": (0, (4, 4)), "zorder": 3},
@@ -43,25 +43,25 @@ LABELS = {
     "optimum": "equivalent model's optimum",
 }
 BEST_FIRST = ("flexible", "equivalent", "rigid")  # the model in which the attitude is drawn
-ANGLE_HEIGHT, SILENT_HEIGHT = 1.0, 0.45  # of the panels, relative
+ANGLE_HEIGHT, SILENT_HEIGHT = 1.0, 0.45  # relative heights of the panels
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.8, "linestyle": (0, (1, 2))}
 
 
 def schedule_plots(document: Document, curves: Document) -> dict[str, bytes]:
-    """Draw what an optimisation's result has to show.
+    """Draw all plots of an optimisation's result.
 
     Parameters
     ----------
-    document : the result; its ``limits`` are drawn as lines, its ``variation`` stands in the legend, its
-        ``pareto``, if there is one, is the front.
+    document : the result; its ``limits`` are drawn as lines, its ``variation`` appears in the legend, its
+    ``pareto``, if present, is the front.
     curves : ``{"time_s", "schedules": {name: {"sweep_rad", "rate_rad_s", "acceleration_rad_s2"}}, "flights":
         {model: {name: {"phi_rad", "theta_rad", "psi_rad"}}}}``; the angles are departures from the start.
 
     Returns
     -------
-    File name -> content: ``schedules`` (the paper's figure 10), ``departures`` (figure 11, in the best model
-    that was flown) and, for a front, ``pareto``, each as ``.svg`` and ``.png``. The same input gives the same
-    bytes.
+    File name -> content: ``schedules`` (the paper's figure 10), ``departures`` (figure 11, in the most
+    accurate model flown) and, for a front, ``pareto``, each as ``.svg`` and ``.png``. The same input gives
+    the same bytes.
     """
     files = rendered("schedules", schedule_figure(document, curves))
     files |= rendered("departures", departure_figure(document, curves))
@@ -100,7 +100,7 @@ def schedule_figure(document: Document, curves: Document) -> Figure:
 
 
 def departure_figure(document: Document, curves: Document) -> Figure:
-    """Departures of roll, pitch and yaw (deg) under all schedules, in the best model that flew them."""
+    """Departures of roll, pitch and yaw (deg) under all schedules, in the most accurate model flown."""
     model = next((name for name in BEST_FIRST if curves["flights"].get(name)), "equivalent")
     flown = curves["flights"].get(model) or {}
     time_s = series(curves["time_s"])
@@ -139,7 +139,7 @@ def front_figure(document: Document) -> Figure:
     beaten = _points([p for p in searched if p.get("beaten")], "variation_rad2")
     if beaten:
         style = {"linestyle": "none", "marker": "x", "markersize": 5, "color": VERMILION}
-        axes.plot(*zip(*beaten, strict=True), label="optimum, but a shorter one is as good", **style)
+        axes.plot(*zip(*beaten, strict=True), label="optimum, but a shorter morph is as good", **style)
     axes.plot(
         [p["duration_s"] for p in front],
         [p["variation_rad2"] for p in front],
@@ -150,7 +150,7 @@ def front_figure(document: Document) -> Figure:
     )
     axes.set_xlabel("duration of the morph, s", fontsize=9)
     axes.set_ylabel("variation of the attitude, rad²", fontsize=9)
-    axes.set_ylim(bottom=0.0)  # after the curves: the top keeps its margin
+    axes.set_ylim(bottom=0.0)  # after the curves, so that the top keeps its margin
     axes.tick_params(labelsize=8.5)
     light_grid(axes)
     axes.legend(frameon=False, fontsize=8.5, loc="best")
@@ -162,7 +162,7 @@ def front_figure(document: Document) -> Figure:
 
 
 def _draw_limit(axes: Axes, limit: float | None) -> None:
-    """Lines at both signs of a limit, where the axis reaches near it."""
+    """Draw lines at plus and minus a limit if the axis comes close to it."""
     if limit is None:
         return
     low, high = axes.get_ylim()
@@ -172,7 +172,7 @@ def _draw_limit(axes: Axes, limit: float | None) -> None:
 
 
 def _points(rows: Sequence[Document], key: str) -> list[tuple[float, float]]:
-    """Duration and one figure of the rows that have it."""
+    """Duration and one figure, for the rows that have it."""
     return [(row["duration_s"], row[key]) for row in rows if row.get(key) is not None]
 
 

@@ -1,4 +1,4 @@
-"""A study as a picture: accuracy and cost against the number of links per wing."""
+"""The figure of a study: accuracy and cost against the number of links per wing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from morphcore.export.figure import (
 )
 
 MILLISECONDS = 1e3  # of a second
-MARGIN = 1.8  # factor above the largest and below the least value
+MARGIN = 1.8  # factor above the largest and below the smallest value
 TWO_DECADES = 100.0
 TRAIN = {"color": BLUE, "marker": "o", "markersize": 5, "linewidth": 1.4}
 HELD_OUT = {
@@ -34,11 +34,11 @@ HELD_OUT = {
     "markerfacecolor": "white",
 }
 RIGID = {"color": VERMILION, "linewidth": 1.1, "linestyle": (0, (1, 1.4))}
-CHOSEN_COLOUR = "#FBEBC8"  # of a light band behind the recommended number of links
+CHOSEN_COLOUR = "#FBEBC8"  # half width of a light band behind the recommended number of links
 
 
 def study_plots(document: Document) -> dict[str, bytes]:
-    """Draw what a study's result has to show.
+    """Draw the plot of a study's result.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def study_plots(document: Document) -> dict[str, bytes]:
 
 
 def study_figure(document: Document) -> Figure:
-    """J (rad²) over the fitted flights and those held out, and below it the time of one flight (ms)."""
+    """J (rad²) for fitted and held-out flights and, below, the time of one flight (ms)."""
     figure = Figure(figsize=(7.2, 6.0))
     accuracy = figure.add_axes((0.115, 0.4, 0.865, 0.53))
     price = figure.add_axes((0.115, 0.085, 0.865, 0.26), sharex=accuracy)
@@ -65,7 +65,7 @@ def study_figure(document: Document) -> Figure:
     values += _line(accuracy, document, "J_held_out", "flights held out", HELD_OUT)
     values += _level(accuracy, rigid.get("J_train"), "rigid model, fitted flights", {**RIGID, "color": BLUE})
     values += _level(accuracy, rigid.get("J_held_out"), "rigid model, held out", {**RIGID, "color": GREEN})
-    _ordinate(accuracy, values, "no model flew every flight")
+    _ordinate(accuracy, values, "no model could fly every flight")
     values = _line(price, document, "flight_s", "equivalent model", TRAIN, MILLISECONDS)
     values += _level(price, rigid.get("flight_s"), "rigid model", RIGID, MILLISECONDS)
     _ordinate(price, values, "no flight was timed")
@@ -107,7 +107,7 @@ def _abscissa(axes: Axes, document: Document) -> None:
 def _line(
     axes: Axes, document: Document, name: str, label: str, style: dict[str, Any], factor: float = 1.0
 ) -> list[float]:
-    """Draw one figure of all rows that have it; give its values."""
+    """Draw one figure for all rows that have it; return its values."""
     points = sorted(
         (row["links_per_wing"], factor * row[name]) for row in document["rows"] if is_cost(row.get(name))
     )
@@ -125,7 +125,7 @@ def _level(axes: Axes, value: Any, label: str, style: dict[str, Any], factor: fl
 
 
 def _ordinate(axes: Axes, values: Sequence[float], nothing: str) -> None:
-    """A logarithmic ordinate around the values, and a legend."""
+    """Set a logarithmic ordinate around the values, and a legend."""
     if not values:
         axes.set_yticks([])
         axes.text(0.5, 0.5, nothing, transform=axes.transAxes, ha="center", fontsize=9)

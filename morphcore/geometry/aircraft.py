@@ -1,4 +1,4 @@
-"""The aircraft and its flight condition with every default resolved, as the numerics take them."""
+"""The aircraft and its flight condition with all defaults resolved, in the form used by the numerics."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Fuselage(Shown):
 
     @classmethod
     def of(cls, document: documents.Fuselage) -> Fuselage:
-        """Return the body that a document describes, a box of uniform density or numbers given outright."""
+        """Return the body that a document describes: a box of uniform density, or explicit numbers."""
         centre = _vector(document.centre_of_mass_m or [0.0, 0.0, 0.0])
         if document.mass_kg is not None and document.inertia_kg_m2 is not None:
             return cls(document.mass_kg, np.array(documents.inertia_matrix(document.inertia_kg_m2)), centre)
@@ -59,18 +59,18 @@ class Aircraft(Shown):
 
     @cached_property
     def hinges(self) -> tuple[Hinge, ...]:
-        """The hinges of all surfaces, surface by surface from the fuselage outward: columns of motions."""
+        """The hinges of all surfaces, surface by surface from the fuselage outward, as columns of motions."""
         return tuple(hinge for surface in self.surfaces for hinge in surface.hinges)
 
     @cached_property
     def hinge_columns(self) -> tuple[slice, ...]:
-        """Which of ``hinges`` each surface has."""
+        """Indices into ``hinges`` for each surface."""
         ends = np.cumsum([0, *(len(surface.hinges) for surface in self.surfaces)]).tolist()
         return tuple(slice(first, last) for first, last in pairwise(ends))
 
     @cached_property
     def drives(self) -> dict[str, Drive]:
-        """What can be moved, by name, in the order of the hinges."""
+        """Names of the drives, in the order of the hinges."""
         return drives_of(
             (hinge.drive, surface, (number, place), hinge)
             for number, surface in enumerate(self.surfaces)
@@ -79,7 +79,7 @@ class Aircraft(Shown):
 
     @property
     def flexible_surfaces(self) -> tuple[Surface, ...]:
-        """Those that bend."""
+        """The surfaces that bend."""
         return tuple(s for s in self.surfaces if s.flexible)
 
 

@@ -1,4 +1,4 @@
-"""Whole numbers of settings that are given in Python, out of numpy too."""
+"""Integer settings given in Python, including numpy numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from morphcore.errors import InvalidInput
 
 
 def _bound_broken(value: float, minimum: float, maximum: float) -> str:
-    """The bound that a number does not keep; empty when it keeps both."""
+    """The bound that a number violates; empty if it is within both."""
     if value < minimum:
         return f"it must be at least {minimum:g}"
     return f"it must be at most {maximum:g}" if value > maximum else ""
@@ -22,11 +22,11 @@ def _bound_broken(value: float, minimum: float, maximum: float) -> str:
 def whole_number(
     value: Any, name: str, *, pointer: str = "", minimum: float = -math.inf, maximum: float = math.inf
 ) -> int:
-    """A whole number as Python's own: out of numpy's, and out of a float without a fraction.
+    """Convert a whole number, possibly a numpy integer or a float without a fraction, to a Python int.
 
     Raises
     ------
-    InvalidInput : it is no number, a truth value, not whole, or beyond its bounds.
+    InvalidInput : it is not a number, is a bool, is not whole, or is out of bounds.
     """
     whole = not isinstance(value, bool | np.bool_) and (
         isinstance(value, int | np.integer)
@@ -39,7 +39,7 @@ def whole_number(
 
 
 class WholeNumbers:
-    """Settings whose fields of the type int are Python's own, whoever gave them; anything else is refused."""
+    """Settings whose int fields are converted to Python ints; anything else is refused."""
 
     def __post_init__(self) -> None:
         for item in dataclasses.fields(self):  # type: ignore[arg-type]  # of a subclass, which is a dataclass

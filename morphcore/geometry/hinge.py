@@ -1,8 +1,8 @@
-"""Hinges as the numerics take them: an axis at a place on the fuselage, and the turns that several compose.
+"""Hinges in the form used by the numerics: an axis on the fuselage, and the composition of several turns.
 
-A surface on hinges 1..m, counted from the fuselage outward, stands at ``E_1 E_2 .. E_m`` applied to where it
-is at rest, each ``E_i`` a turn about the axis of hinge i where no hinge has moved (the product of
-exponentials; Murray, Li & Sastry 1994, section 3.2). So each hinge turns those after it and the surface.
+The pose of a surface on hinges 1..m, counted from the fuselage outward, is ``E_1 E_2 .. E_m`` applied to its
+pose at rest, each ``E_i`` a turn about the axis of hinge i at rest (the product of exponentials; Murray, Li &
+Sastry 1994, section 3.2). So each hinge turns all hinges outboard of it and the surface.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Hinge:
-    """A revolute joint of prescribed motion; two are equal that turn alike, whatever drives them.
+    """A revolute joint of prescribed motion; hinges that turn alike are equal, whatever their drives.
 
     Attributes
     ----------
     drive : str
         Name of the drive that turns it.
     position_m : tuple of float
-        A point of its axis where no hinge has moved, from the fuselage reference point, in B.
+        A point of its axis, all hinges at rest, relative to the fuselage reference point, in B.
     axis_B : tuple of float
-        Unit vector of its axis where no hinge has moved; a positive angle is a right-handed turn about it.
+        Unit vector of its axis, all hinges at rest; a positive angle is a right-handed turn about it.
     min_rad, max_rad : float
         Range of its angle.
     angle_rad : float
-        Angle that is held where no history is given.
+        Angle held if no history is given.
     """
 
     drive: str = field(compare=False)
@@ -48,7 +48,7 @@ class Hinge:
 
     @classmethod
     def of(cls, document: documents.Hinge, side: str) -> Hinge:
-        """Return the hinge that a document describes, of a surface of a side."""
+        """Return the hinge that a document describes, for a surface on a given side."""
         x, y, z = document.position_m
         return cls(
             drive=drive_name(document, side),
@@ -60,7 +60,7 @@ class Hinge:
         )
 
     def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
-        """Rows of a history of angles (k,) that lie beyond the range."""
+        """Rows of a history of angles (k,) that are out of range."""
         low, high = self.min_rad - ANGLE_TOLERANCE_RAD, self.max_rad + ANGLE_TOLERANCE_RAD
         return np.flatnonzero((angle_rad < low) | (angle_rad > high))
 
@@ -72,15 +72,15 @@ class Hinge:
 
     @property
     def reflection(self) -> Hinge:
-        """Its image on the other side of the x-z plane, which the same angle turns to the mirrored place."""
+        """Its mirror image about the x-z plane, which the same angle turns to the mirrored position."""
         (x, y, z), (ax, ay, az) = self.position_m, self.axis_B
         return Hinge(self.drive, (x, -y, z), (-ax, ay, -az), self.min_rad, self.max_rad, self.angle_rad)
 
 
 def hinge_arms(hinges: Sequence[Hinge], root_B: Array, offset: Array | None = None) -> Array:
-    """From each hinge (of a fixed surface: from the fuselage reference point) to a point at rest, (m, 3), m.
+    """Vectors (m, 3), m, from each hinge (or, without hinges, the reference point) to a point at rest.
 
-    The point is ``root_B`` (3,), moved by ``offset`` (3,) if there is one.
+    The point is ``root_B`` (3,), shifted by ``offset`` (3,) if given.
     """
     pivots = np.array([hinge.position_m for hinge in hinges] or [(0.0, 0.0, 0.0)])
     arms = root_B - pivots
@@ -88,17 +88,17 @@ def hinge_arms(hinges: Sequence[Hinge], root_B: Array, offset: Array | None = No
 
 
 def hinged_pose(hinges: Sequence[Hinge], arms: Array, angles: Array) -> tuple[Array, Array]:
-    """Place of a surface for angles (k, m) of its m hinges; ``arms`` as of `hinge_arms`.
+    """Pose of a surface for angles (k, m) of its m hinges; ``arms`` from `hinge_arms`.
 
     Returns
     -------
     R_BW : (k, 3, 3), wing components to body components.
-    r_B : (k, 3) where the point of the arms is, m.
+    r_B : (k, 3) position of the arms' end point, m.
     """
     count = angles.shape[0]
     if not hinges:
         return np.tile(np.eye(3), (count, 1, 1)), np.tile(arms[0], (count, 1))
-    # surface -> fuselage: each hinge turns what those after it have placed
+    # surface -> fuselage: each hinge turns everything outboard of it
     pivot = np.array(hinges[-1].position_m)
     R_BW = hinges[-1].rotation(angles[:, -1])
     r_B = pivot + R_BW @ arms[-1]

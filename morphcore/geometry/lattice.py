@@ -30,9 +30,8 @@ class SurfaceLattice:
     panel_corners_W : (chordwise + 1, spanwise + 1, 3) geometric panel corners, leading edge first.
     ring_corners_W : (chordwise + 1, spanwise + 1, 3) corners of the vortex rings: their fronts at a quarter
         of each panel's chord, the aft edge of the last row on the trailing edge itself. Katz & Plotkin put
-        that edge a quarter panel further aft; there it cancels against the wake's first edge just as it does
-        here, but the two chordwise pieces behind the trailing edge would carry a load that a wake cannot
-        carry.
+        that edge a quarter panel further aft; it cancels against the wake's first edge there as it does here,
+        but the two chordwise pieces behind the trailing edge would carry a load, which a wake cannot.
     control_points_W : (chordwise, spanwise, 3) at three quarters of the panel's chord, mid panel span.
     panel_area_m2 : (chordwise, spanwise).
     strip_edges_m : (spanwise + 1,) distance of the strips' edges from the root.
@@ -75,12 +74,12 @@ class SurfaceLattice:
 
     @property
     def panel_size_m(self) -> float:
-        """Smaller of a panel's mean chord and width: the length to which the core "line" is referred."""
+        """Smaller of a panel's mean chord and width: the reference length of the core "line"."""
         return min(self.mean_chord_m / self.chordwise, float(self.strip_edges_m[1]))
 
     @property
     def mean_chord_m(self) -> float:
-        """Mean chord: the length to which the core "smoothed" is referred."""
+        """Mean chord: the reference length of the core "smoothed"."""
         return float(self.strip_chord_m.mean())
 
 
@@ -108,7 +107,7 @@ def surface_lattice(
 
 
 def surface_pose(surface: Surface, hinge_rad: ArrayLike | None = None) -> tuple[Array, Array]:
-    """Place of an undeformed surface for angles (m,) of its hinges, rad; None: no hinge has moved.
+    """Pose of an undeformed surface for angles (m,) of its hinges, rad; None: all hinges at rest.
 
     Returns
     -------

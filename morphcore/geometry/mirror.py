@@ -1,7 +1,7 @@
-"""Mirror symmetry of an aircraft about its x-z plane: which surfaces are each other's image.
+"""Mirror symmetry of an aircraft about its x-z plane: which surfaces are images of each other.
 
-A symmetric aircraft whose hinges move alike flies straight on: its left half does what its right half does.
-Then one half is flown, which stands for both (models/equivalent.py), and nothing is lost.
+A symmetric aircraft whose hinges move alike flies straight ahead, and both halves move alike. Then only one
+half is computed, without loss of accuracy (models/equivalent.py).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class Mirror:
     """Indices of an aircraft's surfaces: ``own`` of one half, ``image`` of their images in the same order.
 
-    ``own_hinges`` and ``image_hinges`` are those of their hinges among all the aircraft's.
+    ``own_hinges`` and ``image_hinges`` are indices of their hinges among all hinges of the aircraft.
     """
 
     own: tuple[int, ...]
@@ -32,11 +32,11 @@ class Mirror:
     image_hinges: tuple[int, ...]
 
     def spread(self, values: Array) -> Array:
-        """Columns (k, s) of all surfaces from those of one half, (k, s / 2), where both sides are alike."""
+        """Columns (k, s) of all surfaces from those of one half, (k, s / 2), when both sides move alike."""
         return _spread(values, self.own, self.image)
 
     def spread_hinges(self, values: Array) -> Array:
-        """Columns (k, h) of all hinges from those of one half, (k, h / 2), where both sides are alike."""
+        """Columns (k, h) of all hinges from those of one half, (k, h / 2), when both sides move alike."""
         return _spread(values, self.own_hinges, self.image_hinges)
 
 
@@ -52,21 +52,21 @@ def mirror_groups(surfaces: Sequence[Surface]) -> tuple[tuple[int, ...], ...]:
     Parameters
     ----------
     surfaces : sequence of Surface
-        Two are a pair if all values of one are those of the other, mirrored.
+        Two surfaces are a pair if all values of one are the mirrored values of the other.
 
     Returns
     -------
     tuple of tuples of int
-        Groups (first, image) and (first,): every surface is in one of them.
+        Groups (first, image) and (first,); every surface is in exactly one.
     """
     nameless = [replace(surface, name="") for surface in surfaces]
     return paired_by_reflection(nameless, [_reflection(surface) for surface in nameless])
 
 
 def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
-    """The symmetry of an aircraft in a flight condition; None where anything differs at all.
+    """The symmetry of an aircraft in a flight condition; None if anything differs.
 
-    Wind does not count: a uniform one carries the aircraft along.
+    Wind does not matter: uniform wind carries the aircraft along.
     """
     groups = mirror_groups(aircraft.surfaces)
     paired = all(len(group) > 1 for group in groups)
@@ -85,7 +85,7 @@ def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
 
 
 def _reflection(surface: Surface) -> Surface:
-    """The surface on the other side; the angles of hinges are alike on both sides."""
+    """The surface mirrored to the other side; hinge angles are the same on both sides."""
     x, y, z = surface.position_m
     return replace(
         surface,

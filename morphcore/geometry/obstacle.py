@@ -1,7 +1,7 @@
-"""Why an aircraft may not fly, from its document alone: a wing too soft for its load, too little air.
+"""Likely reasons, from the document alone, why an aircraft does not fly: a soft wing, too little air.
 
-Estimates of beam theory and of the lift that level flight takes. They name the field to look at when a trim
-or a flight has failed; they refuse nothing by themselves.
+Estimates from beam theory and from the lift needed in level flight. They name the field to check after a trim
+or a flight has failed; they do not reject anything themselves.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.surface import Surface
 
 STATIONS = 200  # midpoints along the span
-LARGEST_SLOPE_RAD = 1.0  # of a tip under its share of the load: beyond, no wing carries anything
-LARGEST_LIFT_COEFFICIENT = 2.0  # of all surfaces together; a clean wing has 1.5 at most
+LARGEST_SLOPE_RAD = 1.0  # slope of a tip under its share of the load: beyond this no wing carries any load
+LARGEST_LIFT_COEFFICIENT = 2.0  # lift coefficient of all surfaces together; a clean wing reaches 1.5 at most
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad, of a thin airfoil
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """What most likely keeps an aircraft from flying: the field at fault, and what to do about it."""
+    """The most likely reason why an aircraft does not fly: the field at fault, and a remedy."""
 
     pointer: str
     hint: str
 
 
 def obstacle(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
-    """The most likely obstacle for wings that bend as the document says; None where all should do."""
+    """The most likely obstacle for wings with the document's stiffness; None if all estimates are fine."""
     load_n_m = load_per_length(aircraft, flight)
     softest = max(
         (
@@ -53,7 +53,7 @@ def obstacle(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
 
 
 def too_little_air(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
-    """The flight condition, where no wing of that area could carry the weight in it."""
+    """The flight condition as an obstacle, if no wing of that area could carry the weight in it."""
     weight_n = _mass(aircraft) * flight.gravity_m_s2
     area = sum(surface.area_m2 for surface in aircraft.surfaces)
     carried = flight.dynamic_pressure_pa * area * LARGEST_LIFT_COEFFICIENT
@@ -69,9 +69,9 @@ def too_little_air(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
 
 @contextmanager
 def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
-    """Let a trim or a flight that fails within the block say what most likely kept it from flying.
+    """Add the most likely obstacle to the error of a trim or flight that fails within the block.
 
-    ``find`` : gives the obstacle; asked only when something has failed.
+    ``find`` : returns the obstacle; called only after a failure.
     """
     try:
         yield
@@ -83,7 +83,7 @@ def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
 
 
 def load_per_length(aircraft: Aircraft, flight: Flight) -> float:
-    """The weight spread over all spans alike, N/m: about what the lift loads the surfaces with."""
+    """The weight distributed evenly over all spans, N/m: an estimate of the lift per length."""
     weight_n = _mass(aircraft) * flight.gravity_m_s2
     return weight_n / sum(surface.span_m for surface in aircraft.surfaces)
 
@@ -105,12 +105,12 @@ def _tip_slope(surface: Surface, load_n_m: float) -> float:
     """Slope at the tip of a cantilever under a load per length, rad: the integral of M / EI."""
     distance, width = _stations(surface)
     moment = 0.5 * load_n_m * (surface.span_m - distance) ** 2
-    with np.errstate(over="ignore"):  # of a modulus next to nothing
+    with np.errstate(over="ignore"):  # for a modulus close to zero
         return float((moment / surface.section_at(distance).ei_flap).sum()) * width
 
 
 def _divergence_pressure(surface: Surface) -> float:
-    """Dynamic pressure at which an unswept wing by strips twists off, Pa; infinite where none is.
+    """Divergence pressure of an unswept wing by strip theory, Pa; infinite if it cannot diverge.
 
     Bisplinghoff, Ashley & Halfman (1955), section 8-3: q = (pi / 2 L)^2 GJ / (e c a), with the lift e ahead
     of the elastic axis, for the mean section.

@@ -1,9 +1,9 @@
-"""Lifting surfaces that lie in each other: a lattice through a lattice has no meaning.
+"""Overlap of lifting surfaces: intersecting lattices give meaningless loads.
 
-Mid-surfaces are flat trapezia. Two that are nearly parallel overlap where their outlines do and their
-distance is less than their mean thickness; two at an angle where one cuts through the other. Both by
-separating axes (Gottschalk, Lin & Manocha 1996): convex bodies are apart where some axis keeps their shadows
-apart.
+Mid-surfaces are flat trapezia. Two nearly parallel surfaces overlap if their outlines do and their distance
+is less than their mean thickness; two surfaces at an angle overlap if one cuts through the other. Both are
+tested by separating axes (Gottschalk, Lin & Manocha 1996): convex bodies are apart if their projections onto
+some axis are.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 PARALLEL = 0.985  # cosine of ten degrees between the normals
 DEPTH_CHORDS = 0.02  # of the smaller mean chord: surfaces that meet at an edge do not overlap
-SHAPES = 9  # of a flight that are looked at
+SHAPES = 9  # shapes of a flight that are checked
 
 
 def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, int, int]]:
@@ -30,11 +30,12 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
     Parameters
     ----------
     angles : (k, h) of all hinges over a flight, rad. Of the rows
-        SHAPES are used, evenly spread with both ends, and those where each angle is least and greatest.
+        SHAPES are used, evenly spaced and including both ends, and those where each angle is smallest and
+        largest.
 
     Returns
     -------
-    (first, second, row) of each pair, row being the first of ``angles`` at which they were seen to overlap.
+    (first, second, row) of each pair, where row is the first of ``angles`` at which they overlap.
     """
     spread = np.linspace(0, angles.shape[0] - 1, SHAPES).round().astype(np.int64)
     rows = np.unique(np.concatenate([spread, angles.argmin(axis=0), angles.argmax(axis=0)]))

@@ -1,4 +1,4 @@
-"""Cross-section properties of a lifting surface: derived from a solid box of material, or given outright."""
+"""Cross-section properties of a lifting surface: from a solid box of material, or given explicitly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from morphdata.aircraft import Material, Section
 
 Array = NDArray[np.float64]
 
-TORSION_SERIES_TERMS = 60  # odd terms of Saint-Venant's series; the sum is converged to 1e-9
+TORSION_SERIES_TERMS = 60  # odd terms of Saint-Venant's series; converged to 1e-9
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class SectionProperties:
 
 
 def given_section(section: Section, chord: Array) -> SectionProperties:
-    """Properties given outright and constant along the span, at stations of the given chords (stations,)."""
+    """Properties given explicitly, constant along the span, at stations of the given chords (stations,)."""
     ones = np.ones_like(chord)
     ix, iy, iz = section.inertia_per_length_kg_m
     return SectionProperties(

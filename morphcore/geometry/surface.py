@@ -1,4 +1,4 @@
-"""Lifting surfaces with every default resolved, as the numerics take them."""
+"""Lifting surfaces with all defaults resolved, in the form used by the numerics."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Surface(Shown):
     """A flat lifting surface on hinges: straight mid-chord line along its own y, linear taper.
 
     Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
-    +y, the left one -y. ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` say how far the elastic axis and
-    the line of centres of mass lie aft of mid-chord (negative: forward of it), as documents have them; who
-    computes in W uses ``elastic_axis_x_m`` and ``mass_axis_x_m``. ``hinges`` are those that carry it, from
-    the fuselage outward: none of a fixed surface.
+    +y, the left one -y. As in documents, ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the
+    distances of the elastic axis and of the line of centres of mass aft of mid-chord (negative: forward);
+    computations in W use ``elastic_axis_x_m`` and ``mass_axis_x_m``. ``hinges`` carry the surface, from the
+    fuselage outward; a fixed surface has none.
     """
 
     name: str
@@ -75,17 +75,17 @@ class Surface(Shown):
 
     @property
     def elastic_axis_x_m(self) -> float:
-        """The x in W (forward positive) of the elastic axis: its offset is counted aft."""
+        """The x in W (forward positive) of the elastic axis; the offset itself is positive aft."""
         return -self.elastic_axis_offset_m
 
     @property
     def mass_axis_x_m(self) -> float:
-        """The x in W (forward positive) of the line of centres of mass: its offset is counted aft."""
+        """The x in W (forward positive) of the line of centres of mass; the offset itself is positive aft."""
         return -self.mass_axis_offset_m
 
     @property
     def root_arms_B(self) -> Array:
-        """From each hinge to the elastic axis at the root, (m, 3), m, at rest; see `hinge_arms`."""
+        """Vectors (m, 3), m, from each hinge to the elastic axis at the root, at rest; see `hinge_arms`."""
         return hinge_arms(self.hinges, np.array(self.position_m), np.array([self.elastic_axis_x_m, 0.0, 0.0]))
 
     @property
@@ -113,9 +113,9 @@ class Surface(Shown):
     def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array]:
         """Axial and shear stiffness, N, each (stations,), at distances from the root.
 
-        Of the solid box E A and 5/6 G A (Timoshenko's factor of a rectangle). Section properties given
-        outright do not hold them; they are then those of the rectangle of this thickness that is as stiff in
-        flap, 12 EI_flap / thickness^2: both are far too stiff to matter, but a beam needs them.
+        For the solid box they are E A and 5/6 G A (Timoshenko's factor of a rectangle). Explicit section
+        properties do not include them; they are then those of the rectangle of this thickness with the same
+        flap stiffness, 12 EI_flap / thickness^2. Both are far too stiff to matter, but a beam needs them.
         """
         axial = 12.0 * self.section_at(distance_m).ei_flap / self.thickness_m**2
         return axial, SHEAR_FACTOR * axial / (2.0 * (1.0 + self.material.poisson_ratio))

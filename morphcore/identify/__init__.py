@@ -16,6 +16,7 @@ from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
+from morphdata.measurement import Measurement
 
 __all__ = [
     "Identification",
@@ -37,6 +38,7 @@ def identify(
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
+    measurement: Measurement | None = None,
 ) -> IdentifyResult:
     """Identify an equivalent model from sample flights, from start to end.
 
@@ -56,6 +58,9 @@ def identify(
         The model whose parameters are searched: links, bounds, lattice, time step.
     search : IdentifySearch, optional
         Method and effort of the search.
+    measurement : Measurement, optional
+        How the samples were measured: channels, noise, biases, delays. What is left out is decided from the
+        data.
 
     Returns
     -------
@@ -89,6 +94,7 @@ def identify(
         samples,
         model or EquivalentModel(links_per_wing=links_per_wing),
         search_settings(search or IdentifySearch(seed=seed)),
+        measurement=measurement,
     )
     checkpoint = b""
     for step in run.steps():
@@ -126,7 +132,12 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
     """
     if threads is not None:
         use_threads(threads)
-    return Identification(*flown_inputs(request), request.model, search_settings(request.search))
+    return Identification(
+        *flown_inputs(request),
+        request.model,
+        search_settings(request.search),
+        measurement=request.measurement,
+    )
 
 
 def flown_inputs(request: SamplesRequest) -> tuple[Aircraft, Flight, list[Trajectory]]:

@@ -1,21 +1,28 @@
-"""What a parameter set costs: squared attitude errors over the samples, or the errors themselves.
+"""What a parameter set costs: squared errors of its flights over the samples, or the errors themselves.
 
-J = sum over samples and times of w (dphi^2 + dtheta^2 + dpsi^2), the differences wrapped; rad^2.
+J = sum over samples and times of w (dphi^2 + dtheta^2 + dpsi^2), the differences wrapped; rad^2. What else
+is unknown about a measurement is removed from the differences first (`nuisance`), the heading to begin with
+always; other channels count in proportion to their noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
-from morphcore.frames import euler_from_quaternion, euler_rates, wrap_angle
+from morphcore.frames import euler_from_quaternion, euler_rates, quaternion_from_euler
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.identify.measurement import START, Measured, Openness, measured
+from morphcore.identify.nuisance import Reduced, pseudo_residual, reduced
+from morphcore.identify.readings import Readings, readings, rows_needed
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
 from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
@@ -25,6 +32,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
+from morphdata.measurement import Measurement
 
 Array = NDArray[np.float64]
 
@@ -35,10 +43,19 @@ ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
 
 @dataclass(frozen=True)
 class SampleCase:
-    """A sample and the plan that all flights against it share."""
+    """A sample, the plan that all flights against it share, and its readings as they are compared.
+
+    By default these are its three angles, and only the heading is free.
+    """
 
     sample: Trajectory
     plan: FlightPlan
+    given: Measured | None = None
+
+    @cached_property
+    def setup(self) -> Measured:
+        """The readings and what is unknown about them."""
+        return measured(self.sample, Measurement(), Openness()) if self.given is None else self.given
 
     @property
     def weight(self) -> Array:
@@ -48,13 +65,15 @@ class SampleCase:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Errors of parameter sets p against one sample of k rows.
+    """Errors of parameter sets p against one sample of k rows and c fitted channels.
 
-    errors : (p, k, 3) weighted wrapped angle differences, rad. diverged : (p,).
+    errors : (p, k, c) weighted differences, without the nuisances, rad. diverged : (p,). nuisance : (p, n) as
+    of `nuisance.Reduced`.
     """
 
     errors: Array
     diverged: NDArray[np.bool_]
+    nuisance: Array
 
     @property
     def cost(self) -> Array:
@@ -73,10 +92,12 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
             angle = schedule.motion(sample.time_s).angle
             bad = hinge.beyond_range(angle)
             if bad.size:
+                unit = f"; are they degrees? Then name the column {key}_deg"
                 raise InvalidInput(
                     f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
                     pointer=f"{pointer}/{key}_rad/{bad[0]}",
-                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad"
+                    + unit * bool(np.abs(angle).max() > np.pi),
                 )
     return hinge_schedules(aircraft, followed)
 
@@ -88,8 +109,12 @@ def sample_cases(
     pointer: str = "/samples",
     *,
     separate_wings: bool = False,
+    whole: Sequence[bool] = (),
 ) -> tuple[SampleCase, ...]:
-    """Plans for all samples, for models whose wings share their parameters or have ``separate_wings``."""
+    """Plans for all samples, for models whose wings share their parameters or have ``separate_wings``.
+
+    whole : of each sample, whether its flights may leave symmetry although its drives do not.
+    """
     return tuple(
         SampleCase(
             sample,
@@ -97,7 +122,7 @@ def sample_cases(
                 model,
                 sample_schedules(model.aircraft, sample, f"{pointer}/{i}"),
                 time_grid(sample.time_s, longest_step_s),
-                may_halve=not separate_wings,
+                may_halve=not (separate_wings or any(whole[i : i + 1])),
             ),
         )
         for i, sample in enumerate(samples)
@@ -164,16 +189,61 @@ def fly_attitudes(
     return attitude
 
 
+def fly_readings(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
+) -> Readings:
+    """All channels that a sample fits, at any time; NaN from where a flight diverged, or untrimmed."""
+    plan, setup = case.plan, case.setup
+    flown = plan.flown(model)
+    constants = lane_constants(flown, batch, plan.grid.step_s)
+    constants.set_thrust(found.force_B, found.moment_B)
+    state = trimmed_state(flown, batch, plan, found, psi=float(case.sample.psi[0]))
+    if any(setup.openness.start_value):
+        state = moved_start(state, found.alpha, float(case.sample.psi[0]), setup.openness.start_value)
+    count = rows_needed(setup.channels, flown.coordinates)
+    chunks = fly_batch(flown, plan, constants, state, record_rows=count, stop=stop)
+    rows = np.concatenate([chunk.rows for chunk in chunks])
+    rows[..., ~found.converged] = np.nan
+    return readings(flown, batch, plan, found, rows, setup.channels, model)
+
+
+def moved_start(state: Array, alpha: Array, psi: float, change: Sequence[float]) -> Array:
+    """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`."""
+    moved = state.copy()
+    of = dict(zip(START, change, strict=True))
+    zero = np.zeros(alpha.size)
+    moved[:, :OMEGA] = quaternion_from_euler(zero + of["phi_rad"], alpha + of["theta_rad"], zero + psi)
+    moved[:, OMEGA:POSITION] += np.array(change[2:])
+    return moved
+
+
+def reduced_errors(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
+) -> Reduced:
+    """Fly parameter sets against one sample, and remove what is unknown about its measurement."""
+    fly = fly_attitudes if case.setup.plain else fly_readings
+    return reduced(case.setup, case.sample.time_s, fly(model, batch, case, found, stop))
+
+
+def fly_measured(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
+) -> Array:
+    """Angles (p, k, 3) as the sample's sensors would have read them on the flights of parameter sets."""
+    return np.asarray(case.sample.euler + reduced_errors(model, batch, case, found, stop).error[..., :3])
+
+
 def evaluate(
     model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
 ) -> Evaluation:
     """Fly parameter sets against one sample."""
-    attitude = fly_attitudes(model, batch, case, found, stop)
-    diverged = ~np.all(np.isfinite(attitude), axis=(1, 2))
-    errors = wrap_angle(attitude - case.sample.euler)
+    setup = case.setup
+    out = reduced_errors(model, batch, case, found, stop)
+    missing = np.isnan(setup.values[:, setup.fitted])
+    errors = pseudo_residual(setup, out.error)[..., setup.fitted]
+    lost = ~np.isfinite(errors) & ~missing
     # a diverged flight: large, finite, and the less the longer it held out
-    errors = np.where(np.isfinite(errors), errors, DIVERGED_ANGLE)
-    return Evaluation(errors * case.weight, diverged)
+    errors = np.where(lost, DIVERGED_ANGLE * np.sqrt(case.sample.weight), np.where(missing, 0.0, errors))
+    return Evaluation(errors, np.any(lost, axis=(1, 2)), out.nuisance)
 
 
 def costs(
@@ -202,15 +272,17 @@ def residuals(
     start: StartMode,
     stop: Stop | None = None,
 ) -> Array:
-    """(p, m) all weighted errors of all samples in one row per parameter set."""
-    ends = np.cumsum([3 * case.sample.time_s.size for case in cases])
+    """(p, m) all weighted errors of all samples in one row per parameter set: by rows, then channels."""
+    counts = [case.setup.residual_count for case in cases]
+    ends = np.cumsum(counts)
     errors = np.empty((batch.particles, ends[-1]))
 
     def fly(part: slice, stop: Stop) -> None:
         chosen = batch.select(part)
-        for end, (case, found) in zip(ends, shared_trims(model, chosen, cases, start), strict=True):
+        trims = shared_trims(model, chosen, cases, start)
+        for end, count, (case, found) in zip(ends, counts, trims, strict=True):
             own = evaluate(model, chosen, case, found, stop).errors
-            errors[part, end - 3 * case.sample.time_s.size : end] = own.reshape(chosen.particles, -1)
+            errors[part, end - count : end] = own.reshape(chosen.particles, -1)
 
     _in_slabs(batch.particles, fly, stop)
     return errors

@@ -14,7 +14,7 @@ autocorrelation leaves it, so that the choice does not depend on how densely a f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-CHANNELS = 3  # phi, theta, psi of each row
+Shapes = Sequence[tuple[int, int]]  # rows and channels of the residuals of each sample
+
 MIN_SPREAD, MAX_SPREAD = 0.03, 1.0  # of the guess: from a few per cent to a factor e
 WEIGHTS = np.geomspace(1e-16, 1e-2, 113)  # that are tried, rad^2 a squared unit
 # a weight stays until another one makes the flights e times likelier: else it would wander to and fro
@@ -40,13 +41,13 @@ class ChosenPrior:
         The guess in search coordinates.
     first : ndarray, shape (d,)
         Weights with which the search begins, rad^2 a squared unit.
-    rows : tuple of int
-        Rows of each sample to fit.
+    shapes : callable, () -> sequence of (int, int)
+        Rows and channels of the residuals of each sample to fit; looked at when the first ones come.
     """
 
     point: Array
     first: Array
-    rows: tuple[int, ...]
+    shapes: Callable[[], Shapes]
 
     def weights(self, error: Array, jacobian: Array, offset: Array, present: Array) -> Array:
         """Return the weights (d,) under which the residuals are most likely.
@@ -61,7 +62,7 @@ class ChosenPrior:
             The weights so far.
         """
         weight = float(present.max())
-        count = independent_rows(left_after(error, jacobian, offset, weight), self.rows)
+        count = independent_rows(left_after(error, jacobian, offset, weight), self.shapes())
         tried = np.append(WEIGHTS, weight)
         likelihood = log_likelihood(error - jacobian @ offset, jacobian, count, tried)
         best = int(np.argmax(likelihood))
@@ -75,15 +76,15 @@ def left_after(error: Array, jacobian: Array, offset: Array, weight: float) -> A
     return np.asarray(error - jacobian @ np.linalg.solve(square, jacobian.T @ error + weight * offset))
 
 
-def independent_rows(error: Array, rows: Sequence[int]) -> float:
+def independent_rows(error: Array, shapes: Shapes) -> float:
     """How many independent rows residuals (m,) are worth, by their autocorrelation in each channel.
 
     The sum of the autocorrelation is taken as far as it stays positive (Geyer 1992).
     """
     total, first = 0.0, 0
-    for count in rows:
-        own = error[first : first + CHANNELS * count].reshape(count, CHANNELS).T
-        first += CHANNELS * count
+    for count, channels in shapes:
+        own = error[first : first + channels * count].reshape(count, channels).T
+        first += channels * count
         for channel in own[np.abs(own).max(axis=1) > SMALLEST_RAD]:
             spectrum = np.abs(np.fft.rfft(channel, 2 * count)) ** 2
             correlation = np.fft.irfft(spectrum)[:count]

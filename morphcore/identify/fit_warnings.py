@@ -12,6 +12,7 @@ from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.obstacle import obstacle
 from morphcore.identify.cost import shared_trims
+from morphcore.identify.diagnoses import WRONG_DATA
 from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
@@ -22,7 +23,6 @@ from morphcore.validity import (
     AirMotion,
     ResultWarning,
     air_warnings,
-    degrees_warning,
     error_warning,
     overlap_warnings,
     steep_warning,
@@ -35,16 +35,20 @@ if TYPE_CHECKING:
 Motions = list[tuple[str, str, AirMotion]]  # name, pointer and motion of each flight
 SHOWN_NAMES = 4  # of parameters in a sentence
 COMPARED = {"rigid": "the rigid model", "initial": "the first guess from beam theory"}
-UNSEEN_HINT = (
-    "the samples do not determine this, and the value means little: take fewer links, or samples that "
-    "show more"
-)
 
 
-def not_flyable(model: ChainModel, lost: Sequence[SampleFit], settings: EquivalentModel) -> NotFlyable:
+def not_flyable(
+    model: ChainModel,
+    lost: Sequence[SampleFit],
+    settings: EquivalentModel,
+    diagnosed: Sequence[ResultWarning] = (),
+) -> NotFlyable:
     """The error of a search whose best model does not fly what it was fitted to, with what may be why."""
     found = obstacle(model.aircraft, model.flight)
-    if found is not None:
+    cause = next((warning for warning in diagnosed if warning.code in WRONG_DATA), None)
+    if cause is not None:
+        pointer, hint = cause.pointer, f"{cause.message}: {cause.hint}"
+    elif found is not None:
         pointer, hint = found.pointer, found.hint
     elif all(fit.ending("rigid") for fit in lost):
         pointer = "/aircraft"
@@ -70,30 +74,33 @@ def fit_warnings(
     fits: Sequence[SampleFit],
     at_bound: Mapping[str, str],
     undetermined: Collection[str],
+    diagnosed: Sequence[ResultWarning] = (),
 ) -> tuple[ResultWarning, ...]:
     """Warnings of the best model (one parameter set) of an identification.
 
     at_bound : parameters that ended at a bound, and which. undetermined : those that the samples do not see.
+    diagnosed : what is wrong with the samples.
     """
     aircraft = run.model.aircraft
     found: list[ResultWarning] = []
     lost = [fit for fit in fits if fit.case.sample.role == "train" and fit.ending("identified")]
     if lost:
-        error = not_flyable(run.model, lost, run.settings)
+        error = not_flyable(run.model, lost, run.settings, diagnosed)
         found.append(ResultWarning(error.code, error.message, error.hint, error.pointer))
-    found += _of_samples(fits)
+    found += diagnosed
+    found += _of_samples(fits, explained=any(warning.code in WRONG_DATA for warning in diagnosed))
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
     found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft) for fit in fits]))
     return tuple(found)
 
 
-def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
+def _of_samples(fits: Sequence[SampleFit], *, explained: bool) -> Iterable[ResultWarning]:
+    """What each flight shows; a large error is not reported where a diagnosis explains it."""
     for number, fit in enumerate(fits):
         sample = fit.case.sample
         name, pointer = f"sample {sample.name!r}", f"/samples/{number}"
         yield from steep_warning(name, pointer, sample.theta)
-        yield from degrees_warning(name, pointer, sample.euler, fit.rigid)
         if sample.role != "train" and fit.ending("identified"):
             yield ResultWarning(
                 "diverged",
@@ -110,19 +117,25 @@ def _of_samples(fits: Sequence[SampleFit]) -> Iterable[ResultWarning]:
                     "there is nothing to compare the identified model with on this sample",
                     pointer,
                 )
-        yield from error_warning(
-            name, pointer, fit.errors("identified"), wrap_angle(sample.euler - sample.euler[0])
-        )
+        if not explained:
+            yield from error_warning(
+                name, pointer, fit.errors("identified"), wrap_angle(sample.euler - sample.euler[0])
+            )
 
 
 def _of_bounds(
     space: SearchSpace, at_bound: Mapping[str, str], undetermined: Collection[str]
 ) -> Iterable[ResultWarning]:
-    """One warning for each kind of parameter and end of its range; those that are not seen, apart."""
-    kinds: dict[tuple[str, str, bool], list[str]] = {}
+    """One warning for each kind of parameter and end of its range.
+
+    A parameter that the samples do not see may end anywhere: it is reported as undetermined, and no reason to
+    doubt the fit.
+    """
+    kinds: dict[tuple[str, str], list[str]] = {}
     for name, end in at_bound.items():
-        kinds.setdefault((space.parameter(name).name, end, name in undetermined), []).append(name)
-    for (kind, end, unseen), names in kinds.items():
+        if name not in undetermined:
+            kinds.setdefault((space.parameter(name).name, end), []).append(name)
+    for (kind, end), names in kinds.items():
         shown = ", ".join(names[:SHOWN_NAMES])
         more = f" and {len(names) - SHOWN_NAMES} more" if len(names) > SHOWN_NAMES else ""
         hint = space.parameter(names[0]).at_bound.get(
@@ -131,7 +144,7 @@ def _of_bounds(
         yield ResultWarning(
             "at_bound",
             f"{shown}{more} ended at the {end} bound of the search",
-            UNSEEN_HINT if unseen else hint,
+            hint,
             f"/model/bounds/{kind}",
         )
 

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
-from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.drive_histories import smoothed_drives
+from morphcore.identify.first_angles import with_first_angles
 from morphcore.identify.evidence import ChosenPrior
 from morphcore.identify.free_corrections import determined_corrections
+from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
+from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.result import IdentifyResult, identify_result
+from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.search.checkpoint import pack, unpack
-from morphcore.search.hybrid import Hybrid
-from morphcore.search.least_squares import LeastSquares
+from morphcore.search.hybrid import Hybrid, HybridState
+from morphcore.search.least_squares import LeastSquares, LeastSquaresState
 from morphcore.search.methods import Factory, method
 from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.solver import Batch, Box, Outcome
@@ -34,20 +39,24 @@ from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel, samples_faults
+from morphdata.measurement import Measurement
 
 Array = NDArray[np.float64]
 
-VERSION = "identification 4"  # of the checkpoint; another one is not read
+VERSION = "identification 6"  # of the checkpoint; another one is not read
 CANDIDATE_SPREAD = (
     0.5  # standard deviation of the candidates around the physical guess, in search coordinates
 )
-# A weak prior on the descent: being off the physical guess by one unit costs as much as one error of this
-# size. It settles the directions that the samples cannot see and is far below what they can.
+# A weak prior, until the flights have chosen its weight: being off the physical guess by one unit costs as
+# much as one error of this size. It settles the directions that the samples do not determine.
 PRIOR_RAD = 3e-5
 # "hybrid" looks elsewhere where the descent from the physical guess leaves errors above 1 % of the motion
 # (rms, so squared here): it may have ended in a wrong valley. Where it does not, a screening and three times
 # the flights lowered J by five per cent at most (docs/performance_search.md).
 GOOD_FIT = 1e-4
+NOISE_MARGIN = 1.5  # by which a good fit may exceed the noise of the rows
+REVIEW = "measurement"  # as the history of a result calls a review of what is known about the measurement
+DESCENDING = ("hybrid", "least_squares")  # methods whose end is a descent that another one can follow
 
 
 class Identification:
@@ -67,6 +76,8 @@ class Identification:
         The model whose parameters are searched.
     search : SearchSettings, optional
         Method and effort of the search.
+    measurement : Measurement, optional
+        How the samples were measured; what is left out is decided from the data.
     clock : callable
         Wall time, s.
 
@@ -84,17 +95,28 @@ class Identification:
         model: EquivalentModel | None = None,
         search: SearchSettings | None = None,
         *,
+        measurement: Measurement | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.settings = model or EquivalentModel()
         self.search = search or SearchSettings()
         self._clock = clock
         self._step_s = self.settings.step_s
+        self._round = 0
+        self._plans: dict[tuple[bool, ...], tuple[SampleCase, ...]] = {}
+        self._cases: tuple[tuple[Openness, ...], tuple[SampleCase, ...]] | None = None
+        self._linear: tuple[tuple[Openness, ...], Array, Array, Array] | None = None
         refuse(samples_faults(samples))
         for number, sample in enumerate(samples):
             require_flight(sample, f"/samples/{number}")
         samples = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
-        self.samples = tuple(samples)
+        self.measurement = measurement or Measurement()
+        smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
+        self.samples = tuple(sample for sample, _ in smoothed)
+        self.histories = tuple(histories for _, histories in smoothed)
+        self._first_openness = first_openness(self.samples, self.measurement)
+        # of each sample, what is unknown about its measurement; the same in a round of the search
+        self.openness: tuple[Openness, ...] = self._first_openness
         if self.settings.start == "given" and flight.start is None:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
@@ -104,12 +126,14 @@ class Identification:
         if free is None:
             training = [sample for sample in samples if sample.role == "train"]
             free = determined_corrections(self.model.parameters, training)
-        self.space: SearchSpace = search_space(
+        self._first_space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
             aero_coefficients=free,
             bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
         )
+        # the same with the bounds that the search has widened by now, and the weight that it gives the prior
+        self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack(
@@ -139,20 +163,52 @@ class Identification:
                 )
         return self._step_s
 
-    @cached_property
+    @property
     def cases(self) -> tuple[SampleCase, ...]:
-        """All samples with their plans."""
-        return sample_cases(
-            self.model,
-            self.samples,
-            self.step_s,
-            separate_wings=self.settings.separate_wings,
-        )
+        """All samples with their plans, and with what is unknown about their measurement."""
+        if self._cases is None or self._cases[0] is not self.openness:
+            self._cases = (self.openness, self._opened(self.openness))
+        return self._cases[1]
 
-    @cached_property
+    def _opened(self, openness: tuple[Openness, ...]) -> tuple[SampleCase, ...]:
+        whole = tuple(each.start for each in openness)
+        if whole not in self._plans:
+            self._plans[whole] = sample_cases(
+                self.model,
+                self.samples,
+                self.step_s,
+                separate_wings=self.settings.separate_wings,
+                whole=whole,
+            )
+        cases = []
+        for case, each, histories in zip(self._plans[whole], openness, self.histories, strict=True):
+            setup = measured(case.sample, self.measurement, each)
+            if each.start:
+                point = each.reference if each.reference.size else self.known[0]
+                with one_blas_thread():
+                    setup = with_start(self, case, setup, self.space.decode(point))
+            opened = replace(case, given=setup)
+            with one_blas_thread():
+                guess = self.space.decode(self.known[0])
+                setup = with_first_angles(self.model, guess, opened, histories, self.settings.start)
+            cases.append(replace(case, given=setup))
+        return tuple(cases)
+
+    @property
     def training(self) -> tuple[SampleCase, ...]:
         """The samples to fit."""
         return tuple(case for case in self.cases if case.sample.role == "train")
+
+    @cached_property
+    def floors(self) -> dict[str, float]:
+        """The least noise that each channel is credited with."""
+        return self._first_openness[0].sigma
+
+    def linearised(self, point: Array) -> tuple[Array, Array]:
+        """Residuals (m,) and their Jacobian (m, d) at a search point (d,); the last ones are kept."""
+        if self._linear is None or self._linear[0] is not self.openness or any(self._linear[1] != point):
+            self._linear = (self.openness, point, *linearised(self, point))
+        return self._linear[2:]
 
     # the iterator
 
@@ -166,7 +222,9 @@ class Identification:
         """
         state = SearchState(self.search.max_seconds) if checkpoint is None else self.state(checkpoint)
         while not state.over:
-            state = self._search.advance(state, stop)
+            state = self._entered(self._search.advance(state, stop))
+            if state.over:
+                state = self._reviewed(state, stop)
             yield self._step(state)
 
     def result(self, checkpoint: bytes) -> IdentifyResult:
@@ -199,9 +257,60 @@ class Identification:
         ------
         UnreadableCheckpoint : the bytes are damaged or of another version.
         """
-        state = unpack(checkpoint, VERSION, SearchState)
-        self._step_s = state.prepared if self._step_s is None else self._step_s
+        return self._entered(unpack(checkpoint, VERSION, SearchState))
+
+    def _entered(self, state: SearchState) -> SearchState:
+        """Return the state, after taking over what its flights go by."""
+        if isinstance(state.prepared, Prepared):
+            self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
+            if self._round != state.prepared.round:
+                self.openness, self._round = state.prepared.openness, state.prepared.round
+        self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
+        if isinstance(state.solver, LeastSquaresState | HybridState):
+            descent = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
+            self.space = self._first_space.widened(descent.box)
+            self.prior_weight = float(descent.best_weight.max())
         return state
+
+    def _reviewed(self, state: SearchState, stop: Stop | None) -> SearchState:
+        """Return the state of the next round, where the residuals call for one; else the same."""
+        up = state.budget_s is not None and state.wall_s >= state.budget_s
+        if self.search.method not in DESCENDING or self._round + 1 >= MAX_ROUNDS or up:
+            return state
+        if not (self.space.dimension and np.isfinite(state.best_cost)):
+            return state
+        begin = self._clock()
+        with one_blas_thread():
+            found = next_openness(self, state.best)
+            if found is None:
+                return state
+            freed = any(a.reason != b.reason for a, b in zip(found, self.openness, strict=True))
+            prepared = Prepared(self.step_s, found, self._round + 1)
+            self._entered(replace(state, prepared=prepared))
+            # with other unknowns the best model may lie in another valley
+            points = np.stack([state.best, *(self.known if freed else ())])
+            known = self.evaluate(Batch(points), stop)
+        leader = int(np.argmin(known.cost))
+        flights = state.flights + points.shape[0] * self.flights_each
+        row = {
+            "generation": state.generation + 1,
+            "phase": REVIEW,
+            "particles": points.shape[0],
+            "flights": flights,
+            "best_cost": float(known.cost[leader]),
+        }
+        return replace(
+            state,
+            prepared=prepared,
+            solver=_descent(self, self.search).init(known, self.space.box),
+            best=points[leader],
+            best_cost=float(known.cost[leader]),
+            generation=state.generation + 1,
+            flights=flights,
+            wall_s=state.wall_s + self._clock() - begin,
+            history=(*state.history, row),
+            over=False,
+        )
 
     # steps whose flights others fly
 
@@ -211,6 +320,8 @@ class Identification:
 
     def task_costs(self, points: Array, stop: Stop | None = None) -> Array:
         """Costs (p,) of search points (p, d), rad^2: of any part of a task, whoever flies the rest."""
+        # a step whose costs are all that it needs comes before any review of the residuals
+        self._entered(SearchState(prepared=Prepared(self.step_s, self._first_openness)))
         with one_blas_thread():
             return self.evaluate(Batch(points), stop).cost
 
@@ -238,17 +349,7 @@ class Identification:
     @property
     def box(self) -> Box:
         """The bounds of the search coordinates."""
-        return Box(self.space.lower, self.space.upper)
-
-    @property
-    def prior_weight(self) -> float:
-        """What one unit off the physical guess costs in a descent, rad^2."""
-        return PRIOR_RAD**2
-
-    def prior(self) -> ChosenPrior:
-        """What is known before any flight, and how it is weighed against them."""
-        rows = tuple(sample.time_s.size for sample in self.samples if sample.role == "train")
-        return ChosenPrior(self.space.guess, np.full(self.space.dimension, PRIOR_RAD**2), rows)
+        return self._first_space.box
 
     @property
     def flights_each(self) -> int:
@@ -259,13 +360,14 @@ class Identification:
         """Return random points as they are: the coordinates have no order."""
         return points
 
-    def prepare(self, deadline: Deadline) -> float:
-        """Choose the time step of all flights, s; the default where the time is up before it is chosen."""
+    def prepare(self, deadline: Deadline) -> Prepared:
+        """Choose the time step of all flights; the default where the time is up before it is chosen."""
         compile_flights()
+        require_seconds(self)
         if self._step_s is None:
             self._step_s = deadline.before_it(self._chosen_step, STEP_S)
         say("flying the first guess")
-        return self._step_s
+        return Prepared(self._step_s, self._first_openness)
 
     def first(self) -> Batch:
         """Return what is known beforehand."""
@@ -281,17 +383,23 @@ class Identification:
         errors = residuals(self.model, sets, self.training, self.settings.start, stop)
         return Outcome(batch.points, np.einsum("pm,pm->p", errors, errors), errors, count)
 
-    @cached_property
+    @property
     def _search(self) -> Search[Outcome]:
+        """The search of the present round: after a review, a descent from what was found."""
+        if self._round:
+            return Search(self, _descent(self, self.search), self._clock)
         return Search(self, method(self.search.method, self, self.search, METHODS), self._clock)
 
     def good_cost(self) -> float:
-        """Return J with which a descent has ended well, rad^2: a share of the motion in the samples."""
-        return GOOD_FIT * sum(
-            float(np.sum((np.sqrt(sample.weight) * wrap_angle(sample.euler - sample.euler[0])) ** 2))
-            for sample in self.samples
-            if sample.role == "train"
-        )
+        """Return J with which a descent has ended well, rad^2: a share of the motion, and the noise."""
+        total = 0.0
+        for case in self.training:
+            setup = case.setup
+            moved = setup.weight * (setup.values - setup.values[0])
+            noise = np.array(list(angle_noise(case.sample).values()))
+            total += GOOD_FIT * float(np.nansum(moved**2))
+            total += NOISE_MARGIN * case.sample.time_s.size * float(np.sum((setup.weight[:3] * noise) ** 2))
+        return total
 
     def _step(self, state: SearchState) -> Step:
         phase = str(state.history[-1]["phase"])
@@ -307,12 +415,18 @@ class Identification:
 
 
 def _descent(run: Identification, settings: SearchSettings) -> LeastSquares:
-    return LeastSquares(run, settings.iterations, run.prior(), run.space.limits)
+    def shapes() -> list[tuple[int, int]]:
+        """Rows and channels of the residuals of each sample to fit."""
+        return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in run.training]
+
+    first = np.full(run.space.dimension, run.prior_weight)
+    return LeastSquares(
+        run, settings.iterations, ChosenPrior(run.space.guess, first, shapes), run.space.limits
+    )
 
 
 def _hybrid(run: Identification, settings: SearchSettings) -> Hybrid:
     return Hybrid(
-        run,
         _descent(run, settings),
         candidates=settings.screen,
         starts=settings.starts,

@@ -116,6 +116,11 @@ class SearchSpace:
         """(d,) upper bounds."""
         return np.concatenate([unknown.upper for unknown in self.unknowns])
 
+    @property
+    def box(self) -> Box:
+        """The bounds."""
+        return Box(self.lower, self.upper)
+
     @cached_property
     def limits(self) -> Box:
         """How far the box may be widened, (d,) each."""
@@ -271,6 +276,11 @@ class SearchSpace:
             for name, end in zip(unknown.names, ends[at], strict=False)  # the last share has no coordinate
             if end
         }
+
+    def bound_coordinates(self, x: Array) -> NDArray[np.int64]:
+        """Indices of the coordinates of x (d,) that lie at their bounds."""
+        near = BOUND_TOLERANCE * (self.upper - self.lower)
+        return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
 
     def parameter(self, name: str) -> Parameter:
         """The kind of a named parameter; its former name is accepted, too."""

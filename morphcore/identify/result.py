@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.coloured import ColouredNoise, records
-from morphcore.identify.cost import SampleCase, fly_attitudes, residuals, shared_trims
+from morphcore.identify.coloured import ColouredNoise
+from morphcore.identify.cost import SampleCase, fly_measured, shared_trims
+from morphcore.identify.cramer_rao import cramer_rao_percent
+from morphcore.identify.diagnoses import diagnoses
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_measurement import fit_records, fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
+from morphcore.identify.verdict import Verdict, verdict
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
 from morphcore.models.parameters_document import parameters_document
-from morphcore.search.least_squares import differences
 from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
-from morphdata.renamed import both_spellings
+from morphdata.renamed import both_spellings, under_both_spellings
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
@@ -53,6 +58,12 @@ class IdentifyResult(Shown):
         What the method does not answer for.
     at_bound : tuple of str
         Parameters that ended at a bound of the search.
+    values : dict of str to float
+        The identified parameters by the names that their uncertainty has, SI units.
+    cramer_rao_percent : dict of str to float or None
+        Cramer-Rao bound of each searched parameter, per cent of its value.
+    measurement : mapping of str to dict
+        Biases, delay and heading that were found, by the name of the sample; empty where nobody has looked.
     """
 
     model: ChainModel
@@ -64,6 +75,20 @@ class IdentifyResult(Shown):
     settings: EquivalentModel
     warnings: tuple[ResultWarning, ...] = ()
     at_bound: tuple[str, ...] = ()
+    values: dict[str, float] = field(default_factory=dict)
+    cramer_rao_percent: dict[str, float | None] = field(default_factory=dict)
+    measurement: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the model may be believed, and why."""
+        return verdict(
+            self.fits,
+            self.warnings,
+            undetermined=() if self.uncertainty is None else self.uncertainty.undetermined,
+            at_bound=self.at_bound,
+            finished=bool(self.search.get("finished", True)),
+        )
 
     @property
     def lost(self) -> tuple[SampleFit, ...]:
@@ -73,7 +98,7 @@ class IdentifyResult(Shown):
     def require_flown(self) -> IdentifyResult:
         """Itself, if its model flies all samples that it was fitted to; else NotFlyable."""
         if self.lost:
-            raise not_flyable(self.model, self.lost, self.settings)
+            raise not_flyable(self.model, self.lost, self.settings, self.warnings)
         return self
 
     def to_document(self) -> dict[str, Any]:
@@ -83,10 +108,19 @@ class IdentifyResult(Shown):
             "fit": [fit.to_document() for fit in self.fits],
             "uncertainty": no_uncertainty(self.at_bound)
             if self.uncertainty is None
-            else self.uncertainty.to_document(),
+            else self.uncertainty.to_document() | self._values_document(),
+            "measurement": dict(self.measurement),
             "search": self.search,
             "cost": self.cost,
+            "verdict": self.verdict.to_document(),
             "warnings": documents(self.warnings),
+        }
+
+    def _values_document(self) -> dict[str, Any]:
+        """Values by the names that the intervals have, and their Cramer-Rao bounds."""
+        return {
+            "value": under_both_spellings(self.values),
+            "cramer_rao_percent": under_both_spellings(self.cramer_rao_percent),
         }
 
     def _model_document(self) -> dict[str, Any]:
@@ -136,24 +170,14 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
     )
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
-    certainty = None
+    certainty = noise = None
+    nuisances = fitted_nuisances(run, state.best) if judged and flies else ()
     if judged and space.dimension and flies:
-
-        def errors(points: Array) -> Array:
-            return residuals(run.model, space.decode(points), run.training, start)
-
-        residual, jacobian = differences(state.best[None, :], space.upper, errors)
+        residual, jacobian = run.linearised(state.best)
         trained = [fit for fit in fits if fit.case.sample.role == "train"]
-        noise = ColouredNoise(
-            records(
-                [fit.case.sample.time_s for fit in trained],
-                residual[0],
-                jacobian[0],
-                [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained],
-            ),
-            run.prior_weight,
-        )
-        certainty = uncertainty(space, state.best, residual[0], jacobian[0], noise)
+        motions = [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained]
+        noise = ColouredNoise(fit_records(run, residual, jacobian, motions, nuisances), run.prior_weight)
+        certainty = uncertainty(space, state.best, residual, jacobian, noise)
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
@@ -187,9 +211,17 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
         ),
         warnings=fit_warnings(
-            run, best, fits, at_bound, certainty.undetermined if certainty is not None else ()
+            run,
+            best,
+            fits,
+            at_bound,
+            certainty.undetermined if certainty is not None else (),
+            diagnoses(run, fits, state.best, fly=judged),
         ),
         at_bound=tuple(at_bound),
+        values=dict(zip(space.parameter_names, space.flatten(best)[0].tolist(), strict=True)),
+        cramer_rao_percent={} if certainty is None else cramer_rao_percent(space, state.best, certainty),
+        measurement=measurement_documents(run, nuisances, noise) if nuisances else {},
     )
 
 
@@ -197,7 +229,7 @@ def _attitudes(
     model: ChainModel, batch: ParameterBatch, cases: tuple[SampleCase, ...], start: Any
 ) -> list[Array]:
     return [
-        fly_attitudes(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
+        fly_measured(model, batch, case, found) for case, found in shared_trims(model, batch, cases, start)
     ]
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
 from morphcore.identify.cost import SampleCase
+from morphcore.identify.statistics import ChannelStatistics, channel_statistics
 from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
@@ -42,6 +43,16 @@ class SampleFit(Shown):
         time_s = self.case.sample.time_s
         return f"diverged at t = {time_s[np.argmin(known)]:.2f} s" if known[0] else "could not be trimmed"
 
+    def statistics(self) -> dict[str, ChannelStatistics]:
+        """Statistics of the identified model's errors, by angle."""
+        sample = self.case.sample
+        measured = np.unwrap(sample.euler, axis=0)
+        modelled = measured + self.errors("identified")
+        return {
+            angle: channel_statistics(sample.time_s, measured[:, k], modelled[:, k], sample.drives)
+            for k, angle in enumerate(ANGLES)
+        }
+
     def to_document(self) -> dict[str, Any]:
         """JSON form with the names that the API fixes, and the rigid model's errors beside."""
 
@@ -59,6 +70,7 @@ class SampleFit(Shown):
             "max_abs_rad": per_angle(np.abs(identified).max(axis=0)),
             "rms_rigid_rad": per_angle(np.sqrt(np.mean(rigid**2, axis=0))),
             "range_rad": per_angle(np.ptp(self.case.sample.euler, axis=0)),
+            "statistics": {angle: found.to_document() for angle, found in self.statistics().items()},
         }
 
     def to_curves(self) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from morphcore.threads import one_blas_thread, use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, Search, SearchedModel
+from morphdata.measurement import Measurement
 from morphdata.renamed import both_spellings
 from morphdata.study import StudiedModels, StudyRequest
 
@@ -42,8 +43,9 @@ class Study:
     Parameters
     ----------
     links : numbers of links, all different; they are worked off in this order.
-    model, search : as of one identification; ``links_per_wing`` is not looked at. ``max_seconds`` is the
-        time for all, divided by the number of unknowns; what one leaves over the next ones have.
+    model, search, measurement : as of one identification; ``links_per_wing`` is not looked at.
+        ``max_seconds`` is the time for all, divided by the number of unknowns; what one leaves over is for
+        the next ones.
 
     Raises
     ------
@@ -59,6 +61,7 @@ class Study:
         links: Sequence[int] = LINKS,
         model: SearchedModel | None = None,
         search: SearchSettings | None = None,
+        measurement: Measurement | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.links = tuple(StudiedModels.parse({"links_per_wing": [*links]}, "/model").links_per_wing)
@@ -67,7 +70,15 @@ class Study:
         settings = StudiedModels() if model is None else model
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = tuple(
-            Identification(aircraft, flight, samples, _of_links(settings, n), self.search, clock=clock)
+            Identification(
+                aircraft,
+                flight,
+                samples,
+                _of_links(settings, n),
+                self.search,
+                measurement=measurement,
+                clock=clock,
+            )
             for n in self.links
         )
         self._prepared: FlightTiming | None = None
@@ -250,6 +261,7 @@ def study(
     links: Sequence[int] = LINKS,
     model: SearchedModel | None = None,
     search: Search | None = None,
+    measurement: Measurement | None = None,
 ) -> StudyResult:
     """Study several numbers of links per wing, from start to end.
 
@@ -268,6 +280,8 @@ def study(
         What the models have in common: bounds, lattice, time step.
     search : Search, optional
         Method and effort of each search.
+    measurement : Measurement, optional
+        How the samples were measured; what is left out is decided from the data.
 
     Returns
     -------
@@ -294,6 +308,7 @@ def study(
         links=links,
         model=model,
         search=search_settings(search or Search()),
+        measurement=measurement,
     )
     checkpoint = b""
     for step in run.steps():
@@ -315,6 +330,7 @@ def study_from_request(request: StudyRequest, threads: int | None = None) -> Stu
         links=request.model.links_per_wing,
         model=request.model,
         search=search_settings(request.search),
+        measurement=request.measurement,
     )
 
 

@@ -37,18 +37,19 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, repr=False)
 class ParameterBatch(Shown):
-    """Parameters of many equivalent models of one aircraft (p particles, w sets, n links).
+    """Parameters of a batch of equivalent models of one aircraft (p particles, w sets, n links).
 
     Attributes
     ----------
     values : mapping of str to ndarray
-        By the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span that sum
-        to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and edgewise;
-        ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``ac_offset_m`` (forward positive) and
-        ``lag_s`` (p,): those of its largest surface, others have them in proportion to their chords.
+        Keyed by the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span
+        that sum to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and
+        edgewise; ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``ac_offset_m`` (forward
+        positive) and ``lag_s`` (p,): values of its largest surface; other surfaces scale them with their
+        chords.
     surfaces : tuple of tuples of str, optional
-        Names of the surfaces of each set. None: one set is that of all flexible surfaces, which are one
-        mirror pair; several are those of the flexible surfaces in the aircraft's order.
+        Names of the surfaces of each set. None: a single set belongs to all flexible surfaces, which form one
+        mirror pair; several sets belong to the flexible surfaces in the aircraft's order.
     """
 
     values: Mapping[str, Array]
@@ -60,7 +61,7 @@ class ParameterBatch(Shown):
             object.__setattr__(self, "values", current)
 
     def __getitem__(self, name: str) -> Array:
-        """The values of one parameter; its former name is accepted, too."""
+        """The values of one parameter; its former name is also accepted."""
         return self.values[current_name(name)]
 
     @property
@@ -70,7 +71,7 @@ class ParameterBatch(Shown):
 
     @property
     def sets(self) -> int:
-        """Sets of values that surfaces have, w."""
+        """Number of sets of surface values, w."""
         return int(self["division"].shape[1])
 
     @property
@@ -79,29 +80,29 @@ class ParameterBatch(Shown):
         return int(self["division"].shape[2])
 
     def select(self, index: NDArray[np.int64] | slice) -> ParameterBatch:
-        """Some of the particles."""
+        """Return a subset of the particles."""
         return replace(self, values={name: value[index] for name, value in self.values.items()})
 
     def changed(self, **values: Array) -> ParameterBatch:
-        """The same with other values of some parameters.
+        """Return a copy with other values of some parameters.
 
         Raises
         ------
         KeyError
-            It has no such parameter.
+            A name is not one of its parameters.
         """
         values = {current_name(name): value for name, value in values.items()}
         if not values.keys() <= self.values.keys():
-            raise KeyError(f"of {', '.join(values)} only {', '.join(self.values)} are parameters")
+            raise KeyError(f"got {', '.join(values)}, but the parameters are {', '.join(self.values)}")
         return replace(self, values={**self.values, **values})
 
 
 @dataclass(frozen=True, repr=False)
 class ChainModel(Shown):
-    """Topology and lattice of an equivalent (or rigid) model: all that its parameter sets share.
+    """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
     surfaces : (s, 6) first link, links, first strip, strips, first overlap pair of each surface, and whether
-        it stands for its mirror image too.
+        it also represents its mirror image.
     """
 
     aircraft: Aircraft
@@ -112,14 +113,14 @@ class ChainModel(Shown):
 
     @cached_property
     def mirror(self) -> Mirror | None:
-        """Which surfaces are each other's images; None if the aircraft is not symmetric, or half of one."""
+        """The mirror image of each surface; None if the aircraft is not symmetric, or is itself a half."""
         return None if self.lattice.images else mirror_of(self.aircraft, self.flight)
 
     @cached_property
     def half(self) -> ChainModel | None:
-        """One half of a symmetric aircraft, which stands for both where they move alike, at half the cost.
+        """One half of a symmetric aircraft, which can represent both at half the cost if they move alike.
 
-        The fuselage is whole. Of a pair of surfaces the one that is named first is kept.
+        The fuselage is whole. Of a pair of surfaces the first named is kept.
         """
         if self.mirror is None:
             return None
@@ -145,12 +146,12 @@ class ChainModel(Shown):
 
     @property
     def state_rows(self) -> int:
-        """Rows of a state: 13 of the fuselage, angles and rates of the joints, nine of lag a link."""
+        """Rows of a state: 13 for the fuselage, joint angles and rates, nine for the lag of each link."""
         return int(state_rows(self.links, self.coordinates)[-1])
 
     @property
     def scratch_rows(self) -> int:
-        """Rows of a block's scratch."""
+        """Number of rows of a block's scratch."""
         return int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
 
     @property
@@ -160,21 +161,21 @@ class ChainModel(Shown):
 
     @cached_property
     def reference_surface(self) -> Surface:
-        """The largest surface, whose chord lengths and times of the whole aircraft refer to."""
+        """The largest surface, whose chord is the reference for lengths and times of the whole aircraft."""
         return max(self.aircraft.surfaces, key=lambda surface: (surface.area_m2, surface.mean_chord_m))
 
     @cached_property
     def flexible(self) -> tuple[int, ...]:
-        """Indices of the surfaces that bend; of the largest where none does."""
+        """Indices of the flexible surfaces, or of the largest if none is flexible."""
         surfaces = self.aircraft.surfaces
         found = tuple(k for k, surface in enumerate(surfaces) if surface.flexible)
         return found or (surfaces.index(self.reference_surface),)
 
     @cached_property
     def pairs(self) -> tuple[tuple[int, ...], ...]:
-        """Indices of the flexible surfaces by mirror pair; a surface without an image is alone.
+        """Indices of the flexible surfaces by mirror pair; a surface without an image forms its own group.
 
-        The largest come first, then names decide: the same in whatever order the aircraft has them.
+        Sorted by size, then by name, so that the order of the aircraft's surfaces does not matter.
         """
         groups = mirror_groups([self.aircraft.surfaces[k] for k in self.flexible])
         return tuple(sorted((tuple(self.flexible[k] for k in group) for group in groups), key=self._rank))
@@ -183,7 +184,7 @@ class ChainModel(Shown):
         return -self.aircraft.surfaces[group[0]].area_m2, self.label(group)
 
     def label(self, group: Sequence[int]) -> str:
-        """The name of a surface, or of the right one of a mirror pair."""
+        """The name of a surface, or that of the right surface of a mirror pair."""
         surfaces = [self.aircraft.surfaces[k] for k in group]
         return min(surfaces, key=lambda surface: surface.side != "right").name
 
@@ -196,7 +197,7 @@ class ChainModel(Shown):
         return tuple(sorted(((k,) for group in self.pairs for k in group), key=self._rank))
 
     def set_names(self, sets: Sequence[Sequence[int]]) -> tuple[tuple[str, ...], ...] | None:
-        """Whose a batch's sets are, by name, the label first; None where all flexible surfaces are a pair."""
+        """Names of the surfaces of each set, the label first; None if all flexible surfaces are one pair."""
         if len(self.pairs) == 1:
             return None
         names = [[self.aircraft.surfaces[k].name for k in group] for group in sets]
@@ -207,19 +208,19 @@ class ChainModel(Shown):
         )
 
     def set_of(self, batch: ParameterBatch) -> tuple[int, ...]:
-        """Which set of a batch each surface has; -1 for those that do not bend.
+        """Which set of a batch each surface uses; -1 for rigid surfaces.
 
         Raises
         ------
         InvalidInput
-            The batch has no set for a surface, or half an aircraft would have wings that differ.
+            The batch has no set for a surface, or the wings of a halved aircraft would differ.
         """
         surfaces = self.aircraft.surfaces
         chosen = [-1] * len(surfaces)
         if batch.surfaces is None:
             if batch.sets not in (1, len(self.flexible)) or batch.sets < len(self.pairs):
                 raise InvalidInput(
-                    f"the parameters are of {batch.sets} wings, the model has {len(self.flexible)}",
+                    f"the parameters are for {batch.sets} wings, but the model has {len(self.flexible)}",
                     pointer="/model/parameters/division",
                     hint="give the model of this aircraft",
                 )
@@ -231,7 +232,7 @@ class ChainModel(Shown):
             own = {known.get(surfaces[k].name)} | {known.get(s.name) for s in self.lattice.images[k : k + 1]}
             if len(own) > 1 or None in own:
                 raise InvalidInput(
-                    f"the parameters have none for the surface {surfaces[k].name!r} and what mirrors it",
+                    f"there are no parameters for the surface {surfaces[k].name!r} or its mirror image",
                     pointer="/model/parameters/surfaces",
                     hint=f"they are for {', '.join(known)}: give the model of this aircraft",
                 )
@@ -239,14 +240,14 @@ class ChainModel(Shown):
         return tuple(chosen)
 
     def is_even(self, batch: ParameterBatch) -> bool:
-        """Whether mirror images share their parameters: then half the aircraft can stand for it."""
+        """Whether mirror images share their parameters, so that half the aircraft can represent the whole."""
         chosen, mirror = self.set_of(batch), self.mirror
         return mirror is not None and all(
             chosen[k] == chosen[image] for k, image in zip(mirror.own, mirror.image, strict=True)
         )
 
     def on_surface(self, batch: ParameterBatch, number: int) -> dict[str, Array]:
-        """Values (p, ...) of all parameters on one surface: the batch's, in proportion, or its own guess."""
+        """Values (p, ...) of all parameters on one surface: the batch's, scaled, or its own guess."""
         surface, chosen = self.aircraft.surfaces[number], self.set_of(batch)[number]
         links = int(self.surfaces[number, 1])
         cut = CutSurface(surface, self.flight, np.full((batch.particles, links), 1.0 / links))
@@ -265,7 +266,7 @@ class ChainModel(Shown):
 def chain_model(
     aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
-    """The equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
+    """Build the equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
 
     Raises
     ------
@@ -299,18 +300,18 @@ def physical_guess(
 ) -> ParameterBatch:
     """Parameters from beam and thin-airfoil theory, with neutral corrections and Jones' lag.
 
-    Every flexible surface has those of its own beam, mirror images share them unless wings are separate. For
-    division and stiffness, which stand for the whole beam, see `beam_division` and `joint_stiffness`; damping
+    Every flexible surface gets those of its own beam; mirror images share them unless wings are separate. For
+    division and stiffness, which represent the whole beam, see `beam_division` and `joint_stiffness`; damping
     is proportional, c = beta k.
 
     Parameters
     ----------
     model : ChainModel
     division : ndarray, shape (p, w, n) or (p, 1, n), optional
-        Shares of the span of each set of `ChainModel.sets`, or of all alike; None: one particle with those
-        of `beam_division`.
+        Shares of the span for each set of `ChainModel.sets`, or the same for all; None: one particle with
+        those of `beam_division`.
     separate_wings : bool
-        Whether both surfaces of a mirror pair have a set of their own.
+        Whether each surface of a mirror pair has its own set.
     """
     sets = model.sets(separate_wings=separate_wings)
     n = model.links_per_wing
@@ -331,15 +332,15 @@ def physical_guess(
 
 
 def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
-    """Return parameters as the surfaces of a model have them.
+    """Return parameters with one set for each surface group of a model.
 
-    A single set for an aircraft of several unlike flexible surfaces is that of its largest one. The others
-    are off their own beam theory by the same factors, and keep their own profile drag.
+    A single set given for an aircraft with several different flexible surfaces belongs to the largest. The
+    others deviate from their own beam theory by the same factors, and keep their own profile drag.
 
     Raises
     ------
     InvalidInput
-        The batch is of another aircraft.
+        The batch belongs to another aircraft.
     """
     if batch.surfaces is None and batch.sets == 1 < len(model.pairs):
         guess = physical_guess(model, batch["division"])
@@ -397,16 +398,16 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
     Parameters
     ----------
     model : ChainModel
-        What flies: the aircraft, or half of it.
+        The model to fly: the aircraft, or half of it.
     batch : ParameterBatch
-        As the model's surfaces have them (see `fitted`).
+        With the sets of this model (see `fitted`).
     step_s : float
         Time step, s.
 
     Raises
     ------
     InvalidInput
-        The batch is of another aircraft, or half an aircraft would have wings that differ.
+        The batch belongs to another aircraft, or the wings of a halved aircraft would differ.
     """
     particles = batch.particles
     links = np.zeros((particles, model.links, LINK_ROWS))

@@ -1,10 +1,10 @@
 """The flexible model: wings of geometrically exact beams with a vortex lattice on their deformed surfaces.
 
 Node 0 is the fuselage, its axes are B. Each surface follows with its root node on the elastic axis, and the
-nodes of its elements from root to tip; a rigid surface has its root alone. Node axes are wing axes W where
-nothing is bent. The lattice rides on sections of the beams: on one at each edge of a strip (the ring
-corners) and one amid each strip (control points, profile drag); so every force on the lattice goes to the
-nodes by virtual work.
+nodes of its elements from root to tip; a rigid surface has only its root. Without deformation, node axes are
+the wing axes W. The lattice rides on sections of the beams: one at each edge of a strip (the ring corners)
+and one at the middle of each strip (control points, profile drag). Every force on the lattice is transferred
+to the nodes by virtual work.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-INERTIA_POINTS = 400  # midpoints along a rigid surface's span; its mass and inertia converge as their square
+INERTIA_POINTS = 400  # midpoints along a rigid surface's span; mass and inertia converge quadratically
 
 
 @dataclass(frozen=True)
 class FlexibleModel:
-    """Beams, lattice and their connection.
+    """Beams, lattice and the connection between them.
 
     roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
     their root node, in W, m. riders : the lattice on sections; element, fraction : (k,) where these are
@@ -61,7 +61,7 @@ def flexible_model(
     elements: int = DEFAULT_ELEMENTS,
     lattice: Lattice = DEFAULT_LATTICE,
 ) -> FlexibleModel:
-    """Beams of ``elements`` equal elements for every flexible surface.
+    """Build the model, with ``elements`` equal beam elements for every flexible surface.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
 
 
 def _joined(parts: list[Riders]) -> Riders:
-    """Riders of all surfaces, sections numbered through."""
+    """Riders of all surfaces, with sections numbered consecutively."""
     first = np.cumsum([0] + [part.sections for part in parts[:-1]])
 
     def numbered(name: str) -> IntArray:

@@ -1,4 +1,4 @@
-"""Where the links are: for the static start, for tip positions and for the fresh lattice."""
+"""Positions of the links, for the static start, the tip positions and a new lattice."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from morphcore.multibody.kernels.hinge import H_ORIGIN
 Array = NDArray[np.float64]
 
 
-# flap and edgewise angle of a gimbal turn the other way in the mirror image, torsion does not
+# flap and edgewise angle of a gimbal change sign in the mirror image, torsion does not
 REFLECTED_GIMBAL = np.array([-1.0, 1.0, -1.0])
 
 
 def whole_joints(model: ChainModel, q_joint: Array) -> Array:
     """Joint coordinates (k, coordinates) of a symmetric aircraft from those of its half, rad."""
     mirror, half = model.mirror, model.half
-    assert mirror is not None  # noqa: S101 - who has joints of a half has a half
+    assert mirror is not None  # noqa: S101 - joints of a half come from a model that has one
     assert half is not None  # noqa: S101
     out = np.empty((q_joint.shape[0], model.joints, 3))
     own = q_joint.reshape(q_joint.shape[0], half.joints, 3)

@@ -1,7 +1,7 @@
 """Rigid links cut from a lifting surface: mass properties, joint compliance, share of the lattice's strips.
 
-All functions work on batches: ``edges`` (particles, n + 1) are the links' ends, distances from the root in m,
-rising from 0 to the span.
+All functions work on batches: ``edges`` (particles, n + 1) are the links' ends as distances from the root, m,
+increasing from 0 to the span.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from morphcore.geometry.surface import Surface
 
 Array = NDArray[np.float64]
 
-# Gauss-Legendre: four points integrate a linearly tapered solid wing's inertia (degree six in the span)
+# Gauss-Legendre: four points integrate the inertia of a linearly tapered solid wing (degree six in the span)
 # exactly
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 MASS_ROWS = 7
@@ -60,12 +60,12 @@ def link_masses(surface: Surface, edges: Array) -> Array:
 
 
 def beam_division(surface: Surface, links: int) -> Array:
-    """Division (n,) of the chain of n links that stands for the whole beam; the shares sum to one.
+    """Division (n,) of the chain of n links that represents the whole beam; the shares sum to one.
 
-    The span is cut into n - 1 equal segments. The joint of each sits where a hinge bends the wing as the
-    segment does: at the centre of its curvature under a moment that falls linearly to the tip, as that of a
-    force at the tip does, or the torque of a uniform load. So Gauss's rule of one point replaces the integral
-    over the segment (see `joint_stiffness`).
+    The span is divided into n - 1 equal segments. The joint of each is placed where a hinge bends the wing as
+    the segment does: at the centre of its curvature under a moment that falls linearly to the tip, like that
+    of a tip force or the torque of a uniform load. This replaces the integral over the segment by one-point
+    Gauss quadrature (see `joint_stiffness`).
     """
     if links == 1:
         return np.ones(1)
@@ -77,19 +77,19 @@ def beam_division(surface: Surface, links: int) -> Array:
 
 
 def joint_stiffness(surface: Surface, edges: Array) -> Array:
-    """Beam theory's guess (particles, n - 1, 3) for flap, torsion and edgewise, N m/rad.
+    """Guess from beam theory (particles, n - 1, 3) for flap, torsion and edgewise, N m/rad.
 
-    Each joint stands for a segment of the beam, and all segments for all of it: the first begins at the root,
-    the last ends at the tip, and the links between two joints are cut as those of `beam_division` are. Under
-    a moment (or torque) that falls linearly to the tip a joint turns by the angle by which its segment bends
-    (or twists)
+    Each joint represents a segment of the beam, and the segments together the whole beam: the first begins at
+    the root, the last ends at the tip, and the links between two joints are divided as in `beam_division`.
+    Under a moment (or torque) that falls linearly to the tip, a joint turns by the angle by which its segment
+    bends (or twists)
 
         1 / k = integral of (L - y) / EI over the segment / (L - y_joint)
 
     With the joints of `beam_division` the chain is exact in slope and deflection of its tip under a force at
     the tip, in its slope under a distributed load (on a uniform beam), and in its twist under a distributed
-    torque. Its deflection under a distributed load is 11 per cent short with two links on a uniform beam, 4
-    with three, and 0.3 with eight.
+    torque. Its deflection under a distributed load is too small by 11 per cent with two links on a uniform
+    beam, 4 with three, and 0.3 with eight.
     """
     links = edges.shape[1] - 1
     if links == 1:
@@ -106,7 +106,7 @@ def joint_stiffness(surface: Surface, edges: Array) -> Array:
 
 
 def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
-    """Compliance of a surface's segments to a moment of L - y, with which it falls to the tip.
+    """Compliance of a surface's segments under the moment L - y, which falls linearly to the tip.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The identifiable parameters of an equivalent model, as a list.
 
 Search space, names, bounds, documents, uncertainty and warnings iterate over ``CHAIN_PARAMETERS``. To add a
-parameter is to add one entry to it.
+parameter, add one entry to it.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ IntArray = NDArray[np.int64]
 Scope = Literal["surface", "pair", "aircraft"]
 
 AXIS_NAMES = ("flap", "torsion", "edgewise")
-STIFFNESS_FACTOR = 10.0  # either way from beam theory: a chain of few links is off by less than three
+STIFFNESS_FACTOR = 10.0  # factor either way from beam theory: a chain of few links is off by less than three
 DAMPING_FACTOR = 30.0
-MIN_DAMPING_S = 1e-6  # of the stiffness: where the search for the damping of undamped wings begins
+MIN_DAMPING_S = 1e-6  # s, times the stiffness: where the search for the damping of undamped wings starts
 LAG_FACTOR = 10.0
 LIFT_RANGE = (0.6, 1.5)
 LIFT_UNIT = 0.2
@@ -65,7 +65,7 @@ LIFT_LIMITS = (0.3, 2.5)
 CENTRE_LIMIT_CHORDS = 0.5
 DRAG_LIMITS = (0.0, 0.5)
 DIVISION_LIMIT_RATIO = 3.0  # of the log-ratios: a share over the last one 20 times smaller or larger
-SHORTEST_LAG_S = 1e-9  # below, the circulation is quasi-steady; spares a division by zero
+SHORTEST_LAG_S = 1e-9  # shorter lags are quasi-steady; avoids a division by zero
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class CutSurface:
 
 @dataclass
 class SurfaceRows:
-    """The constants of one surface's links for the kernels, while parameters are written into them.
+    """The kernel constants of one surface's links, into which parameters are written.
 
     Attributes
     ----------
@@ -101,11 +101,11 @@ class SurfaceRows:
     step_s : float
         Time step, s.
     links : ndarray, shape (p, n, LINK_ROWS)
-        The rows that articulated.py and loads.py name (``L_...``).
+        Rows as named in articulated.py and loads.py (``L_...``).
     stiffness, damping : ndarray, shape (p, 3 (n - 1))
         Of flap, torsion and edgewise of each gimbal, N m/rad and N m s/rad.
     overlap : ndarray, shape (p, 2 strips n)
-        For each strip and link the share of the strip, and the middle of that share in link axes, m.
+        For each strip and link, the share of the strip and the middle of that share in link axes, m.
     touched : ndarray of int, shape (p, n, 2)
         First strip of each link, and the one after its last.
     """
@@ -127,13 +127,13 @@ class Parameter:
     Attributes
     ----------
     name : str
-        In bounds, documents and reports.
+        Name in bounds, documents and reports.
     unit : str
-        Of its values, "1" if they have none.
+        Unit of its values, "1" if dimensionless.
     transform : callable, Surface -> Transform
-        How it is searched on a surface.
+        Search coordinates on a surface.
     bounds : callable, CutSurface -> (lower, upper)
-        Bounds (d,) of its search coordinates on a surface, where no others are asked for.
+        Default bounds (d,) of its search coordinates on a surface.
     guess : callable, CutSurface -> ndarray, shape (p, ...)
         Its physical values on a surface.
     limits : callable, CutSurface -> (lower, upper), optional
@@ -142,24 +142,24 @@ class Parameter:
     apply : callable, (SurfaceRows, ndarray) -> None
         Writes values (p, ...) into the constants of a surface's links.
     scope : {"surface", "pair", "aircraft"}
-        Who has values of its own: each surface (mirror images share them unless wings are separate), each
+        What has its own values: each surface (mirror images share them unless wings are separate), each
         mirror pair, or the aircraft.
     size : callable, Surface -> float
-        What measures an aircraft's parameter on a surface, such as a chord: surfaces have it in proportion.
+        Size, such as a chord, with which an aircraft-wide parameter scales on a surface.
     labels : callable, int -> tuple of str, optional
-        Names of its values by number of links; None: there is one value.
+        Names of its values by number of links; None for a single value.
     coordinates : callable, int -> tuple of str, optional
-        Names of its search coordinates by number of links, where they are not those of the values.
+        Names of its search coordinates by number of links, if they differ from those of the values.
     correction : bool
-        Whether a request may leave it out of the search. Documents have it in ``aero``.
+        Whether a request may exclude it from the search. Documents list it under ``aero``.
     asymmetric : bool
-        Flights tell it only where both sides differ.
+        Whether only flights with different sides determine it.
     factor : bool
-        Unlike surfaces share one set of it as factors on their own guesses.
+        Whether different surfaces share one set of it as factors on their own guesses.
     default : float, optional
-        Of a value that a document leaves out; None: it must not.
+        Value used if a document omits it; None: it is required.
     at_bound : mapping of str to str
-        Hints for who ends at the "lower" or the "upper" bound, where widening it is none.
+        Hints for a fit that ends at the "lower" or "upper" bound when widening the bound does not help.
     """
 
     name: str
@@ -190,12 +190,12 @@ class Parameter:
         return self.names(links) if self.coordinates is None else self.coordinates(links)
 
     def in_proportion(self, surface: Surface, reference: Surface) -> float:
-        """Value on a surface over the value on the reference surface."""
+        """Ratio of the value on a surface to that on the reference surface."""
         return self.size(surface) / self.size(reference)
 
 
 def lag_weights(lag_s: Array, step_s: float) -> Array:
-    """Weights of one step of both of Jones' exponentials.
+    """Weights of one step for both of Jones' exponentials.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _joint_labels(links: int) -> tuple[str, ...]:
 
 
 def _factor(centre: Array, factor: float) -> tuple[Array, Array]:
-    """Logarithms of a range of one factor both ways."""
+    """Logarithmic range of one factor in both directions."""
     middle = np.log(centre.ravel())
     return middle - np.log(factor), middle + np.log(factor)
 
@@ -230,7 +230,7 @@ def _factor(centre: Array, factor: float) -> tuple[Array, Array]:
 
 
 def _cut(rows: SurfaceRows, division: Array) -> None:
-    """Masses, joint offsets, drag areas and strips of links of these shares of the span."""
+    """Masses, joint offsets, drag areas and strips of links with these shares of the span."""
     surface, edges = rows.surface, link_edges(division, rows.surface.span_m)
     particles = division.shape[0]
     rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
@@ -338,7 +338,7 @@ def _drag(rows: SurfaceRows, coefficient: Array) -> None:
 
 def _lag(rows: SurfaceRows, lag_s: Array) -> None:
     weights = lag_weights(lag_s[:, None], rows.step_s)
-    weights[..., ::2] **= 0.5  # the step carries the lag states by halves
+    weights[..., ::2] **= 0.5  # the step advances the lag states by half steps
     rows.links[:, :, L_SLOW_DECAY : L_FAST_WEIGHT + 1] = weights
 
 
@@ -384,8 +384,8 @@ PROFILE_DRAG = Parameter(
     apply=_drag,
     limits=lambda _: Linear(DRAG_UNIT).box(*DRAG_LIMITS, 1),
     scope="pair",
-    # the drag of wings that do alike has no moment about the vertical: it shows in a hair of pitch alone, and
-    # a fit would put it where it mends other errors of pitch
+    # the drag of wings that move alike has no moment about the vertical and hardly affects pitch, so a fit
+    # would use it to compensate other errors of pitch
     asymmetric=True,
     at_bound={"lower": "drag cannot be negative: the model may lack an effect that the samples show"},
 )
@@ -401,7 +401,7 @@ LAG = Parameter(
     size=_chord,
 )
 
-# in the order of search coordinates and reports; `division` lays the links out that the others write to
+# in the order of search coordinates and reports; `division` defines the links that the others write to
 CHAIN_PARAMETERS: list[Parameter] = [
     DIVISION,
     STIFFNESS,

@@ -1,4 +1,4 @@
-"""Parameters of an equivalent model as the ``model`` object of a result document, there and back."""
+"""Conversion of equivalent-model parameters to and from the ``model`` object of a result document."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     document : dict
         Parsed JSON.
     pointer : str
-        Where the document stands, for errors.
+        JSON pointer of the document, for errors.
 
     Returns
     -------
@@ -33,8 +33,8 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
     Raises
     ------
     InvalidInput
-        A field is missing or out of its range, the lists do not fit the number of links, or the result is of
-        a search whose best model never flew.
+        A field is missing or out of range, the lists do not match the number of links, or the result comes
+        from a search in which no model could be flown.
     """
     if "model" in document:
         return parameter_batch(WholeResult.parse(document, pointer).model)
@@ -42,7 +42,7 @@ def parameters_from_document(document: Document, pointer: str = "/model") -> Par
 
 
 def parameter_batch(given: Parameters) -> ParameterBatch:
-    """Return the parameters of a document as a batch of one particle; each division adds up to 1 exactly."""
+    """Return the parameters of a document as a batch of one particle; each division sums to exactly 1."""
     links, surfaces = given.links_per_wing, given.surfaces or {}
     corrections = [parameter for parameter in CHAIN_PARAMETERS if parameter.correction]
 
@@ -81,8 +81,8 @@ def _structure(given: Parameters | SurfaceParameters, wings: int, links: int) ->
 def parameters_document(batch: ParameterBatch, particle: int = 0) -> Document:
     """Write one parameter set of a batch as a ``model`` object; ``parameters_from_document`` reads it back.
 
-    Shared parameters are written flat; where each wing has its own, with one more leading axis. Where the
-    batch names the surfaces of its sets, the flat ones are those of the first and ``surfaces`` has all.
+    Shared parameters are written flat, parameters of separate wings with one more leading axis. If the batch
+    names the surfaces of its sets, the flat values are those of the first and ``surfaces`` holds all.
     """
     flat = batch.sets == 1 or batch.surfaces is not None
     values = {

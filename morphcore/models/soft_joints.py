@@ -1,4 +1,4 @@
-"""Joints of an equivalent model that are too soft for what they carry, to explain a flight that failed."""
+"""Finds joints of an equivalent model that are too soft for their load, to explain a failed flight."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from morphcore.geometry.obstacle import LARGEST_SLOPE_RAD, Obstacle, load_per_le
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges
 
-NO_STIFFNESS = 1e-9  # of the moment: a joint that would turn a hundred million times carries nothing
+NO_STIFFNESS = 1e-9  # share of the moment below which a joint counts as unloaded
 POINTER = "/model/parameters/stiffness_nm_rad"
 
 
 def chain_obstacle(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
-    """What keeps a chain (one parameter set) from flying: a joint of it, or too little air."""
+    """What prevents a chain (one parameter set) from flying: one of its joints, or too little air."""
     return soft_joint(model, batch) or too_little_air(model.aircraft, model.flight)
 
 
 def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
-    """The joint that its share of the weight would turn too far in flap; None where all carry it.
+    """The joint that its share of the weight would turn too far in flap; None if all can carry it.
 
     The moment at a distance y from the root is q (L - y)^2 / 2 under a load q per length.
     """
@@ -38,5 +38,5 @@ def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
     return Obstacle(
         POINTER,
         f"joint {joint} of {name!r}, {stiffness:.3g} N m/rad in flap, is too soft for its share of the "
-        f"weight: it would turn by {angle:.3g} rad; check the parameters, or identify the model anew",
+        f"weight: it would turn by {angle:.3g} rad; check the parameters, or identify the model again",
     )

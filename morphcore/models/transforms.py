@@ -1,7 +1,7 @@
-"""Search coordinates of a parameter: of order one, so that one difference step and one spread fit all.
+"""Search coordinates of a parameter: of order one, so that one difference step and one spread suit all.
 
-A transform leads from the values of a parameter, in SI units, to its search coordinates and back. It also
-says what an interval around a value looks like: of a shape that fits the parameter, in its own unit.
+A transform maps the values of a parameter, in SI units, to its search coordinates and back. It also defines
+the shape of an interval around a value, such as a symmetric difference or a factor.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ HALVINGS = 50  # of the range of the log-ratios, down to rounding
 
 
 class Transform(Protocol):
-    """The way from m values, the last axis of an array, to d search coordinates and back."""
+    """Map from m values, the last axis of an array, to d search coordinates and back."""
 
     def forward(self, values: Array) -> Array:
         """Search coordinates (..., d) of values (..., m)."""
@@ -38,16 +38,16 @@ class Transform(Protocol):
         Raises
         ------
         InvalidInput
-            There is no room for them.
+            The bounds leave no room for the values.
         """
         ...
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Smallest and largest of each value, (m,), in a box of coordinates (d,)."""
+        """Smallest and largest value of each, (m,), in a box of coordinates (d,)."""
         ...
 
     def derivative(self, values: Array) -> Array:
-        """Derivative (m,) of the coordinate in which a value's interval is even, per unit of the value."""
+        """Derivative (m,), by the value, of the coordinate in which its interval is symmetric."""
         ...
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
@@ -57,11 +57,11 @@ class Transform(Protocol):
 
 @dataclass(frozen=True)
 class Log:
-    """A positive value, searched as its logarithm: intervals are even in factors."""
+    """A positive value, searched as its logarithm; intervals are symmetric as factors."""
 
     def forward(self, values: Array) -> Array:
         """Logarithms."""
-        with np.errstate(divide="ignore"):  # nothing at all is the lower bound of any box
+        with np.errstate(divide="ignore"):  # zero becomes the lower bound of any box
             return np.log(values)
 
     def inverse(self, x: Array) -> Array:
@@ -81,7 +81,7 @@ class Log:
         return 1.0 / values
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """One factor both ways."""
+        """The same factor in both directions."""
         with np.errstate(over="ignore"):
             return values * np.exp(-half), values * np.exp(half)
 
@@ -114,7 +114,7 @@ class Linear:
         return np.full(values.shape, 1.0 / self.unit)
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """The same difference both ways."""
+        """The same difference in both directions."""
         width = half / self.derivative(values)
         return values - width, values + width
 
@@ -129,7 +129,7 @@ class Shares:
     """Positive shares that sum to one, searched as log-ratios to the last one: d = m - 1.
 
     The additive log-ratio (Aitchison 1982): a box of the coordinates lies inside the simplex. Intervals are
-    even in the odds of a share.
+    symmetric in the log-odds of a share.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Shares:
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
         """Log-ratios of at most ``ratio_range`` off the nominal ones for which all shares are inside the bounds.
 
-        Bounds that the nominal shares break are centred on equal shares.
+        If the nominal shares violate the bounds, the box is centred on equal shares.
         """
         if count == 1:
             return np.zeros(0), np.zeros(0)
@@ -182,7 +182,7 @@ class Shares:
         return centre - half, centre + half
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Of each share with all others at their other ends; the last one's ratio to itself is one."""
+        """Limits of each share with all others at their opposite ends; the last share's own ratio is one."""
         low, high = np.exp(np.append(lower, 0.0)), np.exp(np.append(upper, 0.0))
         return low / (low + high.sum() - high), high / (high + low.sum() - low)
 
@@ -191,7 +191,7 @@ class Shares:
         return np.asarray(1.0 / (values * (1.0 - values)))
 
     def interval(self, values: Array, half: Array) -> tuple[Array, Array]:
-        """One factor of the odds both ways."""
+        """The same factor of the odds in both directions."""
         odds = values / (1.0 - values)
         with np.errstate(over="ignore"):
             low, high = (1.0 / (1.0 + np.exp(-sign * half) / odds) for sign in (-1.0, 1.0))

@@ -1,8 +1,8 @@
 """Chains of geometrically exact beam elements with bodies at their nodes: forces and solves.
 
-The mechanics are in kernels/beam.py; this is their typed shell. Nodes have poses R (n, 3, 3), node axes to
-N, and x (n, 3) in N; twists and their rates (n, 6) [omega; v] in node axes. Forces are force vectors [n; f]
-(n, 6), N m and N, in node axes.
+The mechanics are in kernels/beam.py; this module is their typed interface. Nodes have poses R (n, 3, 3), node
+axes to N, and x (n, 3) in N; twists and their rates (n, 6) [omega; v] in node axes. Forces are force vectors
+[n; f] (n, 6), N m and N, in node axes.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from morphcore.multibody.kernels.poses import move_poses
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Gauss points of an element's inertia: the helix is of second degree, its kinetic energy of fourth
+# Gauss points of an element's inertia: the helix is of second degree, its kinetic energy of fourth degree
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS, GAUSS_WEIGHTS = 0.5 * (1.0 + _POINTS), 0.5 * _WEIGHTS
 GAUSS_SERIES = helix_series(GAUSS)
 
 
 class BeamTurnedTooFar(MorphError):
-    """One element turns by more than its logarithm is made for: use more elements."""
+    """An element's rotation exceeds the range of its logarithm; more elements are needed."""
 
     code = "beam_turned_too_far"
 
@@ -86,13 +86,13 @@ class Beams:
 
 @dataclass
 class NodePoses:
-    """Where the nodes are: R (n, 3, 3), node axes to N; x (n, 3) m. Scratch that moves in time."""
+    """Poses of the nodes: R (n, 3, 3), node axes to N; x (n, 3) m. Scratch that changes in time."""
 
     R: Array
     x: Array
 
     def copy(self) -> NodePoses:
-        """Another one at the same place."""
+        """Return a copy."""
         return NodePoses(self.R.copy(), self.x.copy())
 
     def move(self, increments: Array) -> None:
@@ -101,7 +101,7 @@ class NodePoses:
 
 
 def carried(poses: NodePoses, leader: int, motion: Array, nodes: slice) -> Array:
-    """A motion vector (6,) of node ``leader``, moved rigidly to ``nodes``: (m, 6), in their axes."""
+    """A motion vector (6,) of node ``leader``, carried rigidly to ``nodes``: (m, 6), in their axes."""
     R = poses.R[leader].T @ poses.R[nodes]
     arm = (poses.x[nodes] - poses.x[leader]) @ poses.R[leader]
     linear = motion[3:] + np.cross(motion[:3], arm)
@@ -140,7 +140,7 @@ def make_beams(
     ends : (e, 2) nodes. rest : (e, 6) logarithms of the relative poses at rest.
     sections : for each element, one section at each of the three Gauss points.
     damping_s : (e,) or one number. bodies, inertia : rigid bodies on nodes (k,), (k, 6, 6).
-    nodes : their number, if some carry no element.
+    nodes : number of nodes, if some carry no element.
     """
     end_nodes = np.array(ends, dtype=np.int64).reshape(-1, 2)
     at_rest = np.array(rest, dtype=np.float64).reshape(-1, 6)
@@ -171,10 +171,10 @@ def make_beams(
 
 
 def element_flexibility(along: Array, section_stiffness: Sequence[Array]) -> Array:
-    """Flexibility (6, 6) of an element's relative displacement, in its middle, to loads at its ends.
+    """Flexibility (6, 6) of an element's relative displacement, at its middle, under loads at its ends.
 
-    A force f and moment m carried through the middle make the moment m - (s - 1/2) along x f at s; the
-    integral of B^T C^-1 B over the length is exact for straight elements, sections varying or not.
+    A force f and moment m through the middle produce the moment m - (s - 1/2) along x f at s; the integral of
+    B^T C^-1 B over the length is exact for straight elements with constant or varying sections.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def element_flexibility(along: Array, section_stiffness: Sequence[Array]) -> Arr
 def node_forces(
     beams: Beams, work: BeamWorkspace, poses: NodePoses, V: Array, A: Array, gravity_N: Array
 ) -> Array:
-    """What strain, inertia and weight ask of the nodes, (n, 6): zero in motion without other loads.
+    """Forces (n, 6) that strain, inertia and weight require at the nodes; zero in motion without other loads.
 
     Raises
     ------
@@ -210,11 +210,11 @@ def node_forces(
 
 
 class Sections:
-    """Sections of some beams, with the maps between their twists and the nodes' at their last place.
+    """Sections of some beams, with the maps between their twists and the nodes' at their last position.
 
     Parameters
     ----------
-    elements, fractions : (k,) element and place in it, 0..1; element -1 - i stands for node i itself.
+    elements, fractions : (k,) element and position in it, 0..1; element -1 - i stands for node i itself.
     """
 
     def __init__(self, beams: Beams, elements: IntArray, fractions: Array) -> None:
@@ -223,7 +223,7 @@ class Sections:
         self.blocks: Array = np.zeros((elements.size, 2, 3, 3))
 
     def place(self, work: BeamWorkspace, poses: NodePoses) -> NodePoses:
-        """Poses of the sections for the strains of the last `node_forces`."""
+        """Compute the poses of the sections for the strains of the last `node_forces`."""
         count = self.elements.size
         found = NodePoses(np.empty((count, 3, 3)), np.empty((count, 3)))
         place_sections(
@@ -253,7 +253,7 @@ def factor(
 ) -> None:
     """Factor of_mass M + of_rate C + of_pose K + on_nodes (n, 6, 6) at the strains of the last `node_forces`.
 
-    Afterwards ``work.diagonals`` holds at every root its chain's condensed matrix.
+    Afterwards ``work.diagonals`` holds the condensed matrix of each chain at its root.
     """
     beam_tangents(
         beams.rest, beams.stiffness, beams.damping, beams.mass12, work.strains, work.rates,
@@ -265,22 +265,22 @@ def factor(
 
 
 def reduce_right(beams: Beams, work: BeamWorkspace, right: Array) -> None:
-    """First half of a solve, in place: right sides (n, 6) gathered to the roots."""
+    """First half of a solve, in place: condense the right-hand sides (n, 6) to the roots."""
     condense(beams.ends, work.tangents, work.inverses, work.v, right)
 
 
 def expand_solution(beams: Beams, work: BeamWorkspace, right: Array) -> None:
-    """Second half, in place: with the roots' solutions written into their rows, all nodes' solutions."""
+    """Second half, in place: from the roots' solutions in their rows, compute those of all nodes."""
     substitute(beams.ends, work.couplings, right)
 
 
 def _consistent_mass(beams: Beams) -> Array:
-    """``mass12``: the kernel's own forces for unit accelerations of each element alone, at rest."""
+    """``mass12``: the kernel's forces for unit accelerations of each element on its own, at rest."""
     R, x = np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3))
     zero, unit, none = np.zeros((2, 6)), np.zeros((2, 6)), np.zeros(3)
     v, scratch = np.zeros((VECTOR_SCRATCH, 6)), np.zeros((2, 4, 3))
     ends, strain = np.array([[0, 1]]), np.zeros((1, 6))
-    ends.setflags(write=False)  # as all of Beams: one type, compiled once
+    ends.setflags(write=False)  # the same types as in Beams, so that it is compiled only once
     found = np.zeros((beams.elements, 12, 12))
     for e in range(beams.elements):
         R[1], x[1] = np.eye(3), 0.0

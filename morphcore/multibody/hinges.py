@@ -1,8 +1,8 @@
 """Relative motion across the hinges of a surface: their screws, twists and accelerations composed.
 
-Motion vectors have the angular part first, in W at a point of the surface. What lies between two hinges has
-no mass, so that a surface needs nothing of its hinges but their sum (Featherstone 2008, section 9.2): the
-batch pays for one joint whatever their number.
+Motion vectors have the angular part first, in W at a point of the surface. The parts between two hinges have
+no mass, so a surface needs only the sum of its hinges' motions (Featherstone 2008, section 9.2): the cost to
+the batch is that of one joint, whatever their number.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ def relative_motion(
 ) -> tuple[Array, Array]:
     """Twist of a surface relative to the fuselage, and its time derivative in W.
 
-    Outward from hinge to hinge: ``v_i = X v_(i-1) + S qd``, ``a_i = X a_(i-1) + (X v_(i-1)) x S qd + S qdd``
-    (Featherstone 2008, table 5.1, of a base at rest); the middle term is Coriolis' between the hinges.
+    From the fuselage outward, hinge by hinge: ``v_i = X v_(i-1) + S qd``, ``a_i = X a_(i-1) + (X v_(i-1)) x S
+    qd + S qdd`` (Featherstone 2008, table 5.1, for a base at rest); the middle term is the Coriolis term
+    between hinges.
 
     Parameters
     ----------
     hinges : sequence of Hinge
         m hinges from the fuselage outward.
     arms : ndarray, shape (m, 3)
-        From each to the point of the surface, at rest, m; see `hinge_arms`.
+        From each hinge to the point of the surface, at rest, m; see `hinge_arms`.
     angles, rates, accelerations : ndarray, shape (k, m)
         rad, rad/s, rad/s^2.
 
@@ -55,7 +56,7 @@ def relative_motion(
 
 
 def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array) -> Array:
-    """Twist of a surface for a unit rate of each of its hinges, (k, m, 6), in W at a point of it."""
+    """Twist (k, m, 6) of a surface for a unit rate of each of its hinges, in W at a point of it."""
     out = np.empty((angles.shape[0], len(hinges), 6))
     for place, (hinge, arm) in enumerate(zip(hinges, arms, strict=False)):
         turn = hinge.rotation(angles[:, place])
@@ -66,12 +67,12 @@ def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array) -> Array:
 
 
 def _screw(hinge: Hinge, arm: Array) -> Array:
-    """Twist (6,) of what a hinge carries for its unit rate, at a point ``arm`` from its axis."""
+    """Twist (6,) of the parts outboard of a hinge for its unit rate, at a point ``arm`` from its axis."""
     return np.concatenate([hinge.axis_B, np.cross(hinge.axis_B, arm)])
 
 
 def _carried(turn: Array, arm: Array, motion: Array) -> Array:
-    """Motion vectors (k, 6) of what is inboard of a hinge, seen from outboard of it.
+    """Motion vectors (k, 6) of the parts inboard of a hinge, transformed to its outboard frame.
 
     turn : (k, 3, 3) of the hinge. arm : (3,) from its axis to the point; both frames have their origins at
     that point at rest, and the hinge has moved the outer one's by ``turn arm - arm``.

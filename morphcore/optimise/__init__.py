@@ -1,4 +1,4 @@
-"""Optimisation of morph schedules: least disturbance of the attitude within the drive's limits."""
+"""Optimisation of morph schedules: minimum disturbance of the attitude within the drive's limits."""
 
 from __future__ import annotations
 
@@ -72,12 +72,12 @@ def optimise_schedule(
     Returns
     -------
     ScheduleResult
-        The schedule, and how far it and those it is compared with disturb the attitude, rad^2.
+        The schedule, with the attitude variation (rad^2) that it and the reference schedules cause.
 
     Raises
     ------
     InvalidInput
-        No schedule keeps the limits, or a setting makes no sense.
+        No schedule satisfies the limits, or a setting is invalid.
     TrimNotFound
         A model cannot be trimmed.
 
@@ -105,9 +105,9 @@ def optimise_schedule(
 
 
 def optimisation_from_request(request: OptimizeRequest, threads: int | None = None) -> ScheduleOptimisation:
-    """The optimisation that a request (the body of ``POST /optimize``) asks for.
+    """Build the optimisation described by a request, the body of ``POST /optimize``.
 
-    Identified parameters bring their own lattice, step and start, unless others are given beside them.
+    The lattice, step and start of identified parameters are used unless the request overrides them.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def optimisation_from_request(request: OptimizeRequest, threads: int | None = No
     model, flown = request.model, flown_with(request.model)
     if model.known is None:
         raise InvalidInput(
-            "only a service knows a model by its id",
+            "a model id can only be resolved by the service",
             pointer="/model/model_id",
             hint="give the model's parameters instead",
         )

@@ -33,8 +33,8 @@ class MorphCase:
     Parameters
     ----------
     model : one parameter set of the equivalent model.
-    lattice, start, step_s : how both models fly. None as the step: the longest with which both fly the
-        constant rate as exactly as `choose_step` demands.
+    lattice, start, step_s : settings of the flights of both models. A step of None selects the longest with
+    which both fly the constant-rate morph to the tolerance of `choose_step`.
 
     Raises
     ------
@@ -74,7 +74,7 @@ class MorphCase:
 
     @cached_property
     def path(self) -> CommonPath:
-        """The lattice over all angles that a schedule may reach; all models and durations share it."""
+        """The lattice over all angles that a schedule may reach, shared by all models and durations."""
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
@@ -82,27 +82,27 @@ class MorphCase:
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Names of the drives that the morph moves, all alike; others hold their hinges' angles."""
+        """Names of the drives that the morph moves together; the others hold their hinges' angles."""
         return morph_drives(self.aircraft, self.morph)
 
     @property
     def word(self) -> str:
-        """What the morph moves, as its result names it."""
+        """The word or drive name that the result uses for what the morph moves."""
         return morph_word(self.aircraft, self.morph)
 
     @cached_property
     def is_even(self) -> bool:
-        """Whether both sides have the same parameters, so that half the aircraft can stand for it."""
+        """Whether both sides have the same parameters, so that half the aircraft can represent it."""
         model, batch = self.chain("equivalent")
         return model.is_even(batch)
 
     @property
     def step_s(self) -> float:
-        """The longest step, s, of the rigid and the equivalent model: asked for, or chosen."""
+        """The longest step, s, of the rigid and the equivalent model, as requested or chosen."""
         return self._chosen_step()
 
     def _chosen_step(self, stop: Stop | None = None) -> float:
-        """Choose the step if none is given: from the inputs alone, so that a resumed run has the same."""
+        """Choose the step if none is given: from the inputs alone, so that a resumed run uses the same."""
         if self._step_s is None:
             self._step_s = self._found_step(stop)
         return self._step_s
@@ -122,7 +122,7 @@ class MorphCase:
         return min(steps_s)
 
     def chain(self, name: ModelName) -> tuple[ChainModel, ParameterBatch]:
-        """One of the models that are searched with, and its parameters."""
+        """One of the models used in the search, and its parameters."""
         if name == "equivalent":
             links = self.parameters.links
             model = chain_model(self.aircraft, self.flight, links, self.lattice)
@@ -132,15 +132,15 @@ class MorphCase:
 
     @property
     def times_s(self) -> Array:
-        """Times of the rows that count: from the begin of the morph to the end of the longest one's window.
+        """Times of the rows that count: from the start of the morph to the end of the longest morph's window.
 
-        Whatever its duration, every morph is judged over the same time, or a quick one would look calm
-        because its window ends sooner.
+        Every morph is judged over the same time, whatever its duration. Otherwise a quick morph would look
+        calm only because its window ends sooner.
         """
         return sample_times(self.morph.duration_s, self.morph.settle_s)
 
     def flights(self, name: ModelName) -> MorphFlights:
-        """Flights over the window that morphs of all durations share."""
+        """Flights over the window shared by morphs of all durations."""
         if name not in self._flights:
             model, batch = self.chain(name)
             self._flights[name] = MorphFlights(
@@ -155,7 +155,7 @@ class MorphCase:
         return self._flights[name]
 
     def constant(self, duration_s: float) -> Schedule:
-        """The constant rate that the optimum is compared with."""
+        """The constant-rate schedule that the optimum is compared with."""
         return constant_rate(self.morph, self.limits, duration_s)
 
     def not_flyable(self) -> NotFlyable:

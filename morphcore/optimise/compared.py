@@ -1,4 +1,4 @@
-"""The schedules that are compared, and what is kept of their flights."""
+"""The compared schedules, and the results kept from their flights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ComparedFlight(Shown):
     """One schedule flown in one model.
 
     departure : (k, 3) of phi, theta, psi from the start, rad. variation : its sum of squares, rad^2; None if
-    the flight diverged. torque : largest of any hinge, N m; None where it was not computed.
+    the flight diverged. torque : largest torque of any hinge, N m; None where it was not computed.
     """
 
     departure: Array
@@ -39,7 +39,7 @@ def best_found(case: MorphCase, state: OptimisationState) -> Found:
 
 
 def compared_schedules(case: MorphCase, state: OptimisationState) -> dict[str, Schedule | None]:
-    """Return the schedules that are compared, in their order; None for what has not been found."""
+    """Return the compared schedules in order, with None for those not found yet."""
     best = best_found(case, state)
     space = case.space(best.duration_s)
     rigid = next((item for item in state.found if item.model == "rigid"), None)

@@ -1,10 +1,10 @@
 """Gauss-Newton descent under limits, from several starts at once.
 
-The departures of a flight are residuals, so that the finite differences of one flight for each unknown give
-a quadratic model of the cost. Its minimum is found under the *exact* limits, which cost no flight
-(sequential quadratic programming), and under the hinge torque's history, linear like the departures.
-Marquardt's damping (1963) keeps the step where the model holds; several dampings are flown side by side.
-Every schedule that is flown, probes included, keeps the limits of rate, acceleration and sign.
+The departures of a flight are residuals, so that the finite differences of one flight for each unknown give a
+quadratic model of the cost. Its minimum is found under the *exact* limits, which cost no flight (sequential
+quadratic programming), and under the hinge torque's history, linear like the departures. Marquardt's damping
+(1963) keeps the step where the model is valid; several damping values are flown in parallel. Every schedule
+that is flown, probes included, keeps the limits of rate, acceleration and sign.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ from morphcore.search.solver import Batch, Solver
 
 Array = NDArray[np.float64]
 
-# probe of the differences and the slack that its base needs: knots that stand closely take the smaller ones
+# finite-difference steps and the slack that the base point needs; closely spaced knots use the smaller ones
 PROBES = ((1e-6, 1e-3), (1e-7, 1e-3), (1e-7, 1e-4), (1e-8, 1e-5))
 MARGIN = (
-    1e-7  # relative, left by a step: far below what a limit is known to, far above the solver's tolerance
+    1e-7  # relative slack left by a step: far below the limits' accuracy, far above the solver's tolerance
 )
-DAMPING_TRIALS = (0.03, 0.3, 3.0)  # times each start's present damping
+DAMPING_TRIALS = (0.03, 0.3, 3.0)  # multiples of each start's present damping
 FIRST_DAMPING = 3e-2
 MIN_DAMPING, MAX_DAMPING = 1e-8, 1e6
-STALLED = 1e-4  # relative decrease of the cost that counts as none
+STALLED = 1e-4  # a smaller relative decrease of the cost counts as none
 PATIENCE = 2  # iterations without decrease before a start has converged
-MIN_COST = 1e-12  # rad^2: below, nothing is left to be gained
-STILL = 1e-9  # a step shorter than this is none; unknowns are shares of duration and change
+MIN_COST = 1e-12  # rad^2: below this there is nothing left to gain
+STILL = 1e-9  # shorter steps count as none; the unknowns are shares of duration and change
 # the field of starts narrows as the descent goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((5, 1.0), (10, 0.5))
-USUAL_ITERATIONS = 8  # of a descent: for the progress that is shown
+USUAL_ITERATIONS = 8  # typical number in a descent, for the displayed progress
 
 
 @stored
 @dataclass(frozen=True)
 class Probes:
-    """What an iteration flies for its differences.
+    """The points that an iteration flies for its finite differences.
 
     Attributes
     ----------
-    starts : (c,) which starts move. found : (c,) whether there are probes near a start.
+    starts : (c,) indices of the starts that move. found : (c,) whether probes exist near a start.
     points : (q, 1 + d, d) of the q found ones, a base near the start and its probes; steps : (q, d).
     """
 
@@ -58,10 +58,10 @@ class Probes:
 @stored
 @dataclass(frozen=True)
 class DescentState:
-    """Starts s of a descent: points (s, d) that keep all limits; costs, torques, dampings, stalls (s,).
+    """Starts s of a descent: points (s, d) that satisfy all limits; costs, torques, dampings, stalls (s,).
 
-    probes : of the iteration that comes; None where none comes. tried : (t, c, d) its trial steps, which
-    come next once the probes were flown.
+    probes : of the next iteration; None if there is none. tried : (t, c, d) its trial steps, which are flown
+    after the probes.
     """
 
     point: Array
@@ -75,7 +75,7 @@ class DescentState:
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """(s,) starts that still move."""
+        """(s,) whether each start still moves."""
         return self.stalled < PATIENCE
 
 
@@ -91,16 +91,16 @@ class _Linear:
 
 
 class ScheduleDescent(Solver[DescentState, Trials]):
-    """Descents from all schedules that are known.
+    """Descents from all known schedules.
 
     Parameters
     ----------
-    space, limit : what the schedules keep.
+    space, limit : the limits that the schedules must satisfy.
     iterations : int
         at most.
     """
 
-    name = "polish"  # as the history of a result calls it
+    name = "polish"  # its name in the history of a result
 
     def __init__(self, space: MorphSpace, limit: TorqueLimit, iterations: int) -> None:
         self._space, self._limit, self._iterations = space, limit, iterations
@@ -112,7 +112,7 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return self._aimed(DescentState(known.points, known.cost, known.peak, damping, stalled))
 
     def ask(self, state: DescentState) -> Batch:
-        """Return the probes, then the trial steps that move, anchored to their starts."""
+        """Return the probes first, then the non-zero trial steps, anchored to their starts."""
         probes = _probes(state)
         if state.tried is None:
             return Batch(probes.points.reshape(-1, self._space.dimension), residuals=True)
@@ -120,7 +120,7 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return Anchored(state.tried.reshape(held.points.shape)[moved], anchors=held.select(moved))
 
     def tell(self, state: DescentState, outcome: Trials) -> DescentState:
-        """Take trial steps in linear models, or accept the best of them."""
+        """Compute trial steps from linear models, or accept the best trial."""
         if _probes(state).starts.size == 0:
             return replace(state, probes=None)
         trials = _held(state)
@@ -136,7 +136,7 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return self._aimed(_accepted(state, trials))
 
     def done(self, state: DescentState) -> bool:
-        """Return whether no start in the field can move any more, or the iterations are used up."""
+        """Return True when no remaining start can move any more or the iterations are used up."""
         return state.probes is None
 
     def best(self, state: DescentState, outcome: Trials) -> tuple[Array, float]:
@@ -150,13 +150,13 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return state.tried is None
 
     def share(self, state: DescentState) -> float:
-        """Return the share of the iterations that a descent usually takes."""
+        """Return progress as a share of the iterations that a descent usually takes."""
         return min(state.iteration / min(USUAL_ITERATIONS, self._iterations), 1.0)
 
     def _aimed(self, state: DescentState) -> DescentState:
-        """Return the state with the probes of the iteration that comes, if one does.
+        """Return the state with the probes of the next iteration, if there is one.
 
-        There are none where no start in the field moves any more: that iteration is the last.
+        There are none when no remaining start moves: that iteration is the last.
         """
         share = next((share for end, share in NARROWING if state.iteration < end), 0.0)
         order = np.argsort(state.cost, kind="stable")[: max(1, round(share * state.cost.size))]
@@ -189,7 +189,7 @@ class ScheduleDescent(Solver[DescentState, Trials]):
         return tried
 
     def _moved(self, state: DescentState, tried: Array) -> NDArray[np.bool_]:
-        """Return which of the trial steps (t c,) lead anywhere."""
+        """Return which of the trial steps (t c,) differ from their start."""
         away = np.abs(tried - state.point[_probes(state).starts])
         return np.asarray(away.max(axis=2).ravel() > STILL)
 
@@ -201,13 +201,13 @@ def _probes(state: DescentState) -> Probes:
 
 
 def _held(state: DescentState) -> Trials:
-    """Return the starts that move, once for each damping."""
+    """Return the starts that move, repeated for each damping value."""
     starts = np.tile(_probes(state).starts, len(DAMPING_TRIALS))
     return Trials.known(state.point[starts], state.cost[starts], state.torque[starts])
 
 
 def _accepted(state: DescentState, trials: Trials) -> DescentState:
-    """Return the state after trials of all dampings: each start at its best trial where that is better."""
+    """Return the state after the trials of all dampings; a start moves if its best trial is better."""
     chosen = _probes(state).starts
     shape = (len(DAMPING_TRIALS), chosen.size)
     points, tried = trials.points.reshape(*shape, -1), trials.cost.reshape(shape)
@@ -230,9 +230,9 @@ def _accepted(state: DescentState, trials: Trials) -> DescentState:
 
 
 def probes_of(space: MorphSpace, point: Array) -> tuple[Array, Array] | None:
-    """Points (1 + d, d), a base near the given one and its probes, and their steps (d,); all keep the limits.
+    """Base point near the given one with its probes, (1 + d, d), and their steps (d,); all are feasible.
 
-    None where the limits leave no room for any.
+    None if the limits leave no room for probes.
     """
     for length, margin in PROBES:
         base = space.nearest(point, margin)
@@ -249,7 +249,7 @@ def probes_of(space: MorphSpace, point: Array) -> tuple[Array, Array] | None:
 def linear_model(trials: Trials, rows: slice, steps: Array) -> _Linear:
     """Return the linear model near a base from its flight and those of its probes, some rows of trials."""
     if trials.residuals is None or trials.torque is None:
-        raise TypeError("the batch asked for residuals")
+        raise TypeError("the batch requested residuals")
     errors, torque = trials.residuals[rows], trials.torque[rows]
     return _Linear(
         trials.points[rows][0],
@@ -267,7 +267,7 @@ def _step(
     J, cost = model.errors_gradient, max(cost, MIN_COST)
     normal = J.T @ J / cost
     toward = J.T @ model.errors / cost
-    # a floor under Marquardt's scale: an unknown that the attitude does not see must not run to its bound
+    # floor of Marquardt's scaling: an unknown that does not affect the attitude must not run to its bound
     scale = damping * (np.diag(normal) + 1e-6 * np.trace(normal) / point.size)
 
     def value(z: Array) -> float:

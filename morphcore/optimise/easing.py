@@ -1,8 +1,8 @@
-"""Lowering the hinge torque of a schedule until it keeps its limit: a place to search from.
+"""Lowers the hinge torque of a schedule until it meets the limit, to obtain a feasible start for the search.
 
 Sequential minimisation of the largest torque: its history is linear in the unknowns near a base, found by
-differences of flights; a smooth form of the maximum over it is minimised under the exact limits, within a
-radius that grows with success and shrinks without.
+finite differences of flights. A smooth approximation of its maximum is minimised under the exact limits,
+within a trust radius that grows after a success and shrinks after a failure.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 
 FIRST_RADIUS = 0.05  # of the unknowns' range
 MAX_RADIUS, MIN_RADIUS = 0.3, 1e-4
-SHARES = (1.0, 0.25)  # of the radius: steps that are flown side by side
-STALLED = 2e-3  # relative decrease of the peak that counts as none
+SHARES = (1.0, 0.25)  # of the radius: steps that are flown in parallel
+STALLED = 2e-3  # a smaller relative decrease of the peak counts as none
 PATIENCE = 3
 MAX_ITERATIONS = 20
 SHARPNESS = 100.0  # of the smooth maximum: off by a few per cent of the peak
@@ -32,10 +32,10 @@ SHARPNESS = 100.0  # of the smooth maximum: off by a few per cent of the peak
 @stored
 @dataclass(frozen=True)
 class EasingState:
-    """A schedule on its way down: point (d,), its cost and peak torque (N m), the next step's radius, stalls.
+    """A schedule being eased: point (d,), its cost and peak torque (N m), radius of the next step, stalls.
 
-    probes, steps : (1 + d, d) and (d,) of the iteration that comes; None where there are none. tried : (k, d)
-    its trial steps, which come next once the probes were flown.
+    probes, steps : (1 + d, d) and (d,) of the next iteration; None if there are none. tried : (k, d) its
+    trial steps, which are flown after the probes.
     """
 
     point: Array
@@ -50,20 +50,20 @@ class EasingState:
 
 
 class TorqueEasing(Solver[EasingState, Trials]):
-    """Lowers the peak torque of the schedule that has the least.
+    """Lowers the peak torque of the known schedule with the lowest peak.
 
     Parameters
     ----------
-    space : what the schedules keep.
+    space : the limits that the schedules must satisfy.
     """
 
-    name = "ease"  # as the history of a result calls it
+    name = "ease"  # its name in the history of a result
 
     def __init__(self, space: MorphSpace) -> None:
         self._space = space
 
     def init(self, known: Trials) -> EasingState:
-        """Start at the schedule of least torque."""
+        """Start at the schedule with the lowest peak torque."""
         lowest = int(np.argmin(np.where(np.isfinite(known.peak), known.peak, np.inf)))
         return self._aimed(
             EasingState(known.points[lowest], float(known.cost[lowest]), float(known.peak[lowest]))
@@ -73,21 +73,21 @@ class TorqueEasing(Solver[EasingState, Trials]):
         """Return the probes, then the trial steps."""
         points = state.probes if state.tried is None else state.tried
         if points is None:
-            raise ValueError("the torque falls no further")
+            raise ValueError("the torque cannot be lowered further")
         return Batch(points, residuals=True)
 
     def tell(self, state: EasingState, outcome: Trials) -> EasingState:
-        """Take trial steps, or accept the one of least torque."""
+        """Compute trial steps, or accept the one with the lowest peak torque."""
         if state.tried is None:
             return replace(state, tried=self._trial_steps(state, outcome))
         return self._aimed(_accepted(state, outcome))
 
     def done(self, state: EasingState) -> bool:
-        """Return whether the torque falls no further."""
+        """Return whether the torque cannot be lowered further."""
         return state.probes is None
 
     def best(self, state: EasingState, outcome: Trials) -> tuple[Array, float]:
-        """Return that there is none: nothing keeps the limit yet."""
+        """Return no point: nothing satisfies the limit yet."""
         del outcome
         return state.point, np.inf
 
@@ -96,15 +96,15 @@ class TorqueEasing(Solver[EasingState, Trials]):
         return state.tried is None
 
     def _aimed(self, state: EasingState) -> EasingState:
-        """Return the state with the probes of the iteration that comes, if one does."""
+        """Return the state with the probes of the next iteration, if there is one."""
         over = state.stalled >= PATIENCE or state.radius < MIN_RADIUS or state.iteration >= MAX_ITERATIONS
         probed = None if over else probes_of(self._space, state.point)
         return state if probed is None else replace(state, probes=probed[0], steps=probed[1])
 
     def _trial_steps(self, state: EasingState, outcome: Trials) -> Array:
-        """Return steps (k, d) to the least torque of a linear model, within shares of the radius."""
+        """Return steps (k, d) to the lowest peak torque of a linear model within fractions of the radius."""
         if state.steps is None:
-            raise ValueError("the torque falls no further")
+            raise ValueError("the torque cannot be lowered further")
         space = self._space
         model = linear_model(outcome, slice(None), state.steps)
         watched = np.flatnonzero(np.abs(model.torque) > WATCHED * np.abs(model.torque).max())

@@ -1,4 +1,4 @@
-"""Whether a morph can keep its limits at all, in which time it can, and the constant rate that does."""
+"""Feasibility of a morph under its limits, its shortest duration, and the constant-rate schedule."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.optimize import Limits, Morph
 
-OVERSHOOT = 0.5  # of the change: how far a schedule that may turn back may go beyond either end
-USUAL_RAMP_S = 0.1  # of a constant rate where the limits allow it, as the sample flights have
+OVERSHOOT = 0.5  # of the change: how far a schedule that may reverse may go beyond either end
+USUAL_RAMP_S = 0.1  # ramps of a constant-rate schedule where the limits allow them, as in the sample flights
 
 
 def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: float) -> MorphSpace:
-    """The unknowns and limits of a morph on the hinges that it moves.
+    """Return the unknowns and limits of a morph of the hinges that it moves.
 
     Raises
     ------
-    InvalidInput : there is no hinge, several drives could be meant, or a hinge does not reach the angles.
+    InvalidInput : there is no hinge, the drive is ambiguous, or a hinge does not reach the angles.
     """
     drives = morph_drives(aircraft, morph)
     hinges = [hinge for hinge in aircraft.hinges if hinge.drive in drives]
@@ -46,11 +46,11 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
 
 
 def morph_drives(aircraft: Aircraft, morph: Morph) -> tuple[str, ...]:
-    """Names of the drives that a morph moves, all alike: those it names, or those of the only word.
+    """Return the names of the drives that a morph moves together: those it names, or those of the only word.
 
     Raises
     ------
-    InvalidInput : there is none, or several could be meant.
+    InvalidInput : there is none, or the choice is ambiguous.
     """
     drives = aircraft.drives
     if not drives:
@@ -61,16 +61,16 @@ def morph_drives(aircraft: Aircraft, morph: Morph) -> tuple[str, ...]:
 
 
 def morph_word(aircraft: Aircraft, morph: Morph) -> str:
-    """What a morph moves, for people and results: the word or name of its drive."""
+    """Return what a morph moves, for messages and results: the word or name of its drive."""
     return morph.named_drive(aircraft.drives)
 
 
 def require_schedules(space: MorphSpace) -> None:
-    """Refuse limits that no schedule keeps.
+    """Raise InvalidInput if no schedule satisfies the limits.
 
     Raises
     ------
-    InvalidInput : with the limit that is too tight and the shortest duration that it allows.
+    InvalidInput : names the limit that is too tight and the shortest duration that it allows.
     """
     if space.room >= HELD:
         return
@@ -85,7 +85,7 @@ def require_schedules(space: MorphSpace) -> None:
         if getattr(limits, name) is not None
     }
     shortest = space.quickest[0]
-    # of two limits that only together are too tight, the one that takes more of the time
+    # if two limits are too tight only in combination, report the one that needs more of the time
     name = max(needed, key=lambda item: needed[item])
     value = getattr(limits, name)
     # the rate goes with 1 / T, the acceleration with 1 / T^2
@@ -101,21 +101,21 @@ def require_schedules(space: MorphSpace) -> None:
 
 
 def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRate:
-    """The constant rate with ramps that the optimum is compared with, over the same duration.
+    """Return the constant-rate schedule with ramps that the optimum is compared with, over the same duration.
 
-    Its ramps are those of the sample flights, or the nearest that keep the limits: a ramp r needs the rate
-    ``change / (T - r)`` and the acceleration ``change / (T - r) / r``. Where splines keep the limits there is
-    one, since no schedule needs less time than the trapezoid.
+    Its ramps are those of the sample flights, or the nearest that satisfy the limits: a ramp r needs the rate
+    ``change / (T - r)`` and the acceleration ``change / (T - r) / r``. It exists whenever a spline satisfies
+    the limits, since no schedule needs less time than the trapezoid.
     """
     change = abs(morph.change_rad)
     minimum, maximum = 0.0, 0.5 * duration_s
     if limits.max_accel_rad_s2 is not None:
-        # the product of ramp and rest of the time must not be less than change / acceleration
+        # ramp times remaining time must be at least change / acceleration
         root = 0.25 * duration_s**2 - change / limits.max_accel_rad_s2
         minimum = 0.5 * duration_s - np.sqrt(max(root, 0.0))
     if limits.max_rate_rad_s is not None:
         maximum = min(maximum, duration_s - change / limits.max_rate_rad_s)
-    # what keeps a limit by round-off keeps it by a little more
+    # a small margin, so that round-off cannot break the limit
     minimum, maximum = minimum * (1.0 + HELD), max(maximum * (1.0 - HELD), 0.0)
     ramp = float(np.clip(min(USUAL_RAMP_S, 0.25 * duration_s), minimum, max(minimum, maximum)))
     return ConstantRate(morph.initial_rad, morph.final_rad, duration_s, ramp_s=min(ramp, 0.5 * duration_s))
@@ -123,7 +123,7 @@ def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRa
 
 @dataclass(frozen=True)
 class Reached:
-    """Extremes of a schedule: largest rate (rad/s) and acceleration (rad/s^2), and whether it never turns."""
+    """Extremes of a schedule: largest rate (rad/s) and acceleration (rad/s^2); whether it never reverses."""
 
     max_rate_rad_s: float
     max_accel_rad_s2: float
@@ -131,7 +131,7 @@ class Reached:
 
 
 def reached(schedule: Schedule) -> Reached:
-    """The extremes of a schedule as it is flown, in closed form from its own coefficients.
+    """Return the extremes of a schedule as flown, in closed form from its coefficients.
 
     Raises
     ------
@@ -151,12 +151,12 @@ def reached(schedule: Schedule) -> Reached:
     return Reached(
         max_rate_rad_s=float(np.abs(rates).max()),
         max_accel_rad_s2=float(np.abs(acceleration(schedule.knot_time_s)).max()),
-        # the rate vanishes at both ends: round-off there is no turn
+        # the rate vanishes at both ends: round-off there is not a reversal
         monotonic=bool(rates.min() >= -HELD * np.abs(rates).max()),
     )
 
 
 def rounded_up(value: float) -> float:
-    """A number rounded up to three digits, for people."""
+    """Return a number rounded up to three digits, for messages."""
     digit = 10.0 ** (np.floor(np.log10(value)) - 2.0)
     return float(np.ceil(value / digit - 1e-9) * digit)

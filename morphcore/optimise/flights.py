@@ -1,7 +1,7 @@
-"""Flights of candidate schedules in one model: how far the attitude departs, what the hinge motors bear.
+"""Flights of candidate schedules in one model: departures of the attitude and torques of the hinge motors.
 
 All candidates of a morph start from one trim, fly one grid of times and share the lattice along the path of
-the angle; a schedule alone tells them apart. They fly side by side in threads.
+the angle; they differ only in their schedules. They are flown in parallel threads.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from morphdata.optimize import Weights
 Array = NDArray[np.float64]
 
 SAMPLE_S = 0.01  # between the rows whose departures are summed
-LONG_FLIGHT = 5_000  # steps: a fifth of a second
-DIVERGED_ANGLE = 3.0  # rad of departure charged for every angle of a row that a diverged flight never reached
+LONG_FLIGHT = 5_000  # steps per chunk: a fifth of a second
+DIVERGED_ANGLE = 3.0  # rad of departure assigned to every angle of a row that a diverged flight did not reach
 
 
 @dataclass(frozen=True)
 class Flown:
     """Flights of p schedules over k rows.
 
-    departure : (p, k, 3) of phi, theta, psi from their values at the start, wrapped, rad; finite, a diverged
-    flight is charged DIVERGED_ANGLE. torque : (p, n) of all moved hinges at all steps, N m; n is
-    0 where it was not asked for. diverged : (p,).
+    departure : (p, k, 3) of phi, theta, psi from their values at the start, wrapped, rad; always finite, rows
+    missing from a diverged flight are set to DIVERGED_ANGLE. torque : (p, n) of all moved hinges at all
+    steps, N m; n is 0 if it was not requested. diverged : (p,).
     """
 
     departure: Array
@@ -54,7 +54,7 @@ class Flown:
         return np.asarray(np.einsum("pka,pka->p", self.departure, self.departure))
 
     def errors(self, weights: Weights) -> Array:
-        """(p, 3 k) what is squared and summed: the departures times the roots of their weights."""
+        """(p, 3 k) residuals: the departures times the square roots of their weights."""
         roots = np.sqrt([weights.phi, weights.theta, weights.psi])
         return (self.departure * roots).reshape(self.departure.shape[0], -1)
 
@@ -65,12 +65,12 @@ class Flown:
 
     @property
     def peak_torque(self) -> Array:
-        """(p,) largest torque of any hinge, N m; 0 where it was not asked for."""
+        """(p,) largest torque of any hinge, N m; 0 if it was not requested."""
         return np.asarray(np.abs(self.torque).max(axis=1, initial=0.0))
 
 
 def sample_times(duration_s: float, settle_s: float) -> Array:
-    """(k,) times of the rows, from the morph's begin to the end of the settling window."""
+    """(k,) times of the rows, from the start of the morph to the end of the settling window."""
     rows = int(np.floor((duration_s + settle_s) / SAMPLE_S + 1e-6)) + 1
     return SAMPLE_S * np.arange(max(rows, 3), dtype=np.float64)
 
@@ -95,7 +95,7 @@ class MorphFlights:
         step_s: float,
     ) -> None:
         self.model, self.path = path.flown(model), path
-        # the hinges whose motors drive the morph: those that hold do no work, and have no limit
+        # the hinges whose motors drive the morph: motors that only hold do no work and have no limit
         self.moved = np.array([path.moves(hinge) for hinge in self.model.aircraft.hinges], dtype=np.bool_)
         self.times_s = times_s
         self.grid = time_grid(times_s, step_s)
@@ -107,10 +107,10 @@ class MorphFlights:
         self.state = trimmed_state(self.model, batch, waiting, found)
 
     def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:
-        """Fly schedules of the path's drives; with the torque of their motors if asked for.
+        """Fly schedules of the path's drives, with the torque of their motors if requested.
 
-        ``stop`` is asked between rounds of one flight for each thread, of long flights within them too, by
-        one thread at a time; True raises Interrupted.
+        ``stop`` is called between rounds of one flight per thread, and within long flights too, by one thread
+        at a time; True raises Interrupted.
         """
         within = one_at_a_time(stop) if stop is not None and self.grid.steps > LONG_FLIGHT else None
         flown: list[tuple[Array, Array]] = [(np.zeros(0), np.zeros(0))] * len(schedules)
@@ -133,12 +133,12 @@ class MorphFlights:
         )
 
     def motion(self, schedule: Schedule) -> AirMotion:
-        """How the aircraft meets the air in one schedule."""
+        """Return the motion of the aircraft through the air in one schedule."""
         plan = self.path.plan(self.model, schedule, self.grid)
         return chain_motion(self.model, plan, self.constants, self.state)
 
     def _one(self, schedule: Schedule, stop: Stop | None, *, torque: bool) -> tuple[Array, Array]:
-        """Euler angles (k, 3) at the rows, and torques (n,)."""
+        """Fly one schedule; return the Euler angles (k, 3) at the rows, and the torques (n,)."""
         plan = self.path.plan(self.model, schedule, self.grid)
         rows = self.model.state_rows if torque else 4
         chunks = fly_batch(self.model, plan, self.constants, self.state, record_rows=rows, stop=stop)

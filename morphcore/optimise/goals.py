@@ -1,4 +1,4 @@
-"""Which searches a goal takes: one after the other, each chosen from what the ones before found."""
+"""The searches that a goal needs, one after the other, each chosen from the results of the earlier ones."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from morphdata.optimize import Morph
 Array = NDArray[np.float64]
 ModelName = Literal["equivalent", "rigid"]
 
-TICK_S = SAMPLE_S  # durations are compared in whole samples: between two the sums have the same rows
+TICK_S = SAMPLE_S  # durations are compared in whole samples: in between, the sums have the same rows
 
 
 @stored
 @dataclass(frozen=True)
 class Task:
-    """A search to be done: with which model, for which duration in s."""
+    """A search to be run: its model and its duration in s."""
 
     model: ModelName
     duration_s: float
@@ -32,10 +32,10 @@ class Task:
 @stored
 @dataclass(frozen=True)
 class Found:
-    """What a search found: its best point (d,), J with weights, and variation without (rad^2).
+    """The result of a search: its best point (d,), the weighted cost J, and the unweighted variation (rad^2).
 
-    Where no schedule keeps the torque limit, cost and variation are infinite and ``torque`` is the least peak
-    that was seen, N m; infinite they are too where the best flight ``diverged``.
+    If no schedule satisfies the torque limit, cost and variation are infinite and ``torque`` is the lowest
+    peak seen, N m. They are also infinite if the best flight ``diverged``.
     """
 
     model: ModelName
@@ -48,11 +48,11 @@ class Found:
 
     @property
     def feasible(self) -> bool:
-        """Whether there is a schedule."""
+        """Whether a schedule satisfies all limits."""
         return bool(np.isfinite(self.cost))
 
     def varied(self, space: MorphSpace, flights: MorphFlights) -> Found:
-        """The same with its variation, which takes a flight."""
+        """Return a copy with its variation, which takes one flight."""
         if not self.feasible:
             return self
         flown = flights.fly([space.schedule(self.point)], torque=False)
@@ -62,7 +62,7 @@ class Found:
 
 
 def durations(morph: Morph, shortest_s: float) -> Array:
-    """Durations, s, that a goal may choose from, rising; the longest is the morph's own."""
+    """Return the durations, s, that a goal may choose from, ascending; the longest is the morph's own."""
     if morph.goal == "variation":
         return np.array([morph.duration_s])
     first, last = int(np.ceil(shortest_s / TICK_S - 1e-9)), int(np.floor(morph.duration_s / TICK_S + 1e-9))
@@ -76,13 +76,13 @@ def durations(morph: Morph, shortest_s: float) -> Array:
 
 
 def next_task(morph: Morph, choice: Array, found: tuple[Found, ...]) -> Task | None:
-    """The search that comes next; None when the goal is reached.
+    """Return the next search; None when the goal is reached.
 
-    The last is always the rigid model's for the duration that was chosen, to compare with.
+    The last is always the rigid model's for the chosen duration, for comparison.
 
     Raises
     ------
-    InvalidInput : no morph reaches the goal.
+    InvalidInput : no morph meets the goal.
     """
     done = {round(item.duration_s, 6): item for item in found if item.model == "equivalent"}
     if morph.goal == "minimum_time":
@@ -97,7 +97,7 @@ def next_task(morph: Morph, choice: Array, found: tuple[Found, ...]) -> Task | N
 
 
 def chosen(morph: Morph, found: tuple[Found, ...]) -> Found:
-    """The search whose schedule is the result; so far, while not all are done."""
+    """Return the search whose schedule is the result, or is the best so far while searches remain."""
     searched = sorted((item for item in found if item.model == "equivalent"), key=lambda f: f.duration_s)
     searched = [item for item in searched if item.feasible] or searched
     if morph.goal == "minimum_time":
@@ -110,10 +110,11 @@ def _is_calm(morph: Morph, item: Found) -> bool:
 
 
 def _bisected(morph: Morph, choice: Array, done: dict[float, Found]) -> float | None:
-    """The next duration to look at for the least that is calm enough; None when it is known.
+    """Return the next duration to try for the shortest that is calm enough; None when it is known.
 
-    First the shortest, then the longest; then halving between the longest that is not and the shortest that
-    is. What is found has a shorter neighbour that was searched too and is not calm enough.
+    First the shortest, then the longest, then bisection between the longest that is not calm enough and the
+    shortest that is. The next shorter duration than the one found has been searched too and is not calm
+    enough.
     """
     known = [done.get(round(float(t), 6)) for t in choice]
     for end in (0, len(known) - 1):
@@ -126,7 +127,7 @@ def _bisected(morph: Morph, choice: Array, done: dict[float, Found]) -> float | 
         minimum = min((item for item in known if item is not None), key=lambda item: item.variation)
         raise InvalidInput(
             f"no morph of {choice[0]:.4g} to {choice[-1]:.4g} s stays below "
-            f"{morph.max_variation_rad2:g} rad^2: the least found is {minimum.variation:.4g} rad^2 "
+            f"{morph.max_variation_rad2:g} rad^2: the minimum found is {minimum.variation:.4g} rad^2 "
             f"in {minimum.duration_s:.4g} s",
             pointer="/morph/max_variation_rad2",
             hint=f"raise it to {1.01 * minimum.variation:.3g} or more, or loosen the limits",
@@ -137,16 +138,16 @@ def _bisected(morph: Morph, choice: Array, done: dict[float, Found]) -> float | 
 
 
 def planned(morph: Morph, choices: int) -> int:
-    """How many searches a goal takes, about, with so many durations to choose from."""
+    """Return roughly how many searches a goal takes, for a given number of candidate durations."""
     if morph.goal == "minimum_time":
         return 3 + int(np.ceil(np.log2(max(choices, 2))))
     return choices + 1
 
 
 def warm_starts(space: MorphSpace, found: tuple[Found, ...]) -> Array:
-    """Points (w, d) to begin a search with, out of the search for the nearest duration; none without any.
+    """Return points (w, d) to start a search from, taken from the search with the nearest duration, if any.
 
-    Its shape as it is, and the same schedule in its own time, so that both end together.
+    They are its shape unchanged, and the same schedule at its own pace, timed so that both end together.
     """
     like = [item for item in found if item.model == "equivalent" and item.feasible]
     if not like:

@@ -1,4 +1,4 @@
-"""Which schedules keep the limits of rate, acceleration, sign and range: exactly, and without a flight.
+"""Exact limits of rate, acceleration, sign and range on schedules, checked without a flight.
 
 A point holds the unknowns of one schedule: the times of the knots between both ends as shares of the
 duration, then, where the values are free, the angles there as shares of the change. Every limit is a *slack*
@@ -24,29 +24,29 @@ from morphdata.optimize import Limits, Morph
 Array = NDArray[np.float64]
 Map = Callable[[Array], Array]
 
-# a schedule counts as keeping a limit with this relative slack: above the round-off of any program that
-# evaluates the spline anew, and of numbers printed with ten digits
+# a schedule satisfies a limit if it leaves this relative slack: above the round-off of any program that
+# evaluates the spline again, and of numbers printed with ten digits
 HELD = 1e-9
 SHORTEST_PIECE = (
-    0.01  # of the duration, between knots: closer ones are a jolt that a flight's step would miss
+    0.01  # of the duration, between knots: closer ones make a jolt that a flight's step would miss
 )
 BESIDE = 1e-7  # relative margin of points that are put back
-PROBE = 1e-7  # of the slacks' difference quotients; their arguments are of order one
-RAY_POINTS = 32  # looked at on a ray before the last interval is halved
+PROBE = 1e-7  # step of the slacks' finite differences; their arguments are of order one
+RAY_POINTS = 32  # checked on a ray before the last interval is bisected
 HALVINGS = 40
-RAMPS = (0.02, 0.1, 0.3, 0.5)  # of the duration: of the constant rates that are tried first
-WAITS = (0.0, 0.2, 0.4, 0.6)  # of the duration: before them
-MAX_ITERATIONS = 60  # of the quadratic programs; more is round-off at corners of the limits
-TOLERANCE = 1e-11  # of their cost
-NARROW = 0.02  # room below which the search for the centre begins at the quickest morph too
+RAMPS = (0.02, 0.1, 0.3, 0.5)  # of the duration: ramps of the constant rates that are tried first
+WAITS = (0.0, 0.2, 0.4, 0.6)  # of the duration: waiting time before them
+MAX_ITERATIONS = 60  # of the quadratic programs; further ones only chase round-off at corners of the limits
+TOLERANCE = 1e-11  # tolerance of their cost
+NARROW = 0.02  # if the slack is smaller, the search for the centre also starts from the quickest morph
 
 
 @dataclass(frozen=True)
 class MorphSpace:
-    """The unknowns of a morph of one duration, and which of their values keep the limits.
+    """The unknowns of a morph of one duration, and the limits on them.
 
-    low, high : least and largest angle that the hinges (and the lattice's table) allow, as shares of the
-    change; only a schedule that may turn back needs them.
+    low, high : smallest and largest angle that the hinges (and the lattice's table) allow, as shares of the
+    change; only needed by a schedule that may reverse.
     """
 
     morph: Morph
@@ -57,7 +57,7 @@ class MorphSpace:
 
     @property
     def inner(self) -> int:
-        """Knots between both ends."""
+        """Number of knots between both ends."""
         return self.morph.knots - 2
 
     @property
@@ -67,7 +67,7 @@ class MorphSpace:
 
     @property
     def lower(self) -> Array:
-        """(d,) least value of each unknown."""
+        """(d,) smallest value of each unknown."""
         values = np.full(self.dimension - self.inner, 0.0 if self.limits.monotonic else self.low)
         return np.concatenate([np.zeros(self.inner), values])
 
@@ -78,7 +78,7 @@ class MorphSpace:
         return np.concatenate([np.ones(self.inner), values])
 
     def knots(self, points: Array) -> tuple[Array, Array]:
-        """Times and values (p, k) of all knots of points (p, d), shares of duration and change."""
+        """Times and values (p, k) of all knots of points (p, d), as shares of duration and change."""
         zero, one = np.zeros((points.shape[0], 1)), np.ones((points.shape[0], 1))
         time = np.concatenate([zero, points[:, : self.inner], one], axis=1)
         if self.morph.free_values:
@@ -97,12 +97,12 @@ class MorphSpace:
         return Spline(self.duration_s * time[0], angle)
 
     def slack(self, points: Array) -> Array:
-        """(p, m) what points (p, d) leave of each limit; none may be negative.
+        """(p, m) slack that points (p, d) leave in each limit; none may be negative.
 
-        Rate: its value at the knots and where it turns. Acceleration: at the knots, where it is greatest on
-        linear pieces. Sign: the least rate of every piece; in the first it is ``s (b + c s)``, which is never
-        negative if the acceleration at the start and the rate at the piece's end are not; likewise in the
-        last.
+        Rate: its value at the knots and at its extrema. Acceleration: at the knots, where it is largest
+        because the pieces are linear. Sign: the minimum rate of every piece; in the first it is ``s (b + c
+        s)``, which is never negative if the acceleration at the start and the rate at the piece's end are
+        not; likewise in the last.
         """
         shapes = self.shapes(points)
         steepness = abs(self.morph.change_rad) / self.duration_s  # mean rate, rad/s
@@ -132,21 +132,21 @@ class MorphSpace:
         return np.asarray(peak * abs(self.morph.change_rad) / self.duration_s**2)
 
     def min_slack(self, points: Array) -> Array:
-        """(p,) of the limit that is nearest."""
+        """(p,) slack of the tightest limit."""
         return np.asarray(self.slack(points).min(axis=1))
 
     def keeps(self, points: Array) -> NDArray[np.bool_]:
-        """(p,) whether points (p, d) keep all limits."""
+        """(p,) whether points (p, d) satisfy all limits."""
         return self.min_slack(points) >= HELD
 
     # a place to draw back to
 
     @cached_property
     def centre(self) -> Array:
-        """(d,) the point whose least slack is greatest, as far as a local search finds it.
+        """(d,) the point whose minimum slack is largest, as far as a local search finds it.
 
-        Sequential quadratic programming on max t, slack(x) >= t, from the best constant rate with ramps; if
-        that leaves little room, from the quickest morph too.
+        Sequential quadratic programming on max t, slack(x) >= t, from the best constant rate with ramps and,
+        if that leaves little slack, also from the quickest morph.
         """
         tried = np.concatenate([self.waiting((0.0,)), self._even])
         best = tried[int(np.argmax(self.min_slack(tried)))]
@@ -160,15 +160,15 @@ class MorphSpace:
 
     @property
     def room(self) -> float:
-        """Least slack of the centre: how much the limits leave; negative if there is no schedule at all."""
+        """Minimum slack of the centre: the room that limits leave; negative if no schedule is feasible."""
         return float(self.min_slack(self.centre[None, :])[0])
 
     @cached_property
     def quickest(self) -> tuple[float, Array]:
-        """The least duration, s, in which schedules of these knots keep the limits, and its point (d,).
+        """The shortest duration, s, in which schedules of these knots satisfy the limits, and its point (d,).
 
-        As far as a local search finds it: min T, slack_T(x) >= 0. Zero where neither rate nor acceleration is
-        limited. The hinge torque, which takes flights, is not looked at.
+        Found by a local search: min T, slack_T(x) >= 0. Zero if neither rate nor acceleration is limited. The
+        hinge torque is not considered, because it takes flights.
         """
         tried = np.concatenate([self.waiting((0.0,)), self._even])
         needed = [self._needed(point) for point in tried]
@@ -200,7 +200,7 @@ class MorphSpace:
         return np.tile(np.linspace(0.0, 1.0, self.morph.knots)[1:-1], self.dimension // self.inner)[None, :]
 
     def _needed(self, point: Array) -> float:
-        """The duration, s, from which on one point keeps the limits; infinite if it never does."""
+        """Return the shortest duration, s, at which a point keeps the limits; infinite if it never does."""
         ends = replace(self, duration_s=1e9)
         if not ends.keeps(point[None, :])[0]:
             return np.inf
@@ -216,7 +216,7 @@ class MorphSpace:
         return needed * (1.0 + 2.0 * HELD)
 
     def _with_more_room(self, start: Array) -> Array:
-        """The point of greatest least slack (d,) near another, or that other."""
+        """Return the point (d,) with the largest minimum slack near another, or that other point."""
 
         def rows(x: Array) -> Array:
             gradient = self.slack_gradient(x[:-1])
@@ -232,10 +232,10 @@ class MorphSpace:
         return np.asarray(pair[int(np.argmax(self.min_slack(pair)))])
 
     def waiting(self, waits: Sequence[float] = WAITS) -> Array:
-        """(p, d) points of schedules that wait, then go at constant rate between ramps to the end.
+        """(p, d) points of schedules that wait, then move at constant rate between ramps to the end.
 
-        As good as a few knots can tell; they need not keep the limits. Fixed values put the knots at equal
-        angles; free ones are put at the corners of the ramps, where the spline has to bend.
+        As well as a few knots can represent them; they need not satisfy the limits. With fixed values the
+        knots lie at equal angles; free knots lie at the corners of the ramps, where the spline has to bend.
         """
         points = []
         even = np.linspace(0.0, 1.0, self.morph.knots)[1:-1]
@@ -252,14 +252,14 @@ class MorphSpace:
             points.append(np.concatenate([time, value]) if self.morph.free_values else time)
         return np.stack(points)
 
-    # maps onto what keeps the limits
+    # maps onto the feasible set
 
     def drawn_back(self, points: Array) -> Array:
-        """Points (p, d) on the rays from the centre, as far out as limits allow, the given ones at most.
+        """Return points (p, d) on the rays from the centre to the given ones, as far out as the limits allow.
 
-        A point that keeps the limits stays. Of the others the ray is walked outward to the last place before
-        the first that breaks a limit, found among RAY_POINTS and then by halving; what is returned has been
-        checked itself.
+        A feasible point stays where it is. For the others the ray is walked outward to the last point before
+        a limit is first broken, found among RAY_POINTS and then by bisection; every returned point has itself
+        been checked.
         """
         held = self.centre
         out = points.copy()
@@ -270,7 +270,7 @@ class MorphSpace:
         share = np.linspace(0.0, 1.0, RAY_POINTS + 1)[1:]
         along = held + share[None, :, None] * move[:, None, :]
         kept = self.keeps(along.reshape(-1, self.dimension)).reshape(broken.size, -1)
-        first_bad = np.argmin(kept, axis=1)  # the last is broken: there is one
+        first_bad = np.argmin(kept, axis=1)  # the last point breaks a limit, so there is one
         low = np.where(first_bad > 0, share[first_bad - 1], 0.0)
         high = share[first_bad]
         for _ in range(HALVINGS):
@@ -281,7 +281,7 @@ class MorphSpace:
         return out
 
     def nearest(self, point: Array, margin: float) -> Array | None:
-        """The point (d,) nearest to one that leaves a margin of all limits; None if none was found."""
+        """Return the nearest point (d,) that leaves a margin in all limits; None if none was found."""
         slack = self.min_slack(point[None, :])[0]
         if slack >= margin:
             return point
@@ -290,17 +290,17 @@ class MorphSpace:
         )
         if self.min_slack(found[None, :])[0] >= margin:
             return found
-        # along the ray to the centre, the first that does
+        # the first point along the ray to the centre that leaves the margin
         share = np.linspace(0.0, 1.0, 4 * RAY_POINTS)[:, None]
         along = point + share * (self.centre - point)
         good = np.flatnonzero(self.min_slack(along) >= margin)
         return along[good[0]] if good.size else None
 
     def put_back(self, point: Array, other: Array) -> Array:
-        """A point (d,) if it keeps the limits, else the nearest that does, else another that is known to.
+        """Return a point (d,) if it is feasible, else the nearest feasible point, else a known feasible one.
 
-        For steps between points at the limits: these are curved, and the ray between two such points may run
-        just outside.
+        Meant for steps between points at the limits: limits are curved, and the ray between two such points
+        may run just outside them.
         """
         if self.keeps(point[None, :])[0]:
             return point
@@ -315,17 +315,17 @@ class MorphSpace:
         margin: float,
         more: tuple[Map, Map] | None = None,
     ) -> Array:
-        """A local minimum (d,) of a smooth cost under the limits, by sequential quadratic programming.
+        """Return a local minimum (d,) of a smooth cost under the limits, by sequential quadratic programming.
 
-        It keeps the limits to the solver's tolerance only: check or draw back. ``more`` : further slacks and
-        their gradients.
+        It satisfies the limits only to the solver's tolerance: check it or draw it back. ``more`` : further
+        slacks and their gradients.
         """
         limits: list[tuple[Map, Map]] = [(lambda x: self.slack(x[None, :])[0] - margin, self.slack_gradient)]
         found = _minimised(cost, gradient, start, limits + ([] if more is None else [more]))
         return np.clip(found, self.lower, self.upper)
 
     def slack_gradient(self, point: Array) -> Array:
-        """(m, d) forward differences of the slacks at one point."""
+        """Return (m, d) forward differences of the slacks at one point."""
         probes = point + np.concatenate([np.zeros((1, self.dimension)), PROBE * np.eye(self.dimension)])
         slack = self.slack(probes)
         return np.asarray(((slack[1:] - slack[0]) / PROBE).T)
@@ -334,7 +334,7 @@ class MorphSpace:
 def _minimised(
     cost: Callable[[Array], float], gradient: Map, start: Array, slacks: Sequence[tuple[Map, Map]]
 ) -> Array:
-    """A local minimum under slacks that must not be negative, or the start where the solver fails."""
+    """Return a local minimum under slacks that must not be negative, or the start if the solver fails."""
     constraints = [{"type": "ineq", "fun": slack, "jac": rows} for slack, rows in slacks]
     found = minimize(  # type: ignore[call-overload]
         cost,
@@ -348,7 +348,7 @@ def _minimised(
 
 
 def _trapezoid(time: Array, ramp: float) -> Array:
-    """Share of a morph done at shares of its time (k,), at constant rate between ramps."""
+    """Completed share of a morph at shares of its time (k,), at constant rate between ramps."""
     t = np.clip(time, 0.0, 1.0)
     rate = 1.0 / (1.0 - ramp)
     rising, falling = 0.5 * rate / ramp * t**2, 1.0 - 0.5 * rate / ramp * (1.0 - t) ** 2
@@ -358,7 +358,7 @@ def _trapezoid(time: Array, ramp: float) -> Array:
 def _trapezoid_time(value: Array, ramp: float) -> Array:
     """The inverse of ``_trapezoid``."""
     rate = 1.0 / (1.0 - ramp)
-    corner = 0.5 * rate * ramp  # done at the end of the first ramp
+    corner = 0.5 * rate * ramp  # share completed at the end of the first ramp
     rising = np.sqrt(2.0 * ramp / rate * np.minimum(value, corner))
     falling = 1.0 - np.sqrt(2.0 * ramp / rate * np.minimum(1.0 - value, corner))
     even = 0.5 * ramp + value / rate

@@ -1,7 +1,7 @@
-"""The optimisation of a morph as an iterator of steps, each with its complete state.
+"""The optimisation of a morph as an iterator of steps, each with the complete state.
 
-Searches come first: with the equivalent model for every duration that the goal asks for, then with the rigid
-model for the one that was chosen. Then the flexible model flies the constant rate and both optima.
+The searches come first: with the equivalent model for every duration that the goal requires, then with the
+rigid model for the chosen duration. Then the flexible model flies the constant-rate schedule and both optima.
 """
 
 from __future__ import annotations
@@ -35,26 +35,28 @@ from morphdata.faults import refuse
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.optimize import Limits, Morph, Verify, VerifyingModel, Weights, goal_faults
 
-VERSION = "optimise 2"  # of the checkpoint; another one is not read
-# longer durations that are tried where the torque limit is too tight
+VERSION = "optimise 2"  # version of the checkpoint; other versions are not read
+# multiples of the duration that are tried when the torque limit is too tight
 LONGER = (1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
 
 
 class ScheduleOptimisation(MorphCase):
-    """The search for the morph that disturbs the attitude least, within the drive's limits.
+    """Search for the morph that disturbs the attitude least, within the drive's limits.
 
     Parameters
     ----------
-    model : one parameter set of the equivalent model. verify : fly the result in the flexible model, or not.
-    flexible : that model. lattice, start, step_s : how the rigid and the equivalent model fly. None as the
-        longest step: the longest with which both fly the constant rate as exactly as `choose_step` demands.
+    model : one parameter set of the equivalent model. verify : whether to fly the result in the flexible
+    model.
+    flexible : the flexible model. lattice, start, step_s : settings of the flights of the rigid and the
+    equivalent model. A step of None selects the longest with which both fly the constant-rate morph to the
+    tolerance of `choose_step`.
 
     Raises
     ------
-    InvalidInput : no schedule keeps the limits, or a setting makes no sense.
+    InvalidInput : no schedule satisfies the limits, or a setting is invalid.
     """
 
-    def __init__(  # noqa: PLR0913 - what is asked for has as many sides
+    def __init__(  # noqa: PLR0913 - an optimisation has that many independent inputs
         self,
         aircraft: Aircraft,
         flight: Flight,
@@ -95,17 +97,19 @@ class ScheduleOptimisation(MorphCase):
     # the iterator
 
     def steps(self, checkpoint: bytes | None = None, stop: Stop | None = None) -> Iterator[Step]:
-        """Work, one step after the other.
+        """Run the optimisation step by step.
 
         Parameters
         ----------
-        checkpoint : of an earlier step; None starts anew. The result is the same to the bit, but for times.
-        stop : asked several times a second; True raises Interrupted.
+        checkpoint : of an earlier step; None starts from the beginning. Apart from times, the result is
+        bit-identical.
+        stop : called several times a second; True raises Interrupted.
         """
         state = OptimisationState() if checkpoint is None else self.state(checkpoint)
         while state.phase != "done":
             begin, before = self._clock(), state
-            # a step of a search is one state; a flight of the flexible model reports its progress in many
+            # a search step yields one state; a flight of the flexible model reports its progress in many
+            # steps
             advance = self._searched if state.phase == "search" else self._verified
             for after, step in advance(before, stop):
                 used = self._clock() - begin
@@ -115,11 +119,11 @@ class ScheduleOptimisation(MorphCase):
                 yield replace(step, checkpoint=pack(state, VERSION))
 
     def result(self, checkpoint: bytes) -> ScheduleResult:
-        """The schedule at any step, flown in the rigid and the equivalent model beside the others.
+        """Return the schedule at any step, with flights of all compared schedules in both simple models.
 
         Raises
         ------
-        NotFlyable : the equivalent model does not fly the best schedule to its end.
+        NotFlyable : the equivalent model cannot fly the best schedule to its end.
         """
         say("evaluating the result")
         with one_blas_thread():
@@ -129,15 +133,15 @@ class ScheduleOptimisation(MorphCase):
         return found
 
     def best_so_far(self, checkpoint: bytes) -> ScheduleResult:
-        """Give the result without torques: someone waits for a cancelled run.
+        """Return the result without torques, quickly, because a caller is waiting for a cancelled run.
 
-        Where the best does not fly it holds no schedule, and a warning says so.
+        If the best schedule cannot be flown, the result holds no schedule but a warning.
         """
         with one_blas_thread():
             return schedule_result(self, self.search, self.weights, self.state(checkpoint), judged=False)
 
     def state(self, checkpoint: bytes) -> OptimisationState:
-        """Return the state in a checkpoint, whose flights are flown in the steps that it was begun with.
+        """Return the state in a checkpoint; its flights keep the time step with which it was started.
 
         Raises
         ------
@@ -150,7 +154,7 @@ class ScheduleOptimisation(MorphCase):
     # one step each
 
     def _prepared(self, state: OptimisationState, stop: Stop | None) -> OptimisationState:
-        """The state with its step, chosen in the time of the searches, and with the search that comes."""
+        """The state with its time step, chosen within the time of the searches, and with the next search."""
         budget_s = self.search.max_seconds
         deadline = Deadline(None if budget_s is None else budget_s - state.search_s, stop)
         if self._step_s is None:
@@ -161,7 +165,7 @@ class ScheduleOptimisation(MorphCase):
     def _searched(
         self, state: OptimisationState, stop: Stop | None
     ) -> Iterator[tuple[OptimisationState, Step]]:
-        """One step of the search that runs, with what follows when it is over."""
+        """One step of the current search, and the transition when it is over."""
         with one_blas_thread():
             if state.task is None:
                 state = self._prepared(state, stop)
@@ -176,7 +180,7 @@ class ScheduleOptimisation(MorphCase):
         yield state, self._step(state, phase, message)
 
     def _recorded(self, state: OptimisationState, task: Task, search: SearchState) -> OptimisationState:
-        """The state after a step of its search, whose history goes on in that of the whole."""
+        """The state after a step of its search, with the step appended to the overall history."""
         before = 0 if state.search is None else state.search.flights
         flights = state.flights + search.flights - before
         rows = tuple(
@@ -200,7 +204,7 @@ class ScheduleOptimisation(MorphCase):
         )
 
     def _begun(self, state: OptimisationState) -> OptimisationState:
-        """The state with the search that comes next; without any, with the phase that follows."""
+        """The state with the next search, or with the next phase if no search is left."""
         task = next_task(self.morph, self.durations, state.found)
         if task is None:
             return replace(
@@ -211,7 +215,7 @@ class ScheduleOptimisation(MorphCase):
     def _ended(
         self, state: OptimisationState, task: Task, search: SearchState, stop: Stop | None
     ) -> OptimisationState:
-        """After a search: what it found, and what comes next."""
+        """The state after a search, with its result and what comes next."""
         space = self.space(task.duration_s)
         found = found_by(task, space, search).varied(space, self.flights(task.model))
         if not found.feasible and found.model == "equivalent" and found.duration_s == self.durations[-1]:
@@ -222,7 +226,7 @@ class ScheduleOptimisation(MorphCase):
     def _verified(
         self, state: OptimisationState, stop: Stop | None
     ) -> Iterator[tuple[OptimisationState, Step]]:
-        """The next schedule's flight in the flexible model, with its progress."""
+        """Fly the next schedule in the flexible model and report progress."""
         compared = compared_schedules(self, state)
         waiting = {name: schedule for name, schedule in compared.items() if schedule is not None}
         name = list(waiting)[len(state.verified)]
@@ -241,24 +245,24 @@ class ScheduleOptimisation(MorphCase):
     # pieces
 
     def _search(self, task: Task, found: tuple[Found, ...]) -> Search[Trials]:
-        """The search of a task, and of its warm starts out of what others found before."""
+        """The search of a task, warm-started from the results of earlier searches."""
         if task not in self._searches:
             space = self.space(task.duration_s)
-            # the rigid model's search is as free as the equivalent one's first
+            # the rigid model's search starts as freely as the equivalent model's first one
             warm = warm_starts(space, found if task.model == "equivalent" else ())
             problem = MorphProblem(space, self.flights(task.model), self.weights, warm)
             self._searches[task] = schedule_search(problem, self.search, self._clock)
         return self._searches[task]
 
     def _budget(self, state: OptimisationState) -> float | None:
-        """The next search's part of the time that is left."""
+        """The next search's share of the remaining time."""
         if self.search.max_seconds is None:
             return None
         waiting = max(self.effort.searches - len(state.found), 1)
         return max(self.search.max_seconds - state.search_s, 0.0) / waiting
 
     def _too_much_torque(self, found: Found, stop: Stop | None) -> InvalidInput:
-        """The error that says how long a morph takes that the hinges' motors can drive."""
+        """The error that states which duration the hinges' motors could manage."""
         maximum = self.limits.max_hinge_torque_nm
         minimum = found.torque
         for factor in LONGER:

@@ -1,4 +1,4 @@
-"""What is searched in: the schedules of one duration, flown with one model."""
+"""The search problem: schedules of one duration, flown with one model."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class MorphProblem:
 
     Parameters
     ----------
-    space, flights, weights : the unknowns with their limits, what flies them, and what is minimised.
-    warm : (w, d) schedules of other searches to begin with.
+    space, flights, weights : the unknowns with their limits, the flights, and the weights of the cost.
+    warm : (w, d) schedules of other searches to start from.
     """
 
     flights_each = 1
@@ -38,7 +38,7 @@ class MorphProblem:
     def arranged(self, points: Array) -> Array:
         """Return random points (p, d) with their knots in order.
 
-        Without it nearly all schedules begin near the centre, where their rays meet the limits.
+        Unordered knots would put nearly all schedules near the centre, where their rays meet the limits.
         """
         inner = self.space.inner
         return np.concatenate(
@@ -46,19 +46,19 @@ class MorphProblem:
         )
 
     def prepare(self, deadline: Deadline) -> None:
-        """Choose nothing: the optimisation has chosen the time step."""
+        """Do nothing: the optimisation has already chosen the time step."""
 
     def first(self) -> Batch:
         """Return the centre of the limits and the warm starts."""
         return Batch(np.concatenate([self.space.centre[None, :], self.space.drawn_back(self.warm)]))
 
     def anchored(self, points: Array, known: Trials) -> Anchored:
-        """Return a batch of schedules that are all drawn back to the first of the known ones."""
+        """Return a batch of schedules that are all drawn back toward the first of the known ones."""
         count = points.shape[0]
         return Anchored(points, anchors=known.select(np.zeros(count, dtype=np.int64)))
 
     def evaluate(self, batch: Batch, stop: Stop | None) -> Trials:
-        """Fly schedules as they are, or drawn back to their anchors where their torque is too much."""
+        """Fly schedules as they are, or drawn back toward their anchors if their torque is too high."""
         if isinstance(batch, Anchored):
             return self.limit.kept(self.space, batch, lambda points: self._fly(points, stop))
         return self._fly(batch.points, stop)

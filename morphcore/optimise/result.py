@@ -1,4 +1,4 @@
-"""The result of an optimisation: the schedule, what it keeps, and how it compares."""
+"""The result of an optimisation: the schedule, its limits, and the comparison."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ ANGLES = ("phi_rad", "theta_rad", "psi_rad")
 
 @dataclass(frozen=True, repr=False)
 class FrontPoint(Shown):
-    """One duration, s: its best schedule and variation, beside the constant rate's (rad^2).
+    """One duration, s: its best schedule and variation, with that of the constant rate (rad^2).
 
-    ``beaten`` : a shorter morph varies no more. ``constant`` : None where it was not flown, or diverged.
+    ``beaten`` : a shorter morph has no larger variation. ``constant`` : None if not flown or diverged.
     """
 
     duration_s: float
@@ -47,10 +47,10 @@ class FrontPoint(Shown):
 class ScheduleResult(Shown):
     """An optimised morph with its comparison.
 
-    drive : word or name of what the morph moves; drives : names of all those drives.
+    drive : word or name of what the morph moves; drives : names of all drives that it moves.
     schedules : the constant rate, the rigid model's optimum (None if none), the optimum. flights :
-    of each model, of each schedule; None where it was not flown. front : all durations
-    that were looked at, rising. partial : the best so far of a run that did not end. warnings : documents.
+    by model, then by schedule; None where not flown. front : all durations searched, ascending. partial : the
+    best so far of a run that did not finish. warnings : as documents.
     """
 
     morph: Morph
@@ -70,14 +70,14 @@ class ScheduleResult(Shown):
 
     @property
     def lost(self) -> bool:
-        """Whether the equivalent model does not fly the optimum to its end: then it is no answer."""
+        """Whether the equivalent model cannot fly the optimum to its end, which makes it no valid answer."""
         return self.variation("optimum", "equivalent") is None
 
     @property
     def schedule(self) -> Spline:
         """The optimum."""
         found = self.schedules["optimum"]
-        assert isinstance(found, Spline)  # noqa: S101 - a search makes nothing else
+        assert isinstance(found, Spline)  # noqa: S101 - a search produces nothing else
         return found
 
     def variation(self, schedule: str, model: str) -> float | None:
@@ -86,9 +86,9 @@ class ScheduleResult(Shown):
         return None if flown is None else flown.variation
 
     def reduction(self, schedule: str = "optimum") -> tuple[float | None, str]:
-        """By how many per cent less than the constant rate's a variation is, and in which model.
+        """Reduction of the variation against the constant rate, per cent, and the model it refers to.
 
-        The flexible one if both were flown in it, else the equivalent one.
+        The flexible model if both schedules were flown in it, else the equivalent model.
         """
         for model in ("flexible", "equivalent"):
             constant, other = self.variation("constant", model), self.variation(schedule, model)
@@ -97,7 +97,7 @@ class ScheduleResult(Shown):
         return None, "equivalent"
 
     def summary(self) -> Summary:
-        """The schedule, and what it gains over the others."""
+        """The schedule, and its improvement over the others."""
         reduction, model = self.reduction()
         gain = "" if reduction is None else f", {reduction:.1f} % below constant rate ({model} model)"
         return Summary(
@@ -113,7 +113,7 @@ class ScheduleResult(Shown):
         )
 
     def to_document(self) -> Document:
-        """JSON form with the names that the API fixes, and more beside."""
+        """JSON form with the names of the API."""
         reduction, model = self.reduction()
         document: Document = {
             "schedule": None if self.lost else _knots(self.drive, self.schedule),
@@ -148,7 +148,7 @@ class ScheduleResult(Shown):
         return document
 
     def curves(self) -> Document:
-        """Time histories for plots and tables: the schedules, and the attitude in every model."""
+        """Time histories for plots and tables: the schedules and the attitude in every model."""
         schedules = {}
         for name, schedule in self.schedules.items():
             if schedule is not None:
@@ -198,7 +198,7 @@ def schedule_result(
     *,
     judged: bool = True,
 ) -> ScheduleResult:
-    """Fly the compared schedules; if ``judged``, with their torques and the front's constant rates too."""
+    """Fly the compared schedules and, if ``judged``, compute their torques and the front's constant rates."""
     best, schedules = best_found(case, state), compared_schedules(case, state)
     named = {name: schedule for name, schedule in schedules.items() if schedule is not None}
     flights: dict[str, dict[str, ComparedFlight | None]] = {}
@@ -245,7 +245,7 @@ def schedule_result(
 
 
 def _front(case: MorphCase, searched: tuple[Found, ...], *, judged: bool) -> tuple[FrontPoint, ...]:
-    """All durations with a schedule; those that none beats are those that vary less than all shorter ones."""
+    """All durations with a schedule; a duration is beaten unless it varies less than all shorter ones."""
     front: list[FrontPoint] = []
     minimum = np.inf
     for item in searched:
@@ -288,12 +288,12 @@ def _knots(drive: str, schedule: Spline) -> Document:
         "drive": drive,
         "knot_time_s": schedule.knot_time_s.tolist(),
         "knot_angle_rad": angles,
-        "knot_sweep_rad": angles,  # the name of old, whatever the drive
+        "knot_sweep_rad": angles,  # the old name, whatever the drive
     }
 
 
 def _schedule_document(schedule: Schedule | None) -> Document | None:
-    """A schedule as requests have it."""
+    """A schedule in the form used by requests."""
     if isinstance(schedule, ConstantRate):
         return {"kind": "constant_rate", **vars(schedule)}
     if isinstance(schedule, Spline):

@@ -1,4 +1,4 @@
-"""What is said about an optimised morph: flights that failed, and what the method does not answer for."""
+"""Warnings about an optimised morph: failed flights, and results outside the method's validity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from morphcore.simulate.plan import path_angles
 from morphcore.simulate.schedule import Schedule
 from morphcore.validity import ResultWarning, air_warnings, documents, overlap_warnings
 
-SHAPES = 9  # between the path's ends, of which overlaps are looked for
+SHAPES = 9  # angles between the path's ends at which overlaps are checked
 Flights = Mapping[str, Mapping[str, ComparedFlight | None]]
 
 
@@ -24,7 +24,7 @@ def schedule_warnings(
     schedules: Mapping[str, Schedule | None],
     flights: Flights,
 ) -> tuple[dict[str, Any], ...]:
-    """Warnings of the compared schedules as documents; those of the flexible model's flights are kept so."""
+    """Return the warnings of the compared schedules as documents, including those of flexible flights."""
     found = _lost(case, flights)
     optimum = schedules["optimum"]
     flown = flights["equivalent"]["optimum"]
@@ -55,7 +55,7 @@ def schedule_warnings(
 
 
 def _lost(case: MorphCase, flights: Flights) -> list[ResultWarning]:
-    """Flights that left their model's domain; where it is the optimum's, there is no answer."""
+    """Flights that left their model's domain; if the optimum is one of them, there is no answer."""
     found = []
     for model, compared in flights.items():
         for name, flight in compared.items():

@@ -1,4 +1,4 @@
-"""The default search for schedules: a screening of random ones, then descents from the best."""
+"""The default search for schedules: random candidates, then descents from the best of them."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ Array = NDArray[np.float64]
 @stored
 @dataclass(frozen=True)
 class ScreenedState:
-    """The schedules that were known before, and the descents once they have begun."""
+    """The schedules known beforehand, and the descents once they have started."""
 
     known: Trials
     descent: DescentState | None = None
 
 
 class ScreenedDescent(Solver[ScreenedState, Trials]):
-    """Descents from what is known and from the best of ``settings.screen`` random schedules."""
+    """Descents from the known schedules and from the best of ``settings.screen`` random ones."""
 
     def __init__(self, problem: MorphProblem, settings: ScheduleSettings) -> None:
         self._problem, self._settings = problem, settings
         self._descent = ScheduleDescent(problem.space, problem.limit, settings.iterations)
 
     def init(self, known: Trials) -> ScreenedState:
-        """Begin with the screening."""
+        """Start with the candidates."""
         return ScreenedState(known)
 
     def ask(self, state: ScreenedState) -> Batch:
-        """Return schedules that wait and go, and random ones; then what the descents ask for."""
+        """Return wait-then-move and random schedules first, then the batches of the descents."""
         if state.descent is not None:
             return self._descent.ask(state.descent)
         rng, space = np.random.default_rng(self._settings.seed), self._problem.space
@@ -48,7 +48,7 @@ class ScreenedDescent(Solver[ScreenedState, Trials]):
         return self._problem.anchored(self._gentle(state.known).drawn_back(points), state.known)
 
     def tell(self, state: ScreenedState, outcome: Trials) -> ScreenedState:
-        """Choose the descents' starts, or go on with the descents."""
+        """Choose the starts of the descents, or continue the descents."""
         if state.descent is not None:
             return replace(state, descent=self._descent.tell(state.descent, outcome))
         chosen = np.argsort(outcome.cost, kind="stable")[: self._settings.starts - 1]
@@ -75,17 +75,17 @@ class ScreenedDescent(Solver[ScreenedState, Trials]):
         return state.descent is None or self._descent.between_steps(state.descent)
 
     def phase(self, state: ScreenedState) -> str:
-        """Return the screening's name as the history of a result has it, or the descents'."""
+        """Return the name of the candidate screening or of the descents, as in the history of a result."""
         return "screen" if state.descent is None else self._descent.phase(state.descent)
 
     def share(self, state: ScreenedState) -> float:
-        """Return a tenth for what comes before the screening, a fifth for what comes before the descents."""
+        """Return a tenth before the candidates are flown, a fifth before the descents start."""
         return 0.1 if state.descent is None else 0.2 + 0.75 * self._descent.share(state.descent)
 
     def _gentle(self, known: Trials) -> MorphSpace:
-        """The space with the acceleration that the torque limit allows a wing, going by the anchor's flight.
+        """The space with the acceleration that the torque limit allows a wing, judged by the anchor's flight.
 
-        What is drawn back to it hardly ever exceeds the torque, and need not give up its shape in flights.
+        Schedules drawn back into it hardly ever exceed the torque limit and so rarely lose their shape later.
         """
         space, limits = self._problem.space, self._problem.space.limits
         if limits.max_hinge_torque_nm is None:

@@ -1,7 +1,8 @@
-"""One search: the schedule of least variation for one model and one duration.
+"""One search: the schedule of minimum variation for one model and one duration.
 
-The centre of the limits is flown first, and what neighbouring searches found. Where even these exceed the
-hinge torque, it is lowered until one does not. Then a method searches, among schedules that keep all limits.
+The centre of the limits and the results of neighbouring searches are flown first. If all of them exceed the
+limit of the hinge torque, the torque is lowered until one does not. Then a method searches among the
+schedules that satisfy all limits.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ class LimitedState:
     ----------
     stage : what comes next: "waiting", further schedules to ease; "easing"; "starting", the method's first
         batch; "searching", its others.
-    known : schedules flown at first; once the method has begun, those that keep the limit. All others are
-        drawn back to the first of these.
+    known : schedules flown first; once the method has started, those that satisfy the limit. All others are
+    drawn back toward the first of these.
     easing, method : states of the solvers.
     """
 
@@ -50,13 +51,13 @@ class LimitedState:
 
 
 class LimitedSearch(Solver[LimitedState, Trials]):
-    """A method whose schedules keep the limits, after whatever easing it takes to find one that does.
+    """A method that searches among feasible schedules, after easing the torque if none is feasible yet.
 
     Parameters
     ----------
     problem : MorphProblem
-    method : searches.
-    all_known : whether the method begins from all schedules known, or from the first alone.
+    method : the search method.
+    all_known : whether the method starts from all known schedules, or from the first only.
     """
 
     def __init__(self, problem: MorphProblem, method: Solver[Any, Trials], *, all_known: bool) -> None:
@@ -64,14 +65,14 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         self._easing = TorqueEasing(problem.space)
 
     def init(self, known: Trials) -> LimitedState:
-        """Begin from the schedules that keep the limit; without any, look for one."""
+        """Start from the schedules that satisfy the limit; without any, find one first."""
         good = self._problem.limit.keeps(known.peak)
         if good.any():
             return self._started(known.select(good))
         return LimitedState("waiting", known.select(slice(None)))
 
     def ask(self, state: LimitedState) -> Batch:
-        """Return the batch of the solver that runs; candidates are drawn back to the limits."""
+        """Return the batch of the current solver, with candidates drawn back to the limits."""
         space = self._problem.space
         if state.stage == "waiting":
             return Batch(space.drawn_back(space.waiting()))
@@ -83,7 +84,7 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         return self._problem.anchored(space.drawn_back(batch.points), state.known)
 
     def tell(self, state: LimitedState, outcome: Trials) -> LimitedState:
-        """Go on with the solver that runs; begin the search where the torque keeps its limit."""
+        """Update the current solver; start the search once a schedule satisfies the torque limit."""
         if state.stage in ("starting", "searching"):
             return replace(state, stage="searching", method=self._method.tell(state.method, outcome))
         if state.stage == "waiting":
@@ -103,7 +104,7 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         return replace(state, stage="easing", easing=easing)
 
     def done(self, state: LimitedState) -> bool:
-        """Return whether the method is over, or the torque falls no further."""
+        """Return whether the method is finished, or the torque cannot be lowered further."""
         if state.stage == "waiting":
             return False
         if state.stage == "easing":
@@ -111,7 +112,7 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         return self._method.done(state.method)
 
     def best(self, state: LimitedState, outcome: Trials) -> tuple[Array, float]:
-        """Return the best schedule that keeps all limits."""
+        """Return the best schedule that satisfies all limits."""
         if state.stage == "searching":
             return self._method.best(state.method, outcome)
         if state.stage == "starting":
@@ -119,7 +120,7 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         return self._problem.space.centre, np.inf
 
     def between_steps(self, state: LimitedState) -> bool:
-        """Return whether a step of the solver that runs has ended."""
+        """Return whether a step of the current solver has ended."""
         if state.stage == "easing":
             return self._easing.between_steps(_easing(state))
         return state.stage == "starting" or (
@@ -127,11 +128,11 @@ class LimitedSearch(Solver[LimitedState, Trials]):
         )
 
     def phase(self, state: LimitedState) -> str:
-        """Return the name of the solver that runs."""
+        """Return the name of the current solver."""
         return self._easing.name if state.stage == "easing" else self._method.phase(state.method)
 
     def share(self, state: LimitedState) -> float:
-        """Return how far the method has come."""
+        """Return the progress of the method."""
         return 0.0 if state.method is None else self._method.share(state.method)
 
     def _started(self, known: Trials) -> LimitedState:
@@ -146,14 +147,14 @@ def _easing(state: LimitedState) -> EasingState:
 
 
 def schedule_search(problem: MorphProblem, settings: ScheduleSettings, clock: Clock) -> Search[Trials]:
-    """Return the search of a problem that settings ask for."""
+    """Return the search selected by the settings."""
     own = settings.method in METHODS
     solver = method(settings.method, problem, settings, METHODS)
     return Search(problem, LimitedSearch(problem, solver, all_known=own), clock)
 
 
 def found_by(task: Task, space: MorphSpace, search: SearchState) -> Found:
-    """Return what a search of a task has found so far; its variation without weights is not known yet."""
+    """Return the result of a task's search so far; its unweighted variation is not known yet."""
     if search.feasible:
         return Found(task.model, task.duration_s, search.best, search.best_cost, search.best_cost, 0.0)
     inner = search.solver

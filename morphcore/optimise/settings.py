@@ -1,4 +1,4 @@
-"""How a schedule is searched for, with every choice made that a request may leave to the method."""
+"""Complete settings of the search for a schedule, including those that a request may leave open."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNCHOSEN = ScheduleSearch()
 
 @dataclass(frozen=True)
 class ScheduleSettings(WholeNumbers):
-    """The choices of all methods.
+    """The settings of all methods.
 
     "hybrid" descends from ``starts`` of ``screen`` schedules by constrained Gauss-Newton steps,
     ``iterations`` at most; "pso" is the swarm. max_seconds : for all searches together, in equal parts.
@@ -36,7 +36,7 @@ class ScheduleSettings(WholeNumbers):
 
 
 def schedule_settings(search: ScheduleSearch) -> ScheduleSettings:
-    """Choose what a request leaves to the method; ``preset: "paper"`` is the swarm of the 2021 paper."""
+    """Fill in what a request leaves open; ``preset: "paper"`` is the swarm of the 2021 paper."""
     return ScheduleSettings(
         method="pso" if search.preset == "paper" else search.method,
         seed=search.seed,

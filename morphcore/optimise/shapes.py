@@ -1,4 +1,4 @@
-"""Shapes of a morph: clamped cubic splines from 0 to 1 over a unit of time, many at once.
+"""Shapes of a morph: batches of clamped cubic splines from 0 to 1 over unit time.
 
 A morph of duration T from one angle to another is ``initial + change p(t / T)`` with a shape p, so that its
 rate is ``change p' / T`` and its acceleration ``change p'' / T^2``. The rate is a quadratic on each piece and
@@ -22,7 +22,7 @@ class Shapes:
     """Clamped cubic splines (p of them, of k knots).
 
     time, value, rate : (p, k) at the knots; the rate is zero at both ends. first, last : (p, k - 1)
-    acceleration at the begin and at the end of each piece.
+    acceleration at the beginning and at the end of each piece.
     """
 
     time: Array
@@ -37,7 +37,7 @@ class Shapes:
         return _lengths(self.time)
 
     def turning_rate(self) -> Array:
-        """(p, k - 1) the rate where it turns inside each piece; at the piece's end where it does not."""
+        """(p, k - 1) the rate at its extremum inside each piece; at the piece's end if it has none."""
         bend = self.last - self.first
         turn = -self.first / np.where(bend == 0.0, 1.0, bend)  # share of the piece
         inside = (bend != 0.0) & (turn > 0.0) & (turn < 1.0)
@@ -45,17 +45,17 @@ class Shapes:
         return np.where(inside, extreme, self.rate[:, 1:])
 
     def turning_values(self) -> Array:
-        """(p, 2 (k - 1)) the values where the rate vanishes inside a piece; a knot's where it does not.
+        """(p, 2 (k - 1)) the values where the rate vanishes inside a piece; a knot's value if it does not.
 
         Roots of ``d + a s + (b - a) s^2 / 2`` with the rate d, accelerations a, b times the length. The rate
-        vanishes at both ends of the shape, which are no turns: the first and the last piece have one other
-        root each.
+        vanishes at both ends of the shape, which are not reversals: the first and the last piece have one
+        other root each.
         """
         length = self.length
         d, a, b = self.rate[:, :-1], self.first * length, self.last * length
         bend = b - a
         discriminant = a * a - 2.0 * d * bend
-        # the root's form that never subtracts what is nearly equal (Press et al. 2007, equation 5.6.4)
+        # the form of the roots that avoids cancellation (Press et al. 2007, equation 5.6.4)
         q = -(a + np.copysign(np.sqrt(np.maximum(discriminant, 0.0)), a))
         one, other = (2.0 * d, q), (q, bend)
         inner = self.value[:, 1:].copy()
@@ -73,20 +73,20 @@ class Shapes:
 
 
 def clamped_shapes(time: Array, value: Array) -> Shapes:
-    """The splines through knots (p, k) with rate zero at both ends (de Boor 1978, chapter IV)."""
+    """Return the splines through knots (p, k) with zero rate at both ends (de Boor 1978, chapter IV)."""
     length = _lengths(time)
     slope = np.diff(value, axis=1) / length
     rate = np.zeros_like(time)
     # equal accelerations on both sides of every knot: a tridiagonal system for the rates between the ends
     right = 3.0 * (slope[:, :-1] / length[:, :-1] + slope[:, 1:] / length[:, 1:])
     diagonal = 2.0 / length[:, :-1] + 2.0 / length[:, 1:]
-    beside = 1.0 / length[:, 1:-1]
+    coupling = 1.0 / length[:, 1:-1]
     for i in range(1, diagonal.shape[1]):
-        share = beside[:, i - 1] / diagonal[:, i - 1]
-        diagonal[:, i] -= share * beside[:, i - 1]
+        share = coupling[:, i - 1] / diagonal[:, i - 1]
+        diagonal[:, i] -= share * coupling[:, i - 1]
         right[:, i] -= share * right[:, i - 1]
     for i in range(diagonal.shape[1] - 1, -1, -1):
-        carried = beside[:, i] * rate[:, i + 2] if i < diagonal.shape[1] - 1 else 0.0
+        carried = coupling[:, i] * rate[:, i + 2] if i < diagonal.shape[1] - 1 else 0.0
         rate[:, i + 1] = (right[:, i] - carried) / diagonal[:, i]
     first = (6.0 * slope - 4.0 * rate[:, :-1] - 2.0 * rate[:, 1:]) / length
     last = (-6.0 * slope + 2.0 * rate[:, :-1] + 4.0 * rate[:, 1:]) / length

@@ -1,4 +1,4 @@
-"""The complete state of an optimisation, and how far it has come."""
+"""The complete state of an optimisation, and its progress."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from morphcore.search.checkpoint import stored
 from morphcore.search.run import UNFINISHED, SearchState
 from morphdata.optimize import Morph
 
-# seconds that parts of the work take on the machine it was written on: their ratios make the fraction
+# reference seconds for parts of the work: only their ratios matter, for the fraction
 SEARCH_COST_S = 3.5
 PARTICLE_COST_S = 0.015
-FLEXIBLE_COST_S = 1.5  # for each second flown
+FLEXIBLE_COST_S = 1.5  # per second of flight
 FLEXIBLE_FLIGHTS = 3
 
 
@@ -25,9 +25,9 @@ FLEXIBLE_FLIGHTS = 3
 class OptimisationState:
     """An optimisation between two steps.
 
-    phase : what comes next. task, search : the search that runs. found : those that are done. verified :
-    flights of the flexible model that are done. history : one row for each step of a search. search_s : wall
-    time of the searches, s; wall_s : of everything. step_s : of the flights, once it is chosen.
+    phase : what comes next. task, search : the current search. found : finished searches. verified : finished
+    flights of the flexible model. history : one row for each step of a search. search_s : wall time of the
+    searches, s; wall_s : of everything. step_s : time step of the flights, once it is chosen.
     """
 
     phase: Literal["search", "verify", "done"] = "search"
@@ -44,7 +44,7 @@ class OptimisationState:
 
     @property
     def best_cost(self) -> float:
-        """J of the equivalent model's search that ran last, rad^2."""
+        """J of the latest search with the equivalent model, rad^2."""
         if self.search is not None and self.task is not None and self.task.model == "equivalent":
             cost = shown_cost(self.search)
             if cost is not None:
@@ -54,7 +54,7 @@ class OptimisationState:
 
 @dataclass(frozen=True)
 class Effort:
-    """What parts of the work cost, s, and how many there are."""
+    """Costs of the parts of the work, s, and their numbers."""
 
     searches: int
     search_s: float
@@ -63,7 +63,7 @@ class Effort:
     def fraction(self, state: OptimisationState, *, searched: float, flown: float) -> float:
         """Share of the whole work that is done, 0..1.
 
-        searched : of the search that runs. flown : of a flexible flight under way.
+        searched : fraction of the current search. flown : fraction of the current flexible flight.
         """
         if state.phase == "done":
             return 1.0
@@ -75,7 +75,7 @@ class Effort:
 
 
 def effort(morph: Morph, choices: int, search: ScheduleSettings, *, flexible: bool) -> Effort:
-    """The effort that a goal takes with so many durations to choose from."""
+    """Return the effort that a goal takes with a given number of candidate durations."""
     swarm = search.swarm
     return Effort(
         searches=planned(morph, choices),
@@ -87,9 +87,9 @@ def effort(morph: Morph, choices: int, search: ScheduleSettings, *, flexible: bo
 
 
 def shown_cost(search: SearchState) -> float | None:
-    """Least J of a search, rad^2; while no schedule keeps the torque limit, of the one that is eased.
+    """Return the minimum J of a search, rad^2; until a schedule satisfies the torque limit, the eased one's.
 
-    None before anything was flown.
+    None before the first flight.
     """
     if search.feasible:
         return search.best_cost

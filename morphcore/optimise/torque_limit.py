@@ -1,8 +1,8 @@
-"""The limit of the hinge torque, which is known only after a flight.
+"""The limit of the hinge torque, which can only be checked by a flight.
 
 A schedule whose flight exceeds it is drawn back, along the ray to one whose flight does not, until its own
-flight keeps it. So the limit holds for every schedule that is taken, at every step of its flight in the model
-that is searched with; between the steps the torque is smooth and moves by a square of the step.
+flight satisfies it. So the limit holds for every accepted schedule, at every step of its flight in the
+searched model; between the steps the torque is smooth and varies with the square of the step.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from morphcore.search.solver import Batch, Outcome
 
 Array = NDArray[np.float64]
 
-ROUNDS = 4  # of drawing back; what is still too much then stays at its anchor
-AIM = 0.99  # of the limit, when a schedule is drawn back: the torque is not linear along the ray
-NEAR = 0.9  # of the limit: drawn back this far is far enough
-LINEAR_MARGIN = 1e-3  # of the limit, in linear models
-WATCHED = 0.5  # of the limit: torques above are watched in linear models
+ROUNDS = 4  # rounds of drawing back; a schedule that still exceeds the limit is replaced by its anchor
+AIM = 0.99  # target as a share of the limit when drawing back: the torque is not linear along the ray
+NEAR = 0.9  # share of the limit at which drawing back stops
+LINEAR_MARGIN = 1e-3  # share of the limit, in linear models
+WATCHED = 0.5  # share of the limit above which torques enter the linear models
 MAX_WATCHED = 200
 
 
 @stored
 @dataclass(frozen=True)
 class Trials(Outcome):
-    """Flown schedules: residuals are the departures times the roots of their weights.
+    """Flown schedules; residuals are the departures times the square roots of their weights.
 
     Attributes
     ----------
     torque : (p, n) of all hinges at all steps, N m; only with residuals.
-    peak : (p,) the largest of them; NaN of a diverged flight.
+    peak : (p,) the largest of them; NaN for a diverged flight.
     """
 
     torque: Array | None = None
@@ -43,19 +43,19 @@ class Trials(Outcome):
 
     @staticmethod
     def known(points: Array, cost: Array, peak: Array, evaluations: int = 0) -> Trials:
-        """Return schedules flown before, of which only cost and peak torque were kept."""
+        """Return earlier schedules, of which only cost and peak torque were kept."""
         return Trials(points, cost, None, evaluations, None, peak)
 
     def select(self, index: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Trials:
-        """Return some of them, without residuals and torques."""
+        """Return a subset, without residuals and torques."""
         return Trials.known(self.points[index], self.cost[index], self.peak[index])
 
 
 @dataclass(frozen=True)
 class Anchored(Batch):
-    """Schedules that are drawn back to anchors, one for each, until their torque keeps its limit.
+    """Schedules that are drawn back toward anchors, one each, until their torque satisfies the limit.
 
-    ``anchors`` : (p, d) points that keep all limits, with their costs and peaks.
+    ``anchors`` : (p, d) points that satisfy all limits, with their costs and peaks.
     """
 
     anchors: Trials = field(default_factory=lambda: Trials(np.zeros((0, 0)), np.zeros(0)))
@@ -63,21 +63,21 @@ class Anchored(Batch):
 
 @dataclass(frozen=True)
 class TorqueLimit:
-    """The largest torque of any hinge, N m; None is no limit."""
+    """The largest allowed torque of any hinge, N m; None means no limit."""
 
     max_nm: float | None
 
     def keeps(self, peak: Array) -> NDArray[np.bool_]:
-        """Whether peak torques keep the limit."""
+        """Return whether peak torques satisfy the limit."""
         if self.max_nm is None:
             return np.ones(peak.shape, dtype=np.bool_)
         return peak <= self.max_nm  # false for the NaN of a diverged flight
 
     def kept(self, space: MorphSpace, batch: Anchored, fly: Callable[[Array], Trials]) -> Trials:
-        """Fly points (p, d), each drawn back to its anchor until it keeps the limit.
+        """Fly points (p, d), each drawn back toward its anchor until it satisfies the limit.
 
-        Points keep the limits of the space, and so do all that are flown here. What cannot be brought back in
-        a few rounds of false position ends at its anchor.
+        The points satisfy the limits of the space, and so do all that are flown here. A point that a few
+        rounds of false position cannot bring within the limit ends at its anchor.
         """
         flown, anchors = fly(batch.points), batch.anchors
         count = flown.evaluations

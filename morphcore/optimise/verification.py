@@ -1,4 +1,4 @@
-"""The schedules that are compared, flown in the flexible model."""
+"""Verification: flights of the compared schedules in the flexible model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from morphdata.optimize import VerifyingModel
 
 Array = NDArray[np.float64]
 
-SHOWN_SHARE = 0.02  # of a flight: how often its progress is reported
+SHOWN_SHARE = 0.02  # fraction of a flight between progress reports
 
 
 @stored
@@ -31,7 +31,7 @@ SHOWN_SHARE = 0.02  # of a flight: how often its progress is reported
 class Verified:
     """One schedule's flight in the flexible model.
 
-    euler : (k, 3) rad at the rows of the window; none where the flight failed, as ``failure`` says.
+    euler : (k, 3) rad at the rows of the window; empty if the flight failed, as ``failure`` explains.
     warnings : of the flight, as documents.
     """
 
@@ -50,11 +50,11 @@ def verification(
     clock: Clock,
     stop: Stop | None,
 ) -> Iterator[float | Verified]:
-    """Fly one schedule; give the share of the flight that is done now and then, and its record at the end.
+    """Fly one schedule; yield the completed fraction from time to time, and the record at the end.
 
     Raises
     ------
-    Interrupted : ``stop`` said so.
+    Interrupted : ``stop`` returned True.
     """
     begin, shown = clock(), 0.0
     euler, failure = np.zeros((0, 3)), ""

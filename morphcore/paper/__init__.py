@@ -1,4 +1,4 @@
-"""Every table and figure of the paper, made anew with our own flexible model as the truth."""
+"""Reproduction of every table and figure of the paper, with our own flexible model as the truth."""
 
 from __future__ import annotations
 

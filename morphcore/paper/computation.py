@@ -1,10 +1,10 @@
-"""The stage "computation" (Table 2): what one flight costs in each model, on one core, one at a time.
+"""The stage "computation" (Table 2): cost of one flight in each model, on one core, one at a time.
 
-The models take turns, flight by flight, so that a machine that slows down slows all of them; medians are
-kept. What is compared is the time that the processor spends on the flight's thread, which other programs on
-the machine hardly change; the wall time is reported too. ``flight_steps`` of any model reports once before it
-begins to fly: what comes before is called preparation (lattice along the morph, or its first one, and trim),
-what comes after flight.
+The models take turns, flight by flight, so that a slowdown of the machine affects all of them; medians are
+kept. The comparison uses the processor time of the flight's thread, which other programs on the machine
+hardly change; the wall time is reported as well. ``flight_steps`` of any model reports once before the flight
+starts: the time before is called preparation (trim, and the lattice along the morph or its first one), the
+time after it flight.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ Document = dict[str, Any]
 BATCH_ROUNDS = 3
 TIMES = ("prepare_s", "fly_s", "total_s", "wall_s")
 SWARM_SEED = 1
-# spread of the benchmark's swarm around the physical guess: as wide as an identification's candidates
+# spread of the benchmark's swarm around the physical guess: that of an identification's candidates
 STIFFNESS_SPREAD = 0.3  # standard deviation of the logarithm
 DIVISION_CONCENTRATION = 20.0  # of the Dirichlet distribution of the links' shares
 
 
 def benchmark_swarm(model: ChainModel, particles: int, seed: int = SWARM_SEED) -> ParameterBatch:
-    """Parameter sets around the physical guess, as a search has them."""
+    """Parameter sets around the physical guess, like those of a search."""
     rng = np.random.default_rng(seed)
     n = model.links_per_wing
     division = rng.dirichlet(np.full(n, DIVISION_CONCENTRATION), (particles, 1))
@@ -77,13 +77,13 @@ def time_models(settings: PaperSettings, results: Results, _checkpoint: bytes | 
 def _timed(
     settings: PaperSettings, each: PaperFlight, model: ModelChoice
 ) -> tuple[dict[str, float], Trajectory]:
-    """The processor's time for one flight, in its parts, and the wall's, s."""
+    """Processor time of one flight, by part, and its wall time, s."""
     schedules = each.schedules()
     wall, begin = time.perf_counter(), time.thread_time()
     steps = flight_steps(
         aircraft(), flight(), schedules, model=model, duration_s=each.duration_s,
         lattice=settings.lattice, elements=settings.elements,
-        step_s=FLEXIBLE_STEP_S if model == "flexible" else STEP_S,  # known: nobody has to look for it
+        step_s=FLEXIBLE_STEP_S if model == "flexible" else STEP_S,  # known, so that no step has to be chosen
     )  # fmt: skip
     next(steps)
     ready = time.thread_time()
@@ -100,7 +100,7 @@ def _timed(
 
 
 def _row(each: PaperFlight, taken: dict[str, list[Document]]) -> Document:
-    """Medians over the turns, the first left out, and how far these are apart."""
+    """Medians over the turns without the first, and their spread."""
     medians = {
         name: {part: statistics.median(turn[part] for turn in turns[1:]) for part in TIMES}
         for name, turns in taken.items()
@@ -119,7 +119,7 @@ def _row(each: PaperFlight, taken: dict[str, list[Document]]) -> Document:
 
 
 def _timed_batch(settings: PaperSettings, trajectory: Trajectory | None) -> Document:
-    """Cost of one flight among many that fly together: lattice, trims and all, on one core."""
+    """Cost of one flight in a batch, including lattice and trims, on one core."""
     assert trajectory is not None  # noqa: S101 - flights were timed before
     model = chain_model(aircraft(), flight(), LINKS, settings.lattice)
     swarm = benchmark_swarm(model, settings.effort.batch)
@@ -144,7 +144,7 @@ def _timed_batch(settings: PaperSettings, trajectory: Trajectory | None) -> Docu
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """One thread of ours and one of the linear algebra's, inside the block."""
+    """Use one kernel thread and one BLAS thread inside the block."""
     before = thread_count()
     use_threads(1)
     try:

@@ -1,4 +1,4 @@
-"""The stages that identify: the study (Table 1), our search and the paper's swarm (figures 4 to 9)."""
+"""The identification stages: the study (Table 1), our search and the paper's swarm (figures 4 to 9)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Document = dict[str, Any]
 def searched(
     search: Identification | Study | ScheduleOptimisation, checkpoint: bytes | None
 ) -> Generator[Progress, None, bytes]:
-    """Run a search to its end; returns the checkpoint of its last step."""
+    """Run a search to its end and return the checkpoint of its last step."""
     last = checkpoint or b""
     for step in search.steps(checkpoint):
         last = step.checkpoint
@@ -30,7 +30,7 @@ def searched(
 
 
 def study_links(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
-    """Models of several sizes, identified on three flights and judged on the other three."""
+    """Models of several sizes, identified from three flights and judged on the other three."""
     study = Study(
         aircraft(),
         flight(),

@@ -1,7 +1,7 @@
 """The stage "independent": flights of another program, predicted with nominal properties and nothing fitted.
 
-The trim is our own, both laws of the vortex core are flown (DECISIONS 9 says why both), and only the measured
-sweep is taken from the files.
+The trim is our own, both laws of the vortex core are flown (for the reason see DECISIONS 9), and only the
+measured sweep is taken from the files.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ Document = dict[str, Any]
 PATTERN = "*.csv"
 NOTES, WALL = "samples.json", "flexible_model_wall_s"
 TIP = "tip_left_z"
-SILENT_RAD = 1e-6  # an angle that stays below does not move, and has no range to compare with
+SILENT_RAD = 1e-6  # an angle that stays below this does not move, and has no range to compare with
 
 
 def sample_digests(folder: Path | None) -> dict[str, str]:
-    """The digest of every file of another program's flights, which decide the comparison."""
+    """The digest of every file of the other program's flights, an input of the comparison."""
     files = [] if folder is None else [*folder.glob("*.json"), *_flights(folder)]
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(files)}
 
 
 def compare_independent(settings: PaperSettings, _results: Results, _checkpoint: bytes | None) -> Work:
-    """Fly every sample in our flexible model; empty where no samples are at hand."""
+    """Fly every sample in our flexible model; empty if there are no samples."""
     if settings.samples is None:
         return {"available": False, "laws": []}
     craft = Aircraft.of(load_aircraft(settings.samples / "aircraft.json"))
@@ -121,13 +121,13 @@ def _angles(trajectory: Trajectory) -> dict[str, list[float]]:
 
 
 def _first_tip(samples: Sequence[Trajectory]) -> float | None:
-    """The samples' tip at the start, m below the root; None where they do not tell."""
+    """The samples' tip at the start, m below the root; None if they do not contain it."""
     tips = [float(sample.extra[TIP][0]) for sample in samples if TIP in sample.extra]
     return tips[0] if tips else None
 
 
 def _their_wall_s(folder: Path) -> dict[str, float]:
-    """What the other program noted that its flights took, s; empty where it noted nothing."""
+    """Durations of the other program's flights as it recorded them, s; empty if it did not."""
     path = folder / NOTES
     notes = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     return {name: float(note[WALL]) for name, note in notes.items() if WALL in note}

@@ -1,11 +1,11 @@
-"""The stages of the optimised morph (Table 3, figures 10 and 11), and what goes beyond the paper.
+"""The stages of the optimised morph (Table 3, figures 10 and 11), and those that go beyond the paper.
 
-"morph" is our search and is verified by the optimisation itself; "swarm_morph" the paper's swarm of 50;
-"free_morph" also searches the angles; "unsettled_morph" leaves the settling window out, as the paper does;
+"morph" is our search and is verified by the optimisation itself; "swarm_morph" is the paper's swarm of 50;
+"free_morph" also searches the angles; "unsettled_morph" omits the settling window, as the paper does;
 "fastest_morph" is the quickest that moves the attitude no more than the constant rate does; "front" trades
-duration against variation. "flown_morphs" flies what these found in the flexible model. Wherever durations
-differ, attitudes are compared over the same `WINDOW_S`: a window that ended sooner for the quicker morph
-would make every quick morph look calm.
+duration against variation. "flown_morphs" flies the results of these in the flexible model. Whenever
+durations differ, attitudes are compared over the same `WINDOW_S`: a window that ended sooner for a quicker
+morph would make every quick morph look calm.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ FREE_MORPH = MORPH.model_copy(update={"free_values": True})
 UNSETTLED_MORPH = MORPH.model_copy(update={"settle_s": 0.0})
 FASTEST_MORPH = MORPH.model_copy(update={"goal": "minimum_time"})  # under a limit found on the way
 LIMITS = Limits(max_rate_rad_s=RATE_LIMIT_RAD_S)
-WINDOW_S = MORPH_S + SETTLE_S  # from the start of any morph, over which attitudes count
+WINDOW_S = MORPH_S + SETTLE_S  # s from the start of a morph over which attitudes count
 OTHER_SEARCHES = ("swarm_morph", "free_morph", "unsettled_morph", "fastest_morph")
-CHECK_POINTS = 20_001  # at which an optimised schedule's rate is looked at
-SAMPLE_S = 0.01  # between the rows whose squares make the variation
+CHECK_POINTS = 20_001  # points at which an optimised schedule's rate is checked
+SAMPLE_S = 0.01  # s between the rows whose squares make up the variation
 
 Search = Callable[[PaperSettings], ScheduleSettings]
 
@@ -63,7 +63,7 @@ def our_search(settings: PaperSettings) -> ScheduleSettings:
 
 
 def paper_search(settings: PaperSettings) -> ScheduleSettings:
-    """The paper's swarm, for as many generations as there is time."""
+    """The paper's swarm, for as many generations as time allows."""
     swarm = SwarmSettings(particles=PAPER_PARTICLES, generations=settings.effort.schedule_generations)
     return ScheduleSettings(method="pso", seed=settings.seed, swarm=swarm)
 
@@ -83,21 +83,21 @@ def optimise_morph(settings: PaperSettings, results: Results, checkpoint: bytes 
 def search_morph(
     morph: Morph, search: Search, settings: PaperSettings, results: Results, checkpoint: bytes | None
 ) -> Work:
-    """A search alone; "flown_morphs" flies what it finds."""
+    """A search only; "flown_morphs" flies its result."""
     run = _optimisation(settings, results, morph, search(settings), verify=False)
     last = yield from searched(run, checkpoint)
     return run.result(last).to_document()
 
 
 def search_fastest(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
-    """The shortest morph whose variation is at most that of the constant rate in two seconds."""
+    """The shortest morph whose variation does not exceed that of the constant rate in two seconds."""
     maximum = results["morph"]["variation"]["constant"]["equivalent"]
     morph = FASTEST_MORPH.model_copy(update={"max_variation_rad2": maximum})
     return (yield from search_morph(morph, our_search, settings, results, checkpoint))
 
 
 def search_front(settings: PaperSettings, results: Results, checkpoint: bytes | None) -> Work:
-    """The least variation over the same window for morphs of several durations, the rest of it settling."""
+    """The minimum variation over the same window for morphs of several durations, each then settling."""
     points: list[Document] = [] if checkpoint is None else json.loads(checkpoint)
     durations = settings.effort.front_durations_s
     for duration_s in durations[len(points) :]:
@@ -118,7 +118,7 @@ def search_front(settings: PaperSettings, results: Results, checkpoint: bytes | 
 
 
 def fly_morphs(settings: PaperSettings, results: Results, _checkpoint: bytes | None) -> Work:
-    """Every schedule of the other searches, flown in the flexible model over the window."""
+    """Fly the schedules of the other searches in the flexible model over the window."""
     waiting = _found_schedules(results)
     used = Resolution("flexible", settings.elements, settings.effort.flexible_step_s, settings.lattice)
     rows: list[Document] = []
@@ -167,14 +167,14 @@ def _optimisation(
 
 
 def _checked(schedule: Spline) -> Document:
-    """Rates of the schedule as a drive would see it: sampled, not taken from the search's own formulas."""
+    """Rates of the schedule as a drive would see them: sampled, not from the search's own formulas."""
     times = np.linspace(schedule.knot_time_s[0], schedule.knot_time_s[-1], CHECK_POINTS)
     rate = schedule.motion(times).rate
     return {"max_rate_rad_s": float(rate.max()), "min_rate_rad_s": float(rate.min())}
 
 
 def _found_schedules(results: Results) -> list[tuple[str, float, Document]]:
-    """Name, duration and schedule of what the other searches found."""
+    """Name, duration and schedule of the other searches' results."""
     found = [
         (name, float(results[name]["duration_s"]), results[name]["schedules"]["optimum"])
         for name in OTHER_SEARCHES

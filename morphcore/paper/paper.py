@@ -29,8 +29,7 @@ Run = Callable[[PaperSettings, Results, bytes | None], Work]
 
 STAGES_FOLDER = "stages"
 
-# name, title, work, needs, and the seconds that it takes, full and quick, on the machine it was written on
-# (for the progress shown)
+# name, title, work, needs, and typical seconds, full and quick (for the displayed progress)
 PLAN: tuple[tuple[str, str, Run, tuple[str, ...], tuple[float, float]], ...] = (
     ("truth", "six flexible flights", fly_truth, (), (45.0, 15.0)),
     ("study", "Table 1", study_links, ("truth",), (120.0, 20.0)),
@@ -55,7 +54,7 @@ PLAN: tuple[tuple[str, str, Run, tuple[str, ...], tuple[float, float]], ...] = (
 
 
 def paper_stages(settings: PaperSettings) -> tuple[Stage, ...]:
-    """The stages; the code, the scenario in it and the settings are inputs of each."""
+    """The stages; the code, including the scenario, and the settings are inputs of each."""
     inputs: Document = {
         "code": code_digest(),
         "seed": settings.seed,
@@ -79,6 +78,6 @@ def paper_stages(settings: PaperSettings) -> tuple[Stage, ...]:
 
 
 def paper_runner(settings: PaperSettings, folder: Path) -> StageRunner:
-    """The runner of all stages; results go to a folder in the report's folder."""
+    """The runner of all stages; their results go to a subfolder of the report's folder."""
     where = {"machine": machine(), "versions": versions()}
     return StageRunner(paper_stages(settings), folder / STAGES_FOLDER, where=where)

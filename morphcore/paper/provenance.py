@@ -1,4 +1,4 @@
-"""What made the figures: versions, machine, and a digest of the code that decides them."""
+"""Provenance of the figures: versions, machine, and a digest of the code that determines them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Document = dict[str, Any]
 
 PACKAGES = ("numpy", "scipy", "numba", "pyswarms", "matplotlib")
 PACKAGES_OF_OURS = ("morphcore", "morphdata")
-PRESENTATION = ("morphcore/export", "morphcore/paper/report")  # shows figures and does not change them
+PRESENTATION = ("morphcore/export", "morphcore/paper/report")  # presents figures without changing them
 UNKNOWN = "unknown"
 
 
@@ -39,7 +39,7 @@ def machine() -> Document:
 
 
 def code_digest() -> str:
-    """A digest of the source that decides the figures: library and documents without what only shows them."""
+    """A digest of the source that determines the figures: library and documents, not presentation."""
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted(path for package in PACKAGES_OF_OURS for path in (root / package).rglob("*.py")):
@@ -53,12 +53,12 @@ def code_digest() -> str:
 def _version(package: str) -> str:
     try:
         return version(package)
-    except PackageNotFoundError:  # run from a source tree that is not installed
+    except PackageNotFoundError:  # run from a source tree without installation
         return UNKNOWN
 
 
 def processor_name() -> str:
-    """What this machine calls its processor."""
+    """The name of this machine's processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""The requirements on this reproduction next to what this run measured; nothing is judged by hand."""
+"""The requirements on this reproduction next to the figures measured in this run, judged automatically."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from morphdata.lattice import CoreLaw
 
 Document = dict[str, Any]
 
-THEIR_CORE: CoreLaw = "smoothed"  # of the independent program, as far as its trim tells (DECISIONS 9)
-MRAD = 1e3  # of a radian
-PERCENT = 100.0  # of a share
+THEIR_CORE: CoreLaw = "smoothed"  # of the independent program, as far as its trim shows (DECISIONS 9)
+MRAD = 1e3  # in a radian
+PERCENT = 100.0  # in a share of one
 
 # limits, in the units of the table
 ELEMENTS_MRAD, STEP_MRAD = 1.0, 0.1
@@ -22,16 +22,16 @@ TIP_PERCENT, PITCH_RMS_MRAD, ANGLE_PERCENT = 5.0, 3.0, 5.0
 HELD_OUT_RATIO = 5e-4
 FLIGHT_PERCENT, BATCH_PERCENT = 0.5, 0.1
 FLEXIBLE_FLIGHT_S = 20.0
-BACKWARD_RAD_S = 1e-12  # round-off of a spline's rate at rest
+BACKWARD_RAD_S = 1e-12  # round-off in the rate of a spline at rest
 REDUCTION_PERCENT, SEARCH_S = 20.0, 60.0
 FULL_RUN_S, QUICK_RUN_S = 3600.0, 300.0
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """One figure: what it is, its limit, what was measured (None: nothing), in ``unit``.
+    """One figure: its description, its limit and the measured value (None: not measured), in ``unit``.
 
-    at_least : the limit is a least value, not a largest one.
+    at_least : the limit is a minimum instead of a maximum.
     """
 
     what: str
@@ -42,7 +42,7 @@ class Requirement:
 
     @property
     def met(self) -> bool | None:
-        """Whether the limit is kept; None where nothing was measured."""
+        """Whether the limit is met; None if nothing was measured."""
         if self.value is None:
             return None
         return self.value >= self.limit if self.at_least else self.value <= self.limit
@@ -53,7 +53,7 @@ class Requirement:
 
 
 def judged_requirements(results: Results, *, total_s: float, quick: bool) -> list[Requirement]:
-    """Every requirement whose stage is at hand, with its measured value.
+    """Every requirement whose stage is available, with its measured value.
 
     Parameters
     ----------
@@ -70,23 +70,23 @@ def judged_requirements(results: Results, *, total_s: float, quick: bool) -> lis
 
 
 def held_out_ratios(identification: Document) -> dict[str, float | None]:
-    """J of the identified model over J of the rigid one for each flight held out."""
+    """J of the identified model over J of the rigid one for each held-out flight."""
     return {fit["sample"]: ratio(fit) for fit in identification["fit"] if fit["role"] == "held_out"}
 
 
 def ratio(fit: Document) -> float | None:
-    """J of the identified model over that of the rigid one; None where either diverged."""
+    """J of the identified model over that of the rigid one; None if either diverged."""
     identified, rigid = fit["J_identified"], fit["J_rigid"]
     return None if identified is None or not rigid else float(identified / rigid)
 
 
 def flight_share(row: Document, model: str, part: str = "fly_s") -> float:
-    """A model's time for a part of a flight over the flexible model's."""
+    """Ratio of a model's time for a part of a flight to the flexible model's."""
     return float(row["models"][model][part] / row["models"]["flexible"][part])
 
 
 def batch_share(computation: Document) -> float:
-    """One flight in a batch, preparation and all, over one flexible flight of the same two seconds."""
+    """Time of one flight in a batch, with preparation, over that of the same flexible flight."""
     flexible = computation["flights"][0]["models"]["flexible"]
     return float(computation["batch"]["flight_s"] / flexible["total_s"])
 

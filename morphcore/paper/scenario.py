@@ -23,20 +23,20 @@ TITLE = (
     "particle swarm"
 )
 
-# headlines that the paper's text prints, per cent
-PAPER_COMPUTATION = 10.0  # of the flexible model's, that an equivalent flight takes
-PAPER_OPTIMUM = -4.23  # attitude variation of the optimised morph against constant rate
-PAPER_RIGID_OPTIMUM = 4.12  # of the morph optimised with the rigid model
+# headline figures printed in the paper's text, per cent
+PAPER_COMPUTATION = 10.0  # time of an equivalent flight relative to the flexible model's
+PAPER_OPTIMUM = -4.23  # attitude variation of the optimised morph relative to constant rate
+PAPER_RIGID_OPTIMUM = 4.12  # the same for the morph optimised with the rigid model
 
-LINKS = 3  # a wing, of the equivalent model whose flights are shown
+LINKS = 3  # per wing, of the equivalent model whose flights are shown
 
-# how each sample flight begins and ends: held, and rates ramped, as the independent program's flights
+# each sample flight begins and ends held, with ramped rates, like the independent program's flights
 HELD_BEFORE_S = 0.2
 HELD_AFTER_S = 0.3
 RAMP_S = 0.1
 FINAL_RAD = 1.0
 
-# the morph that is optimised
+# the optimised morph
 MORPH_S = 2.0
 SETTLE_S = 2.0
 RATE_LIMIT_RAD_S = 1.0
@@ -96,7 +96,7 @@ class PaperFlight:
     duration_s: float
 
     def schedules(self) -> Schedules:
-        """What both hinges do."""
+        """The schedules of both hinges."""
         return Schedules.parse({"both": self.schedule})
 
 
@@ -111,7 +111,7 @@ def flight() -> Flight:
 
 
 def paper_flights() -> tuple[PaperFlight, ...]:
-    """Three flights to identify on, then three to check with: between, beyond, and of another shape."""
+    """Three flights for identification, then three for checks: between, beyond, and of another shape."""
     fitted = [_constant_rate(rate, "train") for rate in (0.2, 0.5, 0.8)]
     checks = [_constant_rate(rate, "held_out") for rate in (0.4, 1.0)]
     quadratic = {"kind": "quadratic", "duration_s": MORPH_S}
@@ -119,7 +119,7 @@ def paper_flights() -> tuple[PaperFlight, ...]:
 
 
 def two_second_flight() -> PaperFlight:
-    """The flight whose computation is compared: 1 rad in 2 s and nothing else."""
+    """The flight whose computing times are compared: 1 rad in 2 s and nothing else."""
     schedule = {"kind": "constant_rate", "final_rad": FINAL_RAD, "duration_s": MORPH_S, "ramp_s": RAMP_S}
     return PaperFlight("two_seconds", "1 rad in 2 s", "held_out", schedule, MORPH_S)
 
@@ -130,6 +130,6 @@ def _constant_rate(rate_rad_s: float, role: Role) -> PaperFlight:
 
 
 def _held(name: str, label: str, role: Role, morph: Document) -> PaperFlight:
-    """A flight that holds its shape before and after its morph."""
+    """A flight with constant shape before and after its morph."""
     schedule = {"final_rad": FINAL_RAD, "start_s": HELD_BEFORE_S, **morph}
     return PaperFlight(name, label, role, schedule, HELD_BEFORE_S + morph["duration_s"] + HELD_AFTER_S)

@@ -1,4 +1,4 @@
-"""How much work the paper's tables and figures get: all of it, or enough to see that everything runs."""
+"""Amount of work for the paper's tables and figures: all of it, or just enough to exercise everything."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from morphdata.simulate import DEFAULT_ELEMENTS
 class Effort:
     """Sizes of the stages.
 
-    flexible_step_s : of the flights that are not timed. links : numbers of links a wing of the study.
-    iterations : of our search, at most. swarm_particles, swarm_generations : of the paper's search.
-    timing_rounds : repetitions of every timed flight. all_flights_timed : not only that of two seconds.
-    batch : parameter sets that fly together. finer_lattice : whether the truth's convergence in the lattice
+    flexible_step_s : step of the flights that are not timed. links : numbers of links per wing of the study.
+    iterations : of our search, maximum. swarm_particles, swarm_generations : of the paper's search.
+    timing_rounds : repetitions of every timed flight. all_flights_timed : whether to time all flights, not
+    only that of two seconds.
+    batch : parameter sets flown together. finer_lattice : whether the truth's convergence in the lattice
     is shown. schedule_generations : of the paper's swarm of schedules. front_durations_s : of morphs on the
     Pareto front. free_values : whether the angles at the knots are free too.
     """
@@ -70,7 +71,7 @@ QUICK = Effort(
 
 @dataclass(frozen=True)
 class PaperSettings:
-    """What the user chooses.
+    """The user's choices.
 
     samples : folder with an independent program's flights (aircraft.json, flight.json, train_*.csv), or None.
     """
@@ -102,7 +103,7 @@ class PaperSettings:
 
     @property
     def swarm_search(self) -> SearchSettings:
-        """The paper's search, as many generations as there is time for."""
+        """The paper's search, with as many generations as time allows."""
         effort = self.effort
         swarm = SwarmSettings(particles=effort.swarm_particles, generations=effort.swarm_generations)
         return SearchSettings(method="pso", seed=self.seed, swarm=swarm)

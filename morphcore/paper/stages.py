@@ -1,8 +1,8 @@
-"""Long work in stages whose results are files: what is there already is not done again.
+"""Long work in stages whose results are files: finished stages are not run again.
 
-A stage is known by a key of everything that decides its result: its own inputs, and the keys of the stages
-that it needs. Its result stays as long as the key does; when the inputs change it is made anew, and so is
-whatever needs it. A stage that is interrupted goes on from its last checkpoint.
+The key of a stage covers everything that determines its result: its own inputs, and the keys of the stages
+that it needs. Its result is kept as long as the key is unchanged; when inputs change, the stage and
+everything that depends on it run again. An interrupted stage continues from its last checkpoint.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ Document = dict[str, Any]
 Results = Mapping[str, Document]
 Clock = Callable[[], float]
 
-FORMAT = 1  # of the files; others are made anew
+FORMAT = 1  # version of the files; other versions are recomputed
 CHECKPOINT_EVERY_S = 2.0
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a stage has come.
+    """Progress of a stage.
 
-    fraction : 0..1. checkpoint : from where it can go on; None leaves the last one as it is.
+    fraction : 0..1. checkpoint : state from which it can continue; None keeps the previous one.
     """
 
     fraction: float
@@ -42,7 +42,7 @@ Work = Generator[Progress, None, Document]
 
 
 def part(work: Work, done: float, share: float) -> Work:
-    """Work as a part of another: its fractions from ``done`` over ``share``, its checkpoints its own."""
+    """Work as a part of another: fractions run from ``done`` over ``share``; checkpoints pass unchanged."""
     while True:
         try:
             progress = next(work)
@@ -58,11 +58,11 @@ class Stage:
 
     Attributes
     ----------
-    name : also of its file. title : for people.
-    inputs : JSON-able; with the results of the stages ``needs`` it decides the result.
-    run : does the work, given the results needed and a checkpoint of its own (or None); reports progress and
-        returns a JSON-able result, never None.
-    expected_s : how long it takes about, for the progress that is shown.
+    name : also the name of its file. title : for display.
+    inputs : JSON-able; with the results of the stages in ``needs``, these determine the result.
+    run : does the work, given the needed results and its own checkpoint (or None); reports progress and
+    returns a JSON-able result, never None.
+    expected_s : approximate duration, for the displayed progress.
     """
 
     name: str
@@ -75,10 +75,10 @@ class Stage:
 
 @dataclass(frozen=True)
 class Finished:
-    """A stage's result and how it came about.
+    """A stage's result and its origin.
 
-    wall_s : time spent on it, in all runs that it took. finished_at : UTC. where : the machine, as the runner
-    got it. reused : whether it was there already.
+    wall_s : time spent on it, over all runs. finished_at : UTC. where : the machine, as passed to the runner.
+    reused : whether it already existed.
     """
 
     key: str
@@ -90,13 +90,13 @@ class Finished:
 
 
 class StageRunner:
-    """Works stages off in their order.
+    """Runs stages in order.
 
     Parameters
     ----------
     stages : each needs only earlier ones.
-    folder : of the results; it is made if need be.
-    where : kept with each result: the machine that it was made on. It is not part of the key.
+    folder : of the results; created if necessary.
+    where : stored with each result: the machine that produced it. It is not part of the key.
 
     Raises
     ------
@@ -130,9 +130,9 @@ class StageRunner:
         return self._keys[name]
 
     def steps(self) -> Generator[tuple[Stage, Progress]]:
-        """Do what is not done yet; yields the stage at work, and the progress of all by their expected times.
+        """Run the unfinished stages; yield the current stage, and the overall progress by expected times.
 
-        A step that is interrupted leaves its last checkpoint behind.
+        An interrupted stage keeps its last checkpoint.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         total = sum(stage.expected_s for stage in self.stages)
@@ -206,7 +206,7 @@ class StageRunner:
             stored = json.loads(self._file(stage).read_text(encoding="utf-8")) | {"reused": True}
             known = Finished(**{each.name: stored[each.name] for each in fields(Finished)})
         except (OSError, ValueError, KeyError, TypeError):
-            return None  # not there, or damaged: made anew
+            return None  # missing or damaged: computed again
         return known if known.key == self.key(stage.name) else None
 
 
@@ -218,7 +218,7 @@ class _Checkpoint:
     key: str
 
     def read(self) -> tuple[bytes | None, float]:
-        """The state and the seconds spent on it; (None, 0) where there is none for this key."""
+        """The state and the seconds spent on it; (None, 0) if there is none for this key."""
         try:
             key, spent, state = self.path.read_bytes().split(b"\n", 2)
             spent_s = float(spent)
@@ -227,12 +227,12 @@ class _Checkpoint:
         return (state, spent_s) if key.decode("ascii", "replace") == self.key else (None, 0.0)
 
     def write(self, state: bytes, spent_s: float) -> None:
-        """Keep a state."""
+        """Store a state."""
         _replace(self.path, b"%s\n%r\n%s" % (self.key.encode(), spent_s, state))
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write a file so that a killed process leaves the old one or the new one, never half of one."""
+    """Replace a file atomically: a killed process leaves either the old or the new one."""
     partial = path.with_suffix(path.suffix + ".part")
     partial.write_bytes(content)
     partial.replace(path)

@@ -1,4 +1,4 @@
-"""The stage "truth": six flights of the flexible model, and how far they are converged."""
+"""The stage "truth": six flights of the flexible model, and their convergence."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CONVERGENCE_FLIGHT = "rate_0.5"
 
 @dataclass(frozen=True)
 class Resolution:
-    """How finely the flexible model is flown."""
+    """Resolution of a flight of the flexible model."""
 
     what: str
     elements: int
@@ -39,7 +39,7 @@ class Resolution:
 
 
 def resolutions(settings: PaperSettings) -> tuple[Resolution, ...]:
-    """That of the truth, then finer ones, one thing finer at a time."""
+    """The resolution of the truth, then finer ones, each refined in one respect."""
     used = Resolution("as flown", settings.elements, settings.effort.flexible_step_s, settings.lattice)
     finer = [
         replace(used, what="elements doubled", elements=2 * used.elements),
@@ -48,12 +48,12 @@ def resolutions(settings: PaperSettings) -> tuple[Resolution, ...]:
     if settings.effort.finer_lattice:
         coarse = used.lattice
         lattice = Lattice(chordwise=2 * coarse.chordwise, spanwise=2 * coarse.spanwise, core=coarse.core)
-        finer.append(replace(used, what="lattice doubled both ways", lattice=lattice))
+        finer.append(replace(used, what="lattice doubled in both directions", lattice=lattice))
     return (used, *finer)
 
 
 def fly_truth(settings: PaperSettings, _results: Results, _checkpoint: bytes | None) -> Work:
-    """Fly all six, then one of them at finer resolutions."""
+    """Fly all six flights, then one of them at finer resolutions."""
     used, *finer = resolutions(settings)
     flights = paper_flights()
     total = sum(each.duration_s for each in flights) + 3.0 * len(finer)
@@ -85,7 +85,7 @@ def fly_truth(settings: PaperSettings, _results: Results, _checkpoint: bytes | N
 def flown_flexible(
     each: PaperFlight, resolution: Resolution, done: float, share: float
 ) -> Generator[Progress, None, Simulation]:
-    """One flight of the flexible model; reports progress from ``done`` over ``share`` of the stage."""
+    """Fly one flight of the flexible model; report progress from ``done`` over ``share`` of the stage."""
     for step in flight_steps(
         aircraft(), flight(), each.schedules(), model="flexible", duration_s=each.duration_s,
         step_s=resolution.step_s, lattice=resolution.lattice, elements=resolution.elements,
@@ -97,7 +97,7 @@ def flown_flexible(
 
 
 def samples_of(truth: Document) -> list[Trajectory]:
-    """The flights of the truth as samples, with their roles."""
+    """The truth's flights as samples, with their roles."""
     return [
         Trajectory.of(InlineSample.parse(flown["sample"], f"/flights/{i}/sample"))
         for i, flown in enumerate(truth["flights"])

@@ -1,4 +1,4 @@
-"""The state of long work as bytes: plain values, all exactly as they were."""
+"""Serialises the state of long work: plain values, restored exactly."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from morphcore.errors import MorphError
 
 Value = TypeVar("Value")
 
-# keys that stand in the JSON for what JSON has not
+# keys that mark values that JSON cannot express
 ARRAY, BYTES, TUPLE, TYPE = "$array", "$bytes", "$tuple", "$type"
 
 _types: dict[str, type] = {}
 
 
 def stored(cls: type[Value]) -> type[Value]:
-    """Let values of a dataclass be part of a checkpoint. Its name, part of the format, is unique."""
+    """Allow values of a dataclass in checkpoints. Its name is part of the format and must be unique."""
     known = _types.setdefault(cls.__name__, cls)
     if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-        raise TypeError(f"{known.__module__} stores values of the name {cls.__name__}, too")
+        raise TypeError(f"{known.__module__} already stores values under the name {cls.__name__}")
     _types[cls.__name__] = cls
     return cls
 
@@ -41,9 +41,9 @@ def pack(value: Any, version: str) -> bytes:
 
     Parameters
     ----------
-    value : dataclasses marked `stored`, dictionaries, lists, tuples, numbers, texts, bytes, None and arrays.
+    value : dataclasses marked `stored`, dictionaries, lists, tuples, numbers, strings, bytes, None, arrays.
     version : str
-        names what the value means; only the same version is read back.
+        Identifies the format of the value; only the same version is read back.
     """
     arrays: list[NDArray[Any]] = []
     header = json.dumps({"version": version, "value": _plain(value, arrays)})
@@ -58,7 +58,7 @@ def unpack(checkpoint: bytes, version: str, expected: type[Value]) -> Value:
 
     Raises
     ------
-    UnreadableCheckpoint : the bytes are damaged, of another version, or no such value.
+    UnreadableCheckpoint : the bytes are damaged, of another version, or of another type.
     """
     try:
         with np.load(io.BytesIO(checkpoint), allow_pickle=False) as content:
@@ -66,7 +66,7 @@ def unpack(checkpoint: bytes, version: str, expected: type[Value]) -> Value:
         header = json.loads(arrays.pop("header").tobytes())
         if header["version"] != version:
             raise UnreadableCheckpoint(
-                f"the checkpoint is of {header['version']!r}, not {version!r}", hint="start again"
+                f"the checkpoint has version {header['version']!r}, not {version!r}", hint="start again"
             )
         value = _filled(header["value"], arrays)
     except (ValueError, KeyError, TypeError, AttributeError, OSError, EOFError, zipfile.BadZipFile) as error:

@@ -1,9 +1,9 @@
 """Covariance matrix adaptation (CMA-ES, Hansen & Ostermeier 2001) by the package cma, resumable to the bit.
 
 The strategy's own state is spread over many objects. Ours is what it received: the costs of all generations.
-Given the same again it goes through the same states, which takes about a millisecond a generation
-and no flights. Its normal numbers come from a generator of its own, and numpy's global one is put back after
-each call.
+Given the same costs again it passes through the same states, which takes about a millisecond per generation
+and no flights. Its normal deviates come from a generator of its own, and numpy's global generator is restored
+after each call.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ FIRST_SPREAD = 0.1  # standard deviation of the first generation, in the unit cu
 
 @cache
 def strategies() -> Any:
-    """Import the package, for the first strategy only, since it brings matplotlib along."""
+    """Import the package only when the first strategy is made, since it imports matplotlib."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it warns of packages for plots that it misses
+        warnings.simplefilter("ignore")  # it warns about missing plotting packages
         import cma
     return cma
 
 
 @dataclass(frozen=True)
 class EvolutionSettings(WholeNumbers):
-    """``particles`` models a generation; the search ends before ``generations`` where it has converged."""
+    """``particles`` models per generation; the search ends before ``generations`` if it has converged."""
 
     particles: int = 32
     generations: int = 200
@@ -63,7 +63,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
 
     Parameters
     ----------
-    problem : gives the box.
+    problem : provides the box.
     settings : EvolutionSettings
     seed : int
     """
@@ -73,17 +73,17 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
     def __init__(self, problem: Problem[Any], settings: EvolutionSettings, seed: int) -> None:
         self._box = problem.box
         self._settings, self._seed = settings, seed
-        # the package's strategy as it was last used: what it received, and the generation that it asks for
+        # the package's strategy as last used: the costs it received, and the generation it proposes
         self._strategy: Any = None
         self._seen = EvolutionState(np.empty(0), np.empty((0, 0)))
         self._candidates: Array | None = None
 
     def init(self, known: Outcome) -> EvolutionState:
-        """Begin around the first point."""
+        """Start around the first point."""
         return EvolutionState(self._box.to_unit(known.points[0]), np.empty((0, self._settings.particles)))
 
     def ask(self, state: EvolutionState) -> Batch:
-        """Return the generation that follows a state."""
+        """Return the next generation."""
         self._go_to(state)
         if self._candidates is None:
             with _own_numbers():
@@ -95,7 +95,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
         return replace(state, costs=np.concatenate([state.costs, outcome.cost[None]]))
 
     def done(self, state: EvolutionState) -> bool:
-        """Return whether all generations have been flown, or the strategy sees no use in going on."""
+        """Return whether all generations have been flown, or the strategy has stopped by its own criteria."""
         if state.generation >= self._settings.generations:
             return True
         self._go_to(state)
@@ -111,7 +111,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
         return {"mean_cost": float(outcome.cost.mean())}
 
     def _go_to(self, state: EvolutionState) -> None:
-        """Give the strategy the costs that it has not received yet; begin again where it received others."""
+        """Pass the strategy the costs that it has not received yet; restart it if it received others."""
         known = self._seen.generation
         if (
             self._strategy is None
@@ -136,7 +136,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
             "popsize": self._settings.particles,
             "randn": lambda *shape: numbers.standard_normal(shape),
             "seed": np.nan,  # the package must not seed numpy's global generator
-            "tolfun": 1e-12,  # rad^2: costs differ by less only for the arithmetic
+            "tolfun": 1e-12,  # rad^2: smaller differences of cost are round-off
             "verbose": -9,
             "verb_log": 0,  # no files
             "signals_filename": None,  # and none read
@@ -147,7 +147,7 @@ class EvolutionStrategy(Solver[EvolutionState, Outcome]):
 
 @contextmanager
 def _own_numbers() -> Iterator[None]:
-    """Numpy's global generator is in a known state inside and unchanged outside; no warnings come out."""
+    """Put numpy's global generator into a known state inside, restore it after, and suppress warnings."""
     others = np.random.get_state(legacy=True)  # noqa: NPY002 - parts of the package know no other
     np.random.seed(0)  # noqa: NPY002
     try:

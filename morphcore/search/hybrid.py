@@ -1,33 +1,33 @@
-"""A descent from what is known and, where that ends in a poor fit, another one from screened candidates."""
+"""A descent from the known points and, if that ends in a poor fit, another one from screened candidates."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
 from morphcore.search.least_squares import LeastSquares, LeastSquaresState
-from morphcore.search.solver import Batch, Box, Outcome, Problem, Solver
+from morphcore.search.solver import Batch, Outcome, Solver
 
 Array = NDArray[np.float64]
 
-SCREENING = "screen"  # as the history of a result calls the candidate screening
+SCREENING = "screen"  # name of the candidate screening in the history of a result
 
 
 @stored
 @dataclass(frozen=True)
 class HybridState:
-    """Which descent runs, or the screening between them.
+    """The current descent, or the candidate screening between the two.
 
     Attributes
     ----------
     stage : what comes next.
     centre : (d,) the best guess, around which candidates are drawn.
-    descent : the state of the descent that runs, or that ended before the screening.
-    best_cost : of all points so far.
+    descent : the state of the current descent, or of the one that ended before the screening.
+    best_cost : lowest cost of all points so far.
     """
 
     stage: Literal["first", "screening", "second"]
@@ -37,24 +37,22 @@ class HybridState:
 
 
 class Hybrid(Solver[HybridState, Outcome]):
-    """Descents, with a screening of candidates between them where the first leaves more than ``good_cost``.
+    """Descents, with a screening of candidates in between if the first ends above ``good_cost``.
 
     Parameters
     ----------
-    problem : gives the box.
     descent : LeastSquares
     candidates : int
-        flown around the best guess, to choose ``starts`` of the second descent.
+        Number flown around the best guess, from which ``starts`` of the second descent are chosen.
     spread : float
-        standard deviation of the candidates, in search coordinates.
+        Standard deviation of the candidates, in search coordinates.
     good_cost : float
-        the first descent may have ended in a wrong valley where its cost is higher.
+        A higher cost suggests that the first descent ended in a wrong valley.
     seed : int
     """
 
     def __init__(
         self,
-        problem: Problem[Any],
         descent: LeastSquares,
         *,
         candidates: int,
@@ -68,24 +66,22 @@ class Hybrid(Solver[HybridState, Outcome]):
         self._good_cost, self._seed = good_cost, seed
 
     def init(self, known: Outcome) -> HybridState:
-        """Begin with the descent from what is known."""
+        """Start with the descent from the known points."""
         return HybridState("first", known.points[0], self._descent.init(known), float(known.cost.min()))
 
     def ask(self, state: HybridState) -> Batch:
-        """Return the descent's batch, or the candidates."""
+        """Return the batch of the descent, or the candidates."""
         if state.stage != "screening":
             return self._descent.ask(state.descent)
         drawn = self._spread * even_normals(self._candidates, state.centre.size, self._seed)
         return Batch(np.clip(state.centre + drawn, state.descent.lower, state.descent.upper))
 
     def tell(self, state: HybridState, outcome: Outcome) -> HybridState:
-        """Go on with the descent; begin the second one from the best candidates."""
+        """Continue the descent, or start the second one from the best candidates."""
         if state.stage == "screening":
             chosen = np.argsort(outcome.cost, kind="stable")[: self._starts]
             starts = Outcome(outcome.points[chosen], outcome.cost[chosen])
-            begun = self._descent.init(starts)
-            box = {"lower": state.descent.lower, "upper": state.descent.upper}
-            return replace(state, stage="second", descent=replace(begun, **box))
+            return replace(state, stage="second", descent=self._descent.init(starts, state.descent.box))
         descent = self._descent.tell(state.descent, outcome)
         best = min(state.best_cost, self._descent.best(descent, outcome)[1])
         poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost
@@ -103,14 +99,6 @@ class Hybrid(Solver[HybridState, Outcome]):
         """Return what the first descent says; the second has to find something better."""
         return state.stage == "first" and self._descent.replaces(state.descent)
 
-    def box(self, state: HybridState) -> Box:
-        """Return the descent's box."""
-        return self._descent.box(state.descent)
-
-    def weight(self, state: HybridState) -> Array:
-        """Return the weights (d,) of the prior in the descent."""
-        return self._descent.weight(state.descent)
-
     def between_steps(self, state: HybridState) -> bool:
         """Return whether an iteration of the descent, or the screening, has ended."""
         return self._descent.between_steps(state.descent)
@@ -126,8 +114,10 @@ class Hybrid(Solver[HybridState, Outcome]):
 
 
 def even_normals(count: int, d: int, seed: int) -> Array:
-    """Return normal numbers (count, d), more even than independent draws: a scrambled Sobol sequence."""
-    from scipy.stats import qmc  # as large as half of the library, and many searches need no screening
+    """Return normal deviates (count, d) from a scrambled Sobol sequence, more even than independent draws."""
+    from scipy.stats import (
+        qmc,
+    )  # half the size of the library, and many searches need no screening
 
     draws = qmc.MultivariateNormalQMC(np.zeros(d), rng=np.random.default_rng(seed))
     return np.asarray(draws.random(1 << max(count - 1, 0).bit_length())[:count])

@@ -2,11 +2,11 @@
 
 Levenberg (1944), Marquardt (1963): J(x) is lowered by the step s that minimises |r + D s|^2 + mu |s|^2. Few
 directions of such a problem are stiff and many are loose ("sloppy": Transtrum, Machta & Sethna 2011), and its
-valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: by
-what its residuals differ from the linear forecast, c = r(x + s) - r - D s, the same least-squares problem is
-amended, solved and flown again. The first correction is the geodesic acceleration of Transtrum & Sethna
-(2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the multi-step method of
-Fan (2012) does. A correction costs one flight, a Jacobian d.
+valley bends: a step along a loose direction runs up the walls. So each trial step is flown and corrected: the
+difference of its residuals from the linear forecast, c = r(x + s) - r - D s, is added to the same
+least-squares problem, which is solved and flown again. The first correction is the geodesic acceleration of
+Transtrum & Sethna (2012), the curvature taken from the flight itself; more of them reuse a Jacobian as the
+multi-step method of Fan (2012) does. A correction costs one flight, a Jacobian d.
 
 The damping is Levenberg's (equal in all coordinates, which are of order one), not Marquardt's: scaled by the
 Jacobian's columns it would let a coordinate that the samples hardly see run far off. Several damping values
@@ -33,16 +33,16 @@ from morphcore.search.solver import Batch, Box, Outcome, Problem, Solver
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
 
-# forward-difference step in coordinates of order one: residuals are good to 1e-12, and a slope is off by half
-# a step times their second derivative
+# forward-difference step in coordinates of order one: residuals are accurate to 1e-12, and the error of a
+# slope is half a step times the second derivative
 PROBE = 1e-5
-DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # times the present one
-CORRECTIONS = 2  # of each trial step, by what its flight differs from the forecast
-FIRST_DAMPING = 1e-3  # in units of the sum of the squares of the Jacobian
+DAMPING_TRIALS = tuple(float(factor) for factor in 10.0 ** np.linspace(-2.0, 2.0, 8))  # of the present one
+CORRECTIONS = 2  # corrections of each trial step by the difference of its flight from the forecast
+FIRST_DAMPING = 1e-3  # in units of the sum of squares of the Jacobian
 MIN_DAMPING, MAX_DAMPING = 1e-14, 1e6
-STALLED = 0.01  # relative decrease of the cost that counts as none: past it, only unseen directions drift
+STALLED = 0.01  # a smaller relative decrease counts as none: only undetermined directions still drift
 PATIENCE = 3  # iterations without decrease before a start has converged
-EXACT_RMS = 1e-8  # residuals below it are those of the arithmetic: nothing is left to fit
+EXACT_RMS = 1e-8  # smaller residuals are round-off: nothing is left to fit
 # hopeless starts are dropped as the descent goes on: iteration -> starts kept (as a share of the first field)
 NARROWING = ((3, 1.0), (6, 0.5))
 # of the box's width, by which a bound moves outward when a start is pushed against it
@@ -105,11 +105,11 @@ class TrialSteps:
 
     Attributes
     ----------
-    starts : (s,) which starts move.
+    starts : (s,) indices of the starts that move.
     error, jacobian : (s, m) and (s, m, d) residuals at the starts, and their derivatives.
     dampings : (s, t)
-    tried : (s, t, d) the points that come next.
-    correction : number of corrections that have been made.
+    tried : (s, t, d) the points to be flown next.
+    correction : number of corrections made.
     best, cost, winner : (s, d), (s,), (s,) the best trial so far, and the damping that led to it.
     """
 
@@ -150,17 +150,27 @@ class LeastSquaresState:
     trials: TrialSteps | None = field(default=None, repr=False)
 
     @property
+    def box(self) -> Box:
+        """The box with its bounds as they were widened."""
+        return Box(self.lower, self.upper)
+
+    @property
+    def best_weight(self) -> Array:
+        """(d,) weights of the prior at the best start."""
+        return np.asarray(self.weight[int(np.argmin(self.cost))])
+
+    @property
     def active(self) -> NDArray[np.bool_]:
         """(s,) starts that still move."""
         return self.stalled < PATIENCE
 
 
 class LeastSquares(Solver[LeastSquaresState, Outcome]):
-    """Descents from all points that are known.
+    """Descents from all known points.
 
     Parameters
     ----------
-    problem : gives the box.
+    problem : provides the box.
     iterations : int
         at most.
     prior : Prior, optional
@@ -169,7 +179,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         How far the box may be widened; None: not at all.
     """
 
-    name = "polish"  # as the history of a result calls it
+    name = "polish"  # its name in the history of a result
 
     def __init__(
         self, problem: Problem[Any], iterations: int, prior: Prior | None = None, limits: Box | None = None
@@ -180,8 +190,12 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         nothing = np.zeros_like(self._box.lower)
         self._prior = FixedPrior(nothing, nothing) if prior is None else prior
 
-    def init(self, known: Outcome) -> LeastSquaresState:
-        """Start at every point."""
+    def init(self, known: Outcome, box: Box | None = None) -> LeastSquaresState:
+        """Start at every point.
+
+        ``box`` : whose bounds were widened before; None for the problem's.
+        """
+        box = self._box if box is None else box
         count = known.points.shape[0]
         weight = np.tile(self._prior.first, (count, 1))
         return LeastSquaresState(
@@ -190,21 +204,21 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
             np.full(count, FIRST_DAMPING),
             np.zeros(count, dtype=np.int64),
             weight,
-            np.minimum(self._box.lower, known.points.min(axis=0)),
-            np.maximum(self._box.upper, known.points.max(axis=0)),
+            np.minimum(box.lower, known.points.min(axis=0)),
+            np.maximum(box.upper, known.points.max(axis=0)),
         )
 
     def ask(self, state: LeastSquaresState) -> Batch:
         """Return the starts and their probes, then three rounds of trial steps."""
         if state.trials is None:
-            probed, _ = _probes(state.point[_moving(state)], state.upper)
+            probed, _ = probes(state.point[_moving(state)], state.upper)
             return Batch(probed, residuals=True)
         return Batch(state.trials.tried.reshape(-1, state.lower.size), residuals=True)
 
     def tell(self, state: LeastSquaresState, outcome: Outcome) -> LeastSquaresState:
         """Take the first trial steps, correct them, or accept the best of them."""
         if outcome.residuals is None:
-            raise TypeError("the batch asked for residuals")
+            raise TypeError("the batch requested residuals")
         if state.trials is None:
             return self._begun(state, outcome.residuals)
         trials = self._judged(state, state.trials, outcome)
@@ -213,13 +227,13 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         return self._widened(state, _accepted(state, trials))
 
     def done(self, state: LeastSquaresState) -> bool:
-        """Return whether none of the starts in the field moves any more, or the iterations are used up."""
+        """Return True when no remaining start moves any more or the iterations are used up."""
         if state.trials is not None:
             return False
         return state.iteration >= self._iterations or _moving(state).size == 0
 
     def best(self, state: LeastSquaresState, outcome: Outcome) -> tuple[Array, float]:
-        """Return the best start after an iteration, its cost without the prior."""
+        """Return the best start after an iteration, with its cost without the prior."""
         if state.trials is None and state.iteration == 0:
             return super().best(state, outcome)
         leader = int(np.argmin(state.cost))
@@ -229,23 +243,15 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         return point, float(state.cost[leader] - self._prior_cost(point, state.weight[leader]))
 
     def replaces(self, state: LeastSquaresState) -> bool:
-        """Return whether an iteration has ended: where the weights rise, the cost without the prior may, too."""
+        """Return whether an iteration has ended: where the weights rise, so may the cost without them."""
         return state.trials is None and state.iteration > 0
-
-    def box(self, state: LeastSquaresState) -> Box:
-        """Return the box with its bounds as they were widened."""
-        return Box(state.lower, state.upper)
-
-    def weight(self, state: LeastSquaresState) -> Array:
-        """Return the weights (d,) of the prior at the best start."""
-        return np.asarray(state.weight[int(np.argmin(state.cost))])
 
     def between_steps(self, state: LeastSquaresState) -> bool:
         """Return whether an iteration has ended."""
         return state.trials is None
 
     def share(self, state: LeastSquaresState) -> float:
-        """Return the share of the iterations that have been made."""
+        """Return the completed share of the iterations."""
         return state.iteration / self._iterations
 
     def _prior_cost(self, points: Array, weight: Array) -> Array:
@@ -260,7 +266,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         """Choose the prior's weights at the starts, and damped steps from there and their probes."""
         starts = _moving(state)
         points = state.point[starts]
-        error, jacobian = _differences(residuals, _probes(points, state.upper)[1])
+        error, jacobian = _differences(residuals, probes(points, state.upper)[1])
         weight = state.weight.copy()
         for k, start in enumerate(starts):
             if state.stalled[start]:
@@ -316,10 +322,10 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
     ) -> Array:
         """Return where steps of all dampings (s, t) lead from points (s, d), (s, t, d).
 
-        ``assumed`` : (s, t, m) residuals that the linear model has where no step is made.
+        ``assumed`` : (s, t, m) residuals of the linear model at zero step.
         """
         squares = jacobian.transpose(0, 2, 1) @ jacobian
-        # the floor is for samples that see nothing at all
+        # the floor covers samples that determine nothing at all
         scale = np.maximum(np.trace(squares, axis1=1, axis2=2), np.finfo(float).tiny / MIN_DAMPING)
         gradients = assumed @ jacobian
         return np.array(
@@ -346,7 +352,9 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         if not (held["lower"].any() or held["upper"].any()):
             return after
         reach = WIDENING * (self._box.upper - self._box.lower)
-        at_one = ((before.point == before.lower) & held["lower"]) | ((before.point == before.upper) & held["upper"])
+        at_one = ((before.point == before.lower) & held["lower"]) | (
+            (before.point == before.upper) & held["upper"]
+        )
         return replace(
             after,
             lower=np.where(held["lower"], np.maximum(before.lower - reach, self._limits.lower), before.lower),
@@ -356,7 +364,7 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
 
 
 def _moving(state: LeastSquaresState) -> NDArray[np.int64]:
-    """Return the starts (s,) in the field that still move, the best first."""
+    """Return the remaining starts (s,) that still move, best first."""
     share = next((share for limit, share in NARROWING if state.iteration < limit), 0.0)
     keep = max(1, round(share * state.cost.size))
     order = np.argsort(state.cost, kind="stable")[:keep]
@@ -364,7 +372,7 @@ def _moving(state: LeastSquaresState) -> NDArray[np.int64]:
 
 
 def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState:
-    """Return the state after an iteration: each start at its best trial where that is better."""
+    """Return the state after an iteration; each start moves to its best trial if that is an improvement."""
     chosen, dampings = trials.starts, trials.dampings
     before = np.einsum("sm,sm->s", trials.error, trials.error)
     improved = trials.cost < before
@@ -390,11 +398,11 @@ def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState
 
 def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:
     """Return residuals (s, m) and forward-difference Jacobians (s, m, d) at points (s, d), in one batch."""
-    probed, steps = _probes(points, upper)
+    probed, steps = probes(points, upper)
     return _differences(residuals(probed), steps)
 
 
-def _probes(points: Array, upper: Array) -> tuple[Array, Array]:
+def probes(points: Array, upper: Array) -> tuple[Array, Array]:
     """Return points (s (1 + d), d), each of (s, d) followed by its probes, and the probes' steps (s, d)."""
     count, d = points.shape
     # step inward at an upper bound

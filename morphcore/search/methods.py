@@ -1,4 +1,4 @@
-"""The search methods that work on any problem, by name; a new one is a class and a line here."""
+"""The search methods that work on any problem, by name. A new method is a class and a line here."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from morphcore.search.evolution import EvolutionStrategy
 from morphcore.search.solver import Problem, Solver
 from morphcore.search.swarm import ParticleSwarm
 
-# makes a solver of a problem and the settings of its search
+# makes a solver from a problem and the settings of its search
 Factory = Callable[[Any, Any], Solver[Any, Any]]
 
 METHODS: dict[str, Factory] = {
@@ -20,22 +20,22 @@ METHODS: dict[str, Factory] = {
 
 
 def register(name: str, factory: Factory) -> None:
-    """Let searches choose a method by a name."""
+    """Register a method under a name."""
     METHODS[name] = factory
 
 
 def method(name: str, problem: Problem[Any], settings: Any, own: Mapping[str, Factory]) -> Solver[Any, Any]:
-    """Return the method of a name, made for a problem.
+    """Return the named method, made for a problem.
 
     Parameters
     ----------
     name : str
-    problem, settings : what the method is made of.
-    own : methods that only this kind of problem has.
+    problem, settings : arguments of the method.
+    own : methods specific to this kind of problem.
 
     Raises
     ------
-    InvalidInput : there is no such method.
+    InvalidInput : no method has that name.
     """
     methods = {**METHODS, **own}
     if name not in methods:

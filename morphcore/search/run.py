@@ -1,4 +1,4 @@
-"""The one loop of all searches: ask, evaluate, tell, with time limit, stop and a state after each step."""
+"""The loop shared by all searches: ask, evaluate, tell, with time limit, stop and a state after each step."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from morphcore.threads import one_blas_thread
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
 
-FIRST = "baseline"  # as the history of a result calls the step that evaluates what is known
-UNFINISHED = 0.99  # largest fraction of a search that goes on
+FIRST = "baseline"  # name in the history of a result of the step that evaluates the known points
+UNFINISHED = 0.99  # largest fraction reported by an unfinished search
 
 
 @stored
@@ -30,12 +30,12 @@ class SearchState:
     Attributes
     ----------
     budget_s : time that the search may take, s; None for no limit.
-    prepared : what the problem chose before its first evaluation.
+    prepared : choices that the problem made before its first evaluation.
     solver : the method's own state; None before the first evaluation.
-    best : (d,) the point of least cost so far; ``best_cost`` is infinite where there is none.
-    generation : steps after the first. flights : flown so far. wall_s : s.
+    best : (d,) the point of lowest cost so far; ``best_cost`` is infinite if there is none.
+    generation : steps after the first. flights : number flown so far. wall_s : wall time, s.
     history : one row for each step.
-    over : whether the search has ended, by itself or because its time was up.
+    over : whether the search has ended, by itself or by its time limit.
     """
 
     budget_s: float | None = None
@@ -51,17 +51,17 @@ class SearchState:
 
     @property
     def feasible(self) -> bool:
-        """Whether any point keeps all limits."""
+        """Whether any point satisfies all limits."""
         return bool(np.isfinite(self.best_cost))
 
 
 class Search(Generic[Result]):
-    """A solver at work on a problem.
+    """A solver applied to a problem.
 
     Parameters
     ----------
-    problem, solver : what is searched in, and how.
-    clock : seconds that only rise.
+    problem, solver : the search problem and the method.
+    clock : monotonic clock, s.
     """
 
     def __init__(
@@ -71,13 +71,13 @@ class Search(Generic[Result]):
         self._clock = clock
 
     def advance(self, state: SearchState, stop: Stop | None = None) -> SearchState:
-        """Return the state after the next step; without it, and over, where the time is up before its end.
+        """Return the state after the next step, or the unchanged state marked as over if time runs out first.
 
-        What is known is evaluated in any case: there is a result however little time there was.
+        The known points are always evaluated, so there is a result however short the time.
 
         Raises
         ------
-        Interrupted : ``stop`` said so.
+        Interrupted : ``stop`` returned True.
         """
         begin = self._clock()
         left_s = None if state.budget_s is None else state.budget_s - state.wall_s
@@ -93,7 +93,7 @@ class Search(Generic[Result]):
         return self._timed(moved, self._clock() - begin)
 
     def task(self, state: SearchState) -> Batch | None:
-        """Return the batch of the next step if its costs are all that it needs; then others may find them."""
+        """Return the next step's batch if it needs costs only, so that it can be evaluated elsewhere."""
         if state.over or state.solver is None:
             return None
         batch = self.solver.ask(state.solver)
@@ -105,13 +105,13 @@ class Search(Generic[Result]):
             return self._timed(self._step(state, None, outcome), wall_s)
 
     def fraction(self, state: SearchState) -> float:
-        """Return how far a search has come, 0..1."""
+        """Return the progress of a search, 0..1."""
         if state.over:
             return 1.0
         return 0.0 if state.solver is None else min(self.solver.share(state.solver), UNFINISHED)
 
     def _step(self, state: SearchState, stop: Stop | None, outcome: Result | None = None) -> SearchState:
-        """Ask, evaluate and tell until a step ends. ``outcome`` : of the first batch, if it is known."""
+        """Ask, evaluate and tell until a step ends. ``outcome`` : of the first batch, if already known."""
         solver, inner = self.solver, state.solver
         best, best_cost, evaluations = state.best, state.best_cost, 0
         while True:
@@ -147,7 +147,7 @@ class Search(Generic[Result]):
         return replace(moved, history=(*state.history, row))
 
     def _timed(self, state: SearchState, elapsed_s: float) -> SearchState:
-        """Count the time of a step; where it has used up the search's time, it is the last."""
+        """Add the time of a step; if that exhausts the search's time, the step is the last."""
         wall_s = state.wall_s + elapsed_s
         up = state.feasible and state.budget_s is not None and wall_s >= state.budget_s
         return replace(state, wall_s=wall_s, over=state.over or up)

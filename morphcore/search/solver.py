@@ -1,8 +1,8 @@
-"""What every search method is: a value that asks for batches of points and receives their costs.
+"""The interface of search methods: a value that proposes batches of points and receives their costs.
 
-A solver holds settings only. All that a search knows lies in its state, a plain value: dataclasses marked
-`stored`, tuples, dictionaries, arrays, numbers and texts. So whoever reads the state can go on with it, in
-another process and to the bit, and batches can be evaluated anywhere.
+A solver holds settings only. Everything a search knows is in its state, a plain value: dataclasses marked
+`stored`, tuples, dictionaries, arrays, numbers and strings. So a search can be continued from its state in
+another process with bit-identical results, and batches can be evaluated anywhere.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ class Box:
 
 @dataclass(frozen=True)
 class Batch:
-    """Points (p, d) to be evaluated; ``residuals`` says that their costs alone are not enough."""
+    """Points (p, d) to be evaluated; ``residuals`` requests residuals in addition to costs."""
 
     points: Array
     residuals: bool = False
 
     def parts(self, max_parts: int) -> list[Array]:
-        """Split the points into parts of about one size, which any process may evaluate on its own.
+        """Split the points into parts of similar size, each of which any process may evaluate on its own.
 
-        A part is whole blocks of SIMD lanes: each model flies in the block, with the neighbours, that it has
-        when one process flies them all. What a block's lanes share (the strips that any of them touches)
-        could otherwise differ.
+        A part consists of whole blocks of SIMD lanes, so that each model flies in the same block, with the
+        same neighbours, as when one process flies them all. Otherwise the data shared by a block's lanes (the
+        strips that any of them touches) could differ.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Batch:
 
         Returns
         -------
-        At most so many arrays (k, d), none of them empty, in the order of the points.
+        At most ``max_parts`` arrays (k, d), none of them empty, in the order of the points.
         """
         blocks = -(-self.points.shape[0] // TOGETHER)
         count = max(1, min(max_parts, blocks))
@@ -73,10 +73,10 @@ class Outcome:
 
     Attributes
     ----------
-    points : (p, d) what was evaluated. A problem may repair points that it cannot evaluate.
+    points : (p, d) as evaluated. A problem may repair points that it cannot evaluate.
     cost : (p,)
-    residuals : (p, m), where they were asked for.
-    evaluations : number of points that were evaluated for it, those of repairs included.
+    residuals : (p, m), if they were requested.
+    evaluations : number of points evaluated, repairs included.
     """
 
     points: Array
@@ -97,7 +97,7 @@ class Solver(ABC, Generic[State, Result]):
     are generations of candidates.
     """
 
-    name = "search"  # of its steps, in progress and in the history of a result
+    name = "search"  # name of its steps, in progress and in the history of a result
 
     @abstractmethod
     def init(self, known: Result) -> State:
@@ -105,20 +105,20 @@ class Solver(ABC, Generic[State, Result]):
 
     @abstractmethod
     def ask(self, state: State) -> Batch:
-        """Return the batch to be evaluated next."""
+        """Return the next batch to evaluate."""
 
     @abstractmethod
     def tell(self, state: State, outcome: Result) -> State:
-        """Return the state after the batch that the present state asks for."""
+        """Return the state after evaluation of the batch that the present state proposed."""
 
     @abstractmethod
     def done(self, state: State) -> bool:
         """Return whether the search is over."""
 
     def best(self, state: State, outcome: Result) -> tuple[Array, float]:
-        """Return the best point (d,) that the last outcome led to, and its cost; infinite where to none.
+        """Return the best point (d,) that the last outcome led to, and its cost; infinite if there is none.
 
-        ``state`` : after that outcome.
+        ``state`` : the state after that outcome.
         """
         del state
         minimum = int(np.argmin(outcome.cost))
@@ -132,11 +132,6 @@ class Solver(ABC, Generic[State, Result]):
         del state
         return False
 
-    def box(self, state: State) -> Box | None:
-        """Return the box that is searched by now, where the solver has widened the problem's; else None."""
-        del state
-        return None
-
     def between_steps(self, state: State) -> bool:
         """Return whether a step ends here; a step may take several batches."""
         del state
@@ -148,18 +143,18 @@ class Solver(ABC, Generic[State, Result]):
         return self.name
 
     def share(self, state: State) -> float:
-        """Return how far the search has come, 0..1, as far as one can know."""
+        """Return the estimated progress of the search, 0..1."""
         del state
         return 0.0
 
     def remarks(self, outcome: Result) -> dict[str, float]:
-        """Return what else the history should say about a step that ended with an outcome."""
+        """Return further history entries for a step that ended with an outcome."""
         del outcome
         return {}
 
 
 class Problem(Protocol[Result_co]):
-    """What is searched in."""
+    """A search problem."""
 
     @property
     def box(self) -> Box:
@@ -168,7 +163,7 @@ class Problem(Protocol[Result_co]):
 
     @property
     def flights_each(self) -> int:
-        """Flights that the evaluation of one point takes."""
+        """Number of flights per evaluation of a point."""
         ...
 
     def arranged(self, points: Array) -> Array:
@@ -176,11 +171,11 @@ class Problem(Protocol[Result_co]):
         ...
 
     def prepare(self, deadline: Deadline) -> Any:
-        """Return what has to be chosen before the first evaluation, a plain value that the state keeps."""
+        """Return the choices to be made before the first evaluation, a plain value kept in the state."""
         ...
 
     def first(self) -> Batch:
-        """Return the points that are evaluated before any method begins, the best guess first."""
+        """Return the points to evaluate before any method starts, the best guess first."""
         ...
 
     def evaluate(self, batch: Batch, stop: Stop | None) -> Result_co:
@@ -188,6 +183,6 @@ class Problem(Protocol[Result_co]):
 
         Raises
         ------
-        Interrupted : ``stop`` said so.
+        Interrupted : ``stop`` returned True.
         """
         ...

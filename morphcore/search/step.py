@@ -1,4 +1,4 @@
-"""What long work shows of each of its steps."""
+"""The progress report of one step of long work."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Step:
-    """What one step of a search, a study or an optimisation leaves.
+    """One completed step of a search, a study or an optimisation.
 
     Attributes
     ----------
-    phase : what the step did.
-    generation : steps so far.
-    fraction : of the whole work, 0..1.
-    best_cost : least J so far of the search that ran last, rad^2.
-    flights : flown so far, one per parameter set and sample, or per schedule.
-    message : for people.
-    checkpoint : complete state; ``steps(checkpoint)`` goes on to the bit-identical result.
+    phase : kind of work done by the step.
+    generation : number of steps so far.
+    fraction : completed share of the whole work, 0..1.
+    best_cost : minimum J so far of the latest search, rad^2.
+    flights : number flown so far, one per parameter set and sample, or per schedule.
+    message : human-readable.
+    checkpoint : complete state; ``steps(checkpoint)`` continues to the bit-identical result.
     """
 
     phase: str

@@ -1,8 +1,8 @@
-"""Particle swarm search on the operators of pyswarms, which our driver can stop, report and resume.
+"""Particle swarm search with the operators of pyswarms and a driver that can stop, report and resume.
 
 The paper's search: Kennedy & Eberhart (1995) with inertia (Shi & Eberhart 1998), one global best. pyswarms
-draws from numpy's global generator; its state is part of ours, put in place before each use and taken back
-after it, so that a resumed search goes on to the bit.
+draws from numpy's global generator; its state is part of ours, installed before each use and read back after
+it, so that a resumed search is bit-identical.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from morphcore.search.solver import Batch, Outcome, Problem, Solver
 
 Array = NDArray[np.float64]
 
-FIRST_SPEED = 0.1  # largest of the first generation, in widths of the box
+FIRST_SPEED = 0.1  # largest velocity of the first generation, in widths of the box
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ParticleSwarm(Solver[SwarmState, Outcome]):
         self._settings, self._seed = settings, seed
 
     def init(self, known: Outcome) -> SwarmState:
-        """Spread the swarm evenly over the box; what is known is among its first particles."""
+        """Spread the swarm evenly over the box, with the known points among its first particles."""
         settings = self._settings
         generator = np.random.RandomState(
             self._seed % 2**32
@@ -131,7 +131,7 @@ class ParticleSwarm(Solver[SwarmState, Outcome]):
 
 @cache
 def operators() -> SimpleNamespace:
-    """Import pyswarms, for the first swarm only, since it brings matplotlib along."""
+    """Import pyswarms only when the first swarm is made, since it imports matplotlib."""
     with _default_logging_off():
         from pyswarms.backend import compute_pbest, compute_position, compute_velocity
         from pyswarms.backend.swarms import Swarm
@@ -148,7 +148,7 @@ def operators() -> SimpleNamespace:
 
 @contextmanager
 def _default_logging_off() -> Iterator[None]:
-    """Name a file in the variable by which pyswarms lets its users configure logging.
+    """Set the variable by which pyswarms lets its users configure logging.
 
     By default each of its modules configures the root logger and opens report.log in the working directory.
     """

@@ -1,4 +1,4 @@
-"""Flights of many parameter sets over one plan, in chunks that return to Python well within a second."""
+"""Flights of many parameter sets over one plan, in chunks that each take well under a second."""
 
 from __future__ import annotations
 
@@ -91,11 +91,11 @@ def fly_batch(
     Parameters
     ----------
     state : (p, state_rows) at the grid's start. record_rows : how many rows of the state to report.
-    stop : asked before every chunk; True raises Interrupted.
+    stop : called before every chunk; True raises Interrupted.
 
     Yields
     ------
-    Chunks in order of time, the initial state first (as a chunk of one row).
+    Chunks in chronological order, the initial state first (as a chunk of one row).
     """
     particles = state.shape[0]
     blocks = to_lanes(state)
@@ -142,7 +142,7 @@ def _fly_group(
 
 
 def _groups(blocks: int, threads: int) -> NDArray[np.int64]:
-    """First blocks of the groups, and the end: whole rounds of the threads, none beyond the cache."""
+    """First blocks of the groups, and the end: whole rounds of the threads that fit into the cache."""
     rounds = -(-blocks // (BLOCKS_PER_GROUP * threads))
     groups = min(blocks, threads * rounds)
     return np.arange(groups + 1) * blocks // groups

@@ -23,7 +23,7 @@ from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
 
-LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # there flap and edgewise axis of a gimbal turn about the same axis
+LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # at this torsion the flap and edgewise axes of a gimbal coincide
 
 
 def chain_flight(
@@ -38,11 +38,12 @@ def chain_flight(
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
 ) -> Iterator[tuple[float, FlightRecord | None]]:
-    """Fly one parameter set; gives the fraction flown after every chunk, with the record at the end.
+    """Fly one parameter set; yield the fraction flown after every chunk, and the record with the last.
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. parts : of the record to fill in. Others as in `flight.simulate`.
+    at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
+    `flight.simulate`.
     """
     plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch))
     flown = plan.flown(model)
@@ -53,8 +54,8 @@ def chain_flight(
     rows, chunks, states = JOINTS + flown.coordinates, [], []
     wanted = flown.state_rows if "loads" in parts else rows
     for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
-        chunks.append(chunk.rows[:, :rows, 0].copy())  # a view would keep the whole states
-        if "loads" in parts:  # of the whole states only what is reported is kept
+        chunks.append(chunk.rows[:, :rows, 0].copy())  # copied: a view would keep the whole states alive
+        if "loads" in parts:  # only the reported rows of the states are kept
             inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
             states.append(chunk.rows[at[inside] - chunk.first, :, 0])
         yield chunk.first / grid.steps, None
@@ -73,7 +74,7 @@ def chain_flight(
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
     tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
     loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
-    if plan.halved and model.mirror is not None:  # the other half did the same
+    if plan.halved and model.mirror is not None:  # the other half moved alike
         spread = model.mirror.spread
         angles, tips_z = model.mirror.spread_hinges(angles), spread(tips_z)
         tips_twist = None if tips_twist is None else spread(tips_twist)
@@ -99,28 +100,28 @@ def _tips_z(
     model: ChainModel, batch: ParameterBatch, plan: FlightPlan, q_joint: Array, at: NDArray[np.int64]
 ) -> Array:
     """Tips below their roots along z of B, (k, s), m."""
-    # in wing axes all times are one batch; the hinges turn them afterwards
+    # in wing axes all times form one batch; the hinges' rotation is applied afterwards
     tips_W = tip_positions(model, _repeated(batch, at.size), _level_hinges(model), q_joint)
     down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
     return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))
 
 
 def _tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
-    """Twist of the tips against their roots, (k, s), rad: torsion of Rx(flap) Ry(torsion) Rz(edgewise)."""
+    """Twist (k, s), rad, of tips relative to their roots: torsion of Rx(flap) Ry(torsion) Rz(edgewise)."""
     R_WL, _ = link_poses(model, _repeated(batch, q_joint.shape[0]), _level_hinges(model), q_joint)
     last = model.surfaces[:, 0] + model.surfaces[:, 1] - 1
     return np.arcsin(np.clip(R_WL[:, last, 0, 2], -1.0, 1.0))
 
 
 def _level_hinges(model: ChainModel) -> Array:
-    """Hinges (s, HINGE_ROWS) that turn nothing: what hangs on them is seen in wing axes."""
+    """Hinges (s, HINGE_ROWS) at rest in the reference position, so that surfaces stay in wing axes."""
     level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
     level[:, :9] = np.eye(3).ravel()
     return level
 
 
 def _repeated(batch: ParameterBatch, times: int) -> ParameterBatch:
-    """The one parameter set at so many times."""
+    """One parameter set repeated for a number of times."""
     return batch.select(np.zeros(times, dtype=np.int64))
 
 

@@ -1,4 +1,4 @@
-"""How one parameter set of a chain meets the air along a plan: what its warnings are judged by."""
+"""Motion of one parameter set of a chain through the air along a plan, the basis of its warnings."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 def chain_motion(
     model: ChainModel, plan: FlightPlan, constants: LaneConstants, state: Array, stop: Stop | None = None
 ) -> AirMotion:
-    """Motion through the air of the first particle of ``state``, as long as its flight is finite.
+    """Motion through the air of the first particle of ``state``, while its flight stays finite.
 
-    ``model`` is the one that the plan flies (`FlightPlan.flown`), as of `fly_batch`.
+    ``model`` is the model that the plan flies (`FlightPlan.flown`), as in `fly_batch`.
     """
     chunks = fly_batch(model, plan, constants, state, record_rows=POSITION, stop=stop)
     rows = np.concatenate([chunk.rows[..., 0] for chunk in chunks])

@@ -1,8 +1,8 @@
-"""The output channels of a flight, as a list: what a trajectory can hold beside attitude and hinge angles.
+"""The list of a flight's output channels: what a trajectory can hold besides attitude and hinge angles.
 
-Record, CSV file, result document, command and page go by this list and by ``morphdata/channels.py``, which
-holds each channel's unit and description. To add a channel is to add one entry to both; where it needs
-numbers that the record lacks, the models record them as a `Part`.
+Record, CSV file, result document, command and page are driven by this list and by ``morphdata/channels.py``,
+which holds each channel's unit and description. To add a channel, add one entry to both; if it needs numbers
+that the record lacks, the models record them as a `Part`.
 
 Conventions
 -----------
@@ -10,14 +10,15 @@ B : body axes, forward, right, down, with the origin at the reference point. N :
 
 - ``alpha`` = atan2(w, u) and ``beta`` = asin(v / V), of the velocity (u, v, w) in B of the reference point
   relative to the air: wind, gust and turbulence are subtracted.
-- ``fx fy fz`` : specific force f = a - g in B at the reference point, what an accelerometer there measures.
+- ``fx fy fz`` : specific force f = a - g in B at the reference point, as measured by an accelerometer there.
 - ``nx ny nz`` : load factors (fx, fy, -fz) / g, positive forward, to the right and **up**. In steady level
   flight nz = cos(alpha), +1 to first order, and nx = sin(alpha). g is the flight's own gravity.
 - ``tip_z`` : tip of a surface's elastic axis below its root along z of B, hence negative for a wing that its
   lift bends up. ``tip_left_z``, ``tip_right_z`` : of the first hinged surface of a side.
 - ``tip_twist`` : the torsion of the rotation Rx(flap) Ry(torsion) Rz(edgewise) from the axes of a tip to
   those of its root, nose up.
-- ``hinge_torque`` : of a drive's motors together, along its positive coordinate. At a corner of a schedule's
+- ``hinge_torque`` : the total torque of a drive's motors, along its positive coordinate. At a corner of a
+  schedule's
   rate the hinge's acceleration, and with it torque and load factor, is that of the morph.
 """
 
@@ -49,8 +50,8 @@ class Channel:
     name : str
         As in ``morphdata/channels.py``.
     evaluate : callable, (FlightRecord, Aircraft, Flight) -> ndarray, shape (k,), or mapping of str to ndarray
-        Its values at the record's k times; several columns, or perhaps none, by the part that follows the
-        name ("": the name alone).
+        Its values at the record's k times. A mapping holds several columns, or none, keyed by the suffix of
+        the name ("" for the name alone).
     needs : frozenset of {"twist", "loads"}
         Parts of the record that models leave out unless a channel needs them.
     """
@@ -61,7 +62,7 @@ class Channel:
 
     @property
     def unit(self) -> str:
-        """Of its values, "1" if they have none."""
+        """Unit of its values, "1" if dimensionless."""
         return channel_facts(self.name).unit
 
     def columns(self, record: FlightRecord, aircraft: Aircraft, flight: Flight) -> dict[str, Array]:
@@ -76,12 +77,12 @@ class Channel:
 def requested_channels(
     names: Sequence[str] | None, model_kind: str, gravity_m_s2: float
 ) -> tuple[Channel, ...]:
-    """Find the channels that a flight is to have.
+    """Find the requested channels of a flight.
 
     Parameters
     ----------
     names : sequence of str, optional
-        None: those that a flight has where none are requested.
+        None: the default channels.
     model_kind : {"rigid", "equivalent", "flexible"}
     gravity_m_s2 : float
 
@@ -107,7 +108,7 @@ def parts_of(channels: Iterable[Channel]) -> frozenset[Part]:
 def channel_columns(
     channels: Iterable[Channel], record: FlightRecord, aircraft: Aircraft, flight: Flight
 ) -> dict[str, Array]:
-    """Columns (k,) of some channels, in their order, SI units and radians."""
+    """Columns (k,) of some channels, in order, SI units and radians."""
     columns: dict[str, Array] = {}
     for channel in channels:
         columns |= channel.columns(record, aircraft, flight)
@@ -171,7 +172,7 @@ def _load_factor(number: int, sign: float) -> Evaluate:
 
 
 def _tip_of_side(side: str) -> Evaluate:
-    """Of the side's first hinged surface; no column where it has none."""
+    """Of the side's first hinged surface; no column if there is none."""
 
     def evaluate(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Mapping[str, Array]:
         hinged = [k for k, each in enumerate(aircraft.surfaces) if each.side == side and each.hinges]

@@ -1,8 +1,8 @@
 """Compile the kernels of flights on two cores, before the first flight.
 
 Numba compiles one function at a time in a process, and the kernels are compiled once for batches of flights
-and once for a flight alone (see `morphcore.lanes`), with little in common. So a second process compiles the
-latter into the cache while this one compiles the former.
+and once for single flights (see `morphcore.lanes`), and the two share little. So a second process compiles
+the latter into the cache while this one compiles the former.
 """
 
 from __future__ import annotations
@@ -36,26 +36,27 @@ _COMPILE_ALONE = "from morphcore.simulate.compilation import fly_tiny; fly_tiny(
 def compile_flights() -> None:
     """Compile the kernels of flights, unless the cache has them. A second call does nothing.
 
-    With one core, or without a cache, nothing is gained: they are compiled when a flight first calls them.
+    With one core, or without a cache, this does nothing: the kernels are compiled when a flight first calls
+    them.
     """
     if is_kept(fly) is not False or usable_cores() < 2 or not sys.executable:
         return
     say("compiling kernels, once on this machine")
-    beside = subprocess.Popen(
+    second = subprocess.Popen(
         [sys.executable, "-P", "-c", _COMPILE_ALONE],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         env=os.environ | {"NUMBA_NUM_THREADS": "1"},
     )  # fmt: skip
     try:
         fly_tiny(TOGETHER)
-        beside.wait()  # if it failed, its kernels are compiled when they are called
+        second.wait()  # if it failed, its kernels are compiled on their first call
     finally:
-        beside.kill()
-        beside.wait()
+        second.kill()
+        second.wait()
 
 
 def fly_tiny(particles: int = ALONE) -> None:
-    """Fly a small model as many times at once: the kernels of blocks of that width are compiled or loaded."""
+    """Fly a small model ``particles`` times at once, which compiles or loads the kernels for that width."""
     aircraft, flight = tiny_aircraft()
     model = chain_model(aircraft, flight, 2, SMALL)
     plan = flight_plan(model, [Hold()] * len(aircraft.hinges), time_grid(np.linspace(0.0, 0.03, 4)))

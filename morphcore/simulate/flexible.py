@@ -2,8 +2,9 @@
 
 Brüls, Cardona & Arnold (2012): velocities and positions advance with an algorithmic acceleration ``a`` that
 averages the true one, A; positions move by the exponential of the increment in body axes. Each step's
-equations hold at its end to `kernels.flexible_step.TOLERANCE`, air loads included: the lattice stands where
-the step's predictor puts it (third order off), its circulations, lag and forces follow every iteration.
+equations hold at its end to `kernels.flexible_step.TOLERANCE`, air loads included: the lattice stays where
+the step's predictor puts it (an error of third order), its circulations, lag and forces are updated in every
+iteration.
 """
 
 from __future__ import annotations
@@ -60,16 +61,16 @@ Array = NDArray[np.float64]
 # s; holds attitude within 1e-5 rad of the converged solution on the example flights, a tenth of what the
 # best equivalent models are off (tests/simulate/test_flexible.py)
 FLEXIBLE_STEP_S = 0.001
-SPECTRAL_RADIUS = 0.6  # of the stepper at infinite frequency: stretching waves die out in some ten steps
-START_TOLERANCE = 1e-9  # of the accelerations at the start, relative
+SPECTRAL_RADIUS = 0.6  # at infinite frequency: stretching waves die out in about ten steps
+START_TOLERANCE = 1e-9  # relative, of the accelerations at the start
 
 
 @dataclass(frozen=True)
 class HingePath:
     """Prescribed motion of all hinges along a time grid (k times, s surfaces).
 
-    R_BW : (k, s, 3, 3); origin_B : (k, s, 3) root nodes, m. The twist of a root against the fuselage is
-    ``axis rate`` in W: of one hinge its screw (k, s, 6) and its rate (k, s), of several their sum and 1;
+    R_BW : (k, s, 3, 3); origin_B : (k, s, 3) root nodes, m. The twist of a root relative to the fuselage is
+    ``axis rate`` in W: for one hinge its screw (k, s, 6) and its rate (k, s), for several their sum and 1;
     acceleration : (k, s, 6) its time derivative. angle : (k, h) of all hinges, rad.
     """
 
@@ -82,10 +83,10 @@ class HingePath:
 
 
 def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGrid) -> HingePath:
-    """Motion of all hinges on a grid, a schedule for each in the order of `Aircraft.hinges`.
+    """Motion of all hinges on a grid, with one schedule for each in the order of `Aircraft.hinges`.
 
-    Accelerations are central differences of the rates over two steps: where a sampled rate has a corner, the
-    impulse of the hinge stays right and in time.
+    Accelerations are central differences of the rates over two steps: at a corner of a sampled rate, the
+    impulse of the hinge keeps its size and its time.
     """
     times, h, aircraft = grid.times_s, grid.step_s, model.aircraft
     angle, rate, acceleration = np.zeros((3, times.size, len(aircraft.hinges)))
@@ -94,7 +95,7 @@ def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGr
         late, early = schedule.motion(times + h).rate, schedule.motion(times - h).rate
         angle[:, column], rate[:, column] = motion.angle, motion.rate
         acceleration[:, column] = (late - early) / (2.0 * h)
-        acceleration[0, column] = (late[0] - motion.rate[0]) / h  # what went before the flight is not in it
+        acceleration[0, column] = (late[0] - motion.rate[0]) / h  # the time before the flight does not enter
     parts = [
         _root_path(surface, angle[:, own], rate[:, own], acceleration[:, own])
         for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
@@ -164,7 +165,7 @@ class FlexibleFlight:
         )  # fmt: skip
 
     def structure(self, poses: NodePoses, V: Array, A: Array) -> Array:
-        """What structure, inertia and weight ask of the nodes, (n, 6)."""
+        """Forces (n, 6) that structure, inertia and weight require at the nodes."""
         return node_forces(self.model.beams, self.work, poses, V, A, self.gravity_N)
 
     def place_lattice(self, poses: NodePoses, wind_N: Array, V: Array) -> None:
@@ -174,7 +175,7 @@ class FlexibleFlight:
         self.lattice.place(R_NB.T @ found.R, (found.x - x_N) @ R_NB, wind_N @ R_NB - V[0, 3:])
 
     def subtract_air(self, acting: Array, twists: Array, wind_B: Array, right: Array) -> None:
-        """Subtract the air's forces from the nodes' demands (n, 6)."""
+        """Subtract the air's forces from the required forces (n, 6) of the nodes."""
         self.sections.subtract(self.lattice.section_forces(acting, twists, wind_B), right)
 
     def structure_arrays(self) -> Structure:
@@ -237,12 +238,12 @@ class Stepper:
 
     @property
     def alpha_m(self) -> float:
-        """Weight of the old algorithmic acceleration."""
+        """Weight of the previous algorithmic acceleration."""
         return (2.0 * self.spectral_radius - 1.0) / (self.spectral_radius + 1.0)
 
     @property
     def alpha_f(self) -> float:
-        """Weight of the old true acceleration."""
+        """Weight of the previous true acceleration."""
         return self.spectral_radius / (self.spectral_radius + 1.0)
 
     @property
@@ -256,7 +257,10 @@ class Stepper:
         return 0.25 * (self.gamma + 0.5) ** 2
 
     def coefficients(self, lag_time: Array, still: float = STILL) -> Rule:
-        """As the kernels take them; lag_time (2, r), s; still : of the induced velocities, 0 for exact."""
+        """As the kernels take them.
+
+        lag_time : (2, r) s. still : tolerance of the induced velocities, 0 for exact.
+        """
         h = self.step_s
         share = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         z = h / lag_time
@@ -276,7 +280,7 @@ class Stepper:
 
 
 class FlexibleRun:
-    """A flight under way: its state, moved step by step by `kernels.flexible_step`.
+    """A flight in progress: its state, advanced step by step by `kernels.flexible_step`.
 
     Parameters
     ----------
@@ -314,7 +318,7 @@ class FlexibleRun:
             blocked=np.zeros(rings),
             residual=np.zeros(rings),
             acting=np.zeros(rings),
-            inverse=np.zeros((rings, rings)),  # none yet: the first step asks for one
+            inverse=np.zeros((rings, rings)),  # none yet: the first step requests one
             small=np.zeros((2, 6, 6)),
             pace=np.zeros(1),
             turn=np.zeros((7, 3)),
@@ -325,11 +329,11 @@ class FlexibleRun:
         self._form_matrix()
 
     def fly_to(self, row: int) -> None:
-        """Fly on to a row of the grid.
+        """Continue the flight to a row of the grid.
 
         Raises
         ------
-        FlightDiverged : the flight leaves what the model can follow.
+        FlightDiverged : the flight leaves the model's domain.
         """
         inverted = -1
         while self.row < row:
@@ -346,13 +350,13 @@ class FlexibleRun:
                 raise FlightDiverged(time_s=float(self.grid.times_s[self.row]))
 
     def _form_matrix(self) -> None:
-        """Factor the iteration matrix at the last strains that were asked for."""
+        """Factor the iteration matrix at the strains of the last `structure`."""
         flight, rule = self._flight, self._rule
         factor(flight.model.beams, flight.work, 1.0, rule.of_rate, rule.of_pose)
         self._formed = self.row
 
     def _renew_inverse(self) -> bool:
-        """Invert the influence where the lattice is now; False: it cannot be."""
+        """Invert the influence at the lattice's present place; False if it is singular."""
         matrix = self._flight.lattice.at.influence[:-1]
         if not np.isfinite(matrix).all():
             return False
@@ -364,7 +368,7 @@ class FlexibleRun:
 
 
 def _state_arrays(state: FlexibleState) -> State:
-    """A copy of a state, as the kernels move it."""
+    """A copy of a state, as arrays that the kernels advance."""
     return State(
         R=state.poses.R.copy(),
         x=state.poses.x.copy(),
@@ -380,9 +384,9 @@ def _state_arrays(state: FlexibleState) -> State:
 def set_in_motion(
     flight: FlexibleFlight, path: HingePath, wind_N: Array, state: FlexibleState
 ) -> FlexibleState:
-    """A trimmed state with its hinges moving as the path begins, the wings turning with them as one.
+    """A trimmed state with hinges moving as at the start of the path, the wings turning rigidly with them.
 
-    Accelerations are those that the forces then ask for. A path that begins at rest changes nothing.
+    Accelerations are those that the forces then require. A path that starts at rest changes nothing.
     """
     if not ((path.axis[0] * path.rate[0, :, None]).any() or path.acceleration[0].any()):
         return state

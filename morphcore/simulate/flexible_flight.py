@@ -35,11 +35,12 @@ def flexible_flight(
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
 ) -> Iterator[tuple[float, FlightRecord | None]]:
-    """Fly the flexible model; gives the fraction flown after every chunk, with the record at the end.
+    """Fly the flexible model; yield the fraction flown after every chunk, and the record with the last.
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. parts : of the record to fill in. Others as in `flight.simulate`.
+    at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
+    `flight.simulate`.
     """
     times = grid.times_s
     wind_N = (

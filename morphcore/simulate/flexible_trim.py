@@ -23,7 +23,7 @@ from morphcore.simulate.trim import StartMode
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-10  # rad and m, of the displacement that the remaining imbalance would cause
+TOLERANCE = 1e-10  # rad and m, limit of the displacement that the remaining imbalance would cause
 ACCEPTED = 1e3 * TOLERANCE  # Krylov steps may stall in the last digits; this is far below what a flight shows
 MAX_ITERATIONS = 40
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an angle
@@ -33,7 +33,7 @@ LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an a
 class FlexibleTrim:
     """A start: angle of attack (rad), constant force (N) and moment (N m) in B, and the state.
 
-    residual : what is left of the imbalance, as a displacement, rad and m.
+    residual : the remaining imbalance as a displacement, rad and m.
     """
 
     alpha: float
@@ -44,7 +44,7 @@ class FlexibleTrim:
 
 
 class _Balance:
-    """The equations of trim: scaled imbalance for displacements of all nodes and, of free trim, alpha."""
+    """The equations of trim: scaled imbalance for displacements of all nodes and, in free trim, alpha."""
 
     def __init__(self, flight: FlexibleFlight, path: HingePath, wind_N: Array, start: StartMode) -> None:
         self.flight, self.path, self.wind_N = flight, path, wind_N
@@ -70,7 +70,7 @@ class _Balance:
     def _inertia(self, poses: NodePoses, at_rest: Array) -> Array:
         """Spatial inertia (6, 6) of the whole aircraft in this shape about the reference point.
 
-        From the nodes' demands (n, 6) for unit accelerations, less those ``at_rest``.
+        From the forces (n, 6) required at the nodes for unit accelerations, less those ``at_rest``.
         """
         zero, columns = np.zeros_like(at_rest), []
         for unit_B in np.eye(6):
@@ -79,7 +79,7 @@ class _Balance:
         return np.stack(columns, axis=1)
 
     def _rigid(self, poses: NodePoses, motion_B: Array) -> Array:
-        """Motion vector of the fuselage, moved rigidly to all nodes, (n, 6)."""
+        """Motion vector of the fuselage carried rigidly to all nodes, (n, 6)."""
         return carried(poses, 0, motion_B, slice(None))
 
     def total(self, poses: NodePoses, forces: Array) -> Array:
@@ -91,7 +91,7 @@ class _Balance:
         return np.concatenate([moment.sum(axis=0), force.sum(axis=0)])
 
     def state(self, x: Array) -> tuple[FlexibleState, Array]:
-        """The state of given unknowns and what it asks of the nodes beside the constant force and moment."""
+        """The state for given unknowns, and the nodal forces it requires in addition to the constant ones."""
         flight, count = self.flight, 6 * self.free.size
         alpha = self.given.alpha_rad if self.given is not None else float(x[count])
         airspeed = flight.model.flight.airspeed_m_s
@@ -122,7 +122,7 @@ class _Balance:
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands
 
     def imbalance(self, x: Array) -> Array:
-        """Displacements that would undo the imbalance and, of free trim, the defect of lift as an angle."""
+        """Displacements that would remove the imbalance and, in free trim, the lift deficit as an angle."""
         flight, model = self.flight, self.flight.model
         state, demands = self.state(x)
         total = self.total(state.poses, demands)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -41,6 +42,7 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
 from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
@@ -63,9 +65,9 @@ class Simulation(Shown):
         The start: angle of attack (rad), constant force (N) and moment (N m) in B, joint angles (rad; none of
         the flexible model).
     step_s : float
-        The longest time step that was allowed, s.
+        The longest allowed time step, s.
     warnings : tuple of ResultWarning
-        What the method does not answer for.
+        Where the flight left the method's range of validity.
     start_tips_z : mapping of str to float
         By side, the tip of its first hinged surface at the start, m below its root.
     """
@@ -77,7 +79,7 @@ class Simulation(Shown):
     start_tips_z: Mapping[str, float] = field(default_factory=dict)
 
     def summary(self) -> Summary:
-        """How the flight began, and how far the attitude went."""
+        """The start of the flight, and the range of its attitude."""
         flown = self.trajectory
         return Summary(
             f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
@@ -95,13 +97,13 @@ class Simulation(Shown):
 
 @dataclass(frozen=True)
 class FlightStep:
-    """How far a flight has come: the fraction flown, and at the end what it gave."""
+    """Progress of a flight: the fraction flown and, at the end, the result."""
 
     fraction: float
     simulation: Simulation | None = None
 
 
-def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
+def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     aircraft: AircraftDocument,
     flight: FlightDocument,
     schedules: Schedules,
@@ -127,21 +129,21 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     flight : Flight
         Its flight condition.
     schedules : mapping of str to schedule, Schedules or Trajectory
-        What the drives do, by their names (``{"sweep_left": ..., "fold": ...}``), where a word moves both
-        sides and ``both``, ``left`` and ``right`` are understood if no other drive could be meant; a document
-        of such; or a sample flight whose measured angles are followed. Other drives hold their hinges'
-        ``angle_rad``.
+        The motion of the drives by name (``{"sweep_left": ..., "fold": ...}``). A word such as ``fold`` moves
+        both sides; ``both``, ``left`` and ``right`` are accepted if they are unambiguous. Alternatively a
+        document of such schedules, or a sample flight whose measured angles are followed. Other drives hold
+        their hinges' ``angle_rad``.
     model : {"rigid", "flexible"} or ParameterBatch
-        The model that flies; a batch holds the parameters of one equivalent model
-        (`parameters_from_document`, `physical_guess`).
+        The model to fly; a batch holds the parameters of one equivalent model (`parameters_from_document`,
+        `physical_guess`).
     duration_s : float, optional
-        Time from zero, s; of a sample flight, its own duration from its first time is the default.
+        Time from zero, s. The default for a sample flight is its own duration, from its first time.
     output_step_s : float
         Time between the rows of the trajectory, s.
     step_s : float, optional
-        Longest time step, s. None: 1 ms of the flexible model, of the others the longest of
-        `step_choice.CANDIDATES_S` that holds the attitude to `step_choice.TOLERANCE_RAD` in this flight's
-        smooth air.
+        Longest time step, s. None: 1 ms for the flexible model, for the others the longest of
+        `step_choice.CANDIDATES_S` that keeps the attitude error within `step_choice.TOLERANCE_RAD` in this
+        flight's smooth air.
     start : {"trim", "given"}
         Straight level flight of this model, or the flight's measured start.
     environment : Environment, optional
@@ -166,8 +168,8 @@ def simulate(  # noqa: PLR0913 - the conditions of a flight are its arguments
     Raises
     ------
     InvalidInput
-        A schedule leaves its hinge's range or moves no drive, a channel is unknown or not of this model, or
-        an argument makes no sense.
+        A schedule leaves its hinge's range or moves no drive, a channel is unknown or not available for this
+        model, or an argument is invalid.
     TrimNotFound
         There is no steady level flight.
     FlightDiverged
@@ -210,7 +212,7 @@ def flight_steps(  # noqa: PLR0913 - as above
     channels: Sequence[str] | None = None,
     stop: Stop | None = None,
 ) -> Iterator[FlightStep]:
-    """Fly as `simulate` does, step by step: the fraction flown several times a second, the flight at last.
+    """Fly as `simulate` does, step by step: yield the fraction flown several times a second, then the flight.
 
     Aircraft and flight are resolved; they need not be within the limits of documents.
     """
@@ -253,7 +255,7 @@ def _warnings(
     record: FlightRecord,
     smooth_air_N: Callable[[Array], Array] | None,
 ) -> tuple[ResultWarning, ...]:
-    """What the flight did that its method does not answer for; turbulence is not counted as incidence."""
+    """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
     wind_N = np.tile(flight.wind_N, (times.size, 1)) if smooth_air_N is None else smooth_air_N(times)
     motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
     return (
@@ -261,6 +263,17 @@ def _warnings(
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *overlap_warnings(aircraft, record.angles),
     )
+
+
+def _is_one_of(channels: Mapping[str, Array], title: str) -> bool:
+    """Whether a further column gives one of some channels, in whatever unit."""
+    meant = channel_meant(title)
+    return meant is not None and meant[0] in channels
+
+
+def _cell(value: float) -> str:
+    """Nine digits, or nothing for a gap of a measured channel."""
+    return "" if math.isnan(value) else f"{value:.9g}"
 
 
 def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
@@ -275,24 +288,26 @@ def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
     """Write a trajectory with the columns of the example flights, SI units and radians.
 
-    `load_trajectory` reads it back.
+    Cells are empty where a measured channel has a gap. `load_trajectory` reads it back.
     """
+    measured = trajectory.channels
     columns = {
         "t": trajectory.time_s,
         **{name: trajectory.drives[name] for name in trajectory.drive_order},
         "phi": trajectory.phi,
         "theta": trajectory.theta,
         "psi": trajectory.psi,
-        **trajectory.extra,
+        **measured,
+        **{title: values for title, values in trajectory.extra.items() if not _is_one_of(measured, title)},
     }
     with Path(path).open("w", newline="", encoding="utf-8") as stream:
         # nine digits: a nanoradian of an attitude of one radian
-        rows = ([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
+        rows = (list(map(_cell, row)) for row in zip(*columns.values(), strict=True))
         write_table(stream, columns, rows)
 
 
 class _Fly(Protocol):
-    """A model's way to fly a grid: fractions, and the record at the end."""
+    """A model's function to fly a grid: it yields fractions, and the record with the last."""
 
     def __call__(
         self,
@@ -309,10 +324,10 @@ class _Fly(Protocol):
 
 @dataclass(frozen=True)
 class _Flyer:
-    """How a model flies.
+    """How to fly one kind of model.
 
-    step_s : its default. obstacle : finds what may have kept it from flying. chain : model and parameters
-    for which a step can be chosen, if they are such.
+    step_s : default time step. obstacle : finds the likely cause of a failed flight. chain : model and
+    parameters for which a step can be chosen, if any.
     """
 
     fly: _Fly
@@ -357,7 +372,7 @@ def _chain_flyer(chain: ChainModel, batch: ParameterBatch) -> _Flyer:
 def _air(
     environment: Environment | None, flight: Flight, rng: np.random.Generator | None
 ) -> Callable[[Array], Array] | None:
-    """Wind at some times beside the flight's own."""
+    """Wind at some times, in addition to the flight's own."""
     return None if environment is None else lambda moments: air_velocity(environment, flight, moments, rng)
 
 

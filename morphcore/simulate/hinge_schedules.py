@@ -1,4 +1,4 @@
-"""Who moves which hinge: schedules by drive, documents and measured flights as a schedule for every hinge."""
+"""Turns schedules by drive, documents and measured flights into one schedule for every hinge."""
 
 from __future__ import annotations
 
@@ -17,27 +17,26 @@ from morphdata.faults import Fault, refuse
 from morphdata.samples import columns_of_aircraft, no_drive
 
 Schedules = Mapping[str, Schedule] | documents.Schedules | Trajectory
-Followed = dict[str, tuple[str, Schedule]]  # drive -> key of the history it follows, and that
+Followed = dict[str, tuple[str, Schedule]]  # drive -> key of the history it follows, and the history
 
 
 def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = "/schedules") -> Followed:
-    """Find out what each drive does.
+    """Find the schedule of each drive.
 
     Parameters
     ----------
-    schedules : by the names of drives, their words (``sweep``, of both sides), ``both``, ``left`` or
-        ``right`` where no other drive could be meant; a document of such; or a flight whose measured angles
-        are followed.
+    schedules : by the names of drives, their words (``sweep`` for both sides), or ``both``, ``left`` or
+    ``right`` if unambiguous; a document of such; or a flight whose measured angles are followed.
 
     Returns
     -------
     dict
-        Drive -> the key that moves it and its schedule; a drive that nothing moves is not in it.
+        Drive -> the key that moves it and its schedule; drives that nothing moves are left out.
 
     Raises
     ------
     InvalidInput
-        A key names no drive of the aircraft, could mean several, or moves what another one moves.
+        A key names no drive of the aircraft, is ambiguous, or moves a drive that another key moves.
     """
     if isinstance(schedules, Trajectory):
         return followed_flight(aircraft, schedules, pointer)
@@ -47,7 +46,7 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = 
         return {name: (key, moved[key]) for name, key in keys.items()}
     if not isinstance(schedules, Mapping):
         raise InvalidInput(
-            "the schedules do not say what they move",
+            "the schedules do not name the drives they move",
             pointer=pointer,
             hint=f"give them by drive: {shown_names(aircraft.drives) or 'the aircraft has none'}",
         )
@@ -57,14 +56,14 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = 
 
 
 def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Followed:
-    """Find out which measured angles each drive follows; one that was not measured is not in it.
+    """Find which measured angles each drive follows; drives that were not measured are left out.
 
-    Columns of a file that are no drives of the aircraft are left alone.
+    Columns of a file that are not drives of the aircraft are ignored.
 
     Raises
     ------
     InvalidInput
-        No angle moves a drive, one could mean several or none at all, or one side alone was measured.
+        No angle moves a drive, an angle is ambiguous or matches no drive, or only one side was measured.
     """
     drives = aircraft.drives
     faults: list[Fault] = []
@@ -86,7 +85,7 @@ def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -
 
 
 def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Trajectory:
-    """Return a flight without those columns of its file that are no drives of the aircraft.
+    """Return a flight without the columns of its file that are not drives of the aircraft.
 
     Raises
     ------
@@ -101,7 +100,7 @@ def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> T
 
 
 def hinge_schedules(aircraft: Aircraft, followed: Followed) -> list[Schedule]:
-    """Return the schedule of every hinge, in the aircraft's order; where nothing moves it, its held angle."""
+    """Return the schedule of every hinge, in order; hinges that nothing moves hold their angle."""
     return [
         followed[hinge.drive][1] if hinge.drive in followed else Hold(hinge.angle_rad)
         for hinge in aircraft.hinges
@@ -109,7 +108,7 @@ def hinge_schedules(aircraft: Aircraft, followed: Followed) -> list[Schedule]:
 
 
 def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, pointer: str) -> None:
-    """Raise InvalidInput where a drive is taken beyond the range of one of its hinges at times (k,), s."""
+    """Raise InvalidInput if a drive leaves the range of one of its hinges at times (k,), s."""
     for surface in aircraft.surfaces:
         for hinge in surface.hinges:
             if hinge.drive not in followed:

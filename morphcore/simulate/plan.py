@@ -1,4 +1,4 @@
-"""What all flights of one sample share: the time grid, hinge motion, wind and the lattice along the morph."""
+"""The plan shared by all flights of one sample: time grid, hinge motion, wind and lattice along the morph."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from morphcore.simulate.schedule import Hold, Schedule
 
 Array = NDArray[np.float64]
 
-# holds attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
+# keeps attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
 STEP_S = 0.01
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
-ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: their flight rolls by less than that
-RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at its end
+ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: the flight rolls by less than that
+RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at the path's end
 
 
 @dataclass(frozen=True)
@@ -52,20 +52,20 @@ class TimeGrid:
 
     @property
     def halves_s(self) -> Array:
-        """(2 steps + 1,) times and middles, in turn."""
+        """(2 steps + 1,) times and middles in alternation."""
         times = np.empty(2 * self.steps + 1)
         times[::2], times[1::2] = self.times_s, self.middles_s
         return times
 
     def halved(self, times: int = 1) -> TimeGrid:
-        """The grid with all steps halved so many times."""
+        """The grid with all steps halved ``times`` times."""
         parts = 2**times
         at = None if self.at is None else self.at * parts
         return TimeGrid(self.start_s, self.step_s / parts, self.steps * parts, at)
 
 
 def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
-    """Make a grid that hits evenly spaced output times; others need interpolation (``at`` is None)."""
+    """Make a grid that contains even output times; uneven ones need interpolation (``at`` is None)."""
     times = np.asarray(output_s, dtype=np.float64)
     spacing = (times[-1] - times[0]) / (times.size - 1)
     if np.allclose(np.diff(times), spacing, rtol=1e-6, atol=1e-9):
@@ -106,7 +106,7 @@ class OperatorTable(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Middles(Shown):
-    """What the stages of a flight read, in the middles of its steps.
+    """Data in the middles of the steps, read by the stages of a flight.
 
     angles, rates : (steps, h) of all hinges, rad and rad/s. hinges : (steps, s, HINGE_ROWS) for the kernels.
     wind_N : (steps, 3) m/s. table : the plan's own, at the positions of the middles.
@@ -123,10 +123,10 @@ class Middles(Shown):
 class FlightPlan(Shown):
     """Everything about a flight that does not depend on the parameters.
 
-    aircraft : what flies, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
+    aircraft : the model, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
     hinges, rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the kernels. wind_N : (steps + 1, 3)
     m/s. middle : hinges, wind and lattices between the grid times. halved : the aircraft is one half of a
-    symmetric one whose other half does the same.
+    symmetric one whose other half moves alike.
     """
 
     grid: TimeGrid
@@ -141,11 +141,11 @@ class FlightPlan(Shown):
     halved: bool = False
 
     def flown(self, model: ChainModel) -> ChainModel:
-        """What flies this plan: the model, or one half of it."""
+        """The model that flies this plan: the given one, or one half of it."""
         return _flown(model, halved=self.halved)
 
     def coarser(self, grid: TimeGrid) -> FlightPlan:
-        """The same flight on a grid that gives this plan's by ``halved``: nothing is computed anew.
+        """The same flight on a coarser grid, whose ``halved`` is this plan's grid; nothing is recomputed.
 
         Raises
         ------
@@ -177,7 +177,7 @@ class FlightPlan(Shown):
         )
 
     def instants(self, rows: NDArray[np.int64]) -> FlightPlan:
-        """What the plan has at some grid times alone, to evaluate there; it cannot be flown."""
+        """The plan restricted to some grid times, for evaluation there; it cannot be flown."""
         return replace(
             self,
             angles=self.angles[rows],
@@ -190,16 +190,16 @@ class FlightPlan(Shown):
 
     @cached_property
     def mean_accelerations(self) -> Array:
-        """(steps, s, 6) of the surfaces against the fuselage over each step, in W, rad/s^2 and m/s^2.
+        """(steps, s, 6) of the surfaces relative to the fuselage over each step, in W, rad/s^2 and m/s^2.
 
-        Of the mean accelerations of the hinges, in the place that they have in the middle of the step.
+        From the mean accelerations of the hinges, at their position in the middle of the step.
         """
         mean = np.diff(self.rates, axis=0) / self.grid.step_s
         return surface_accelerations(self.aircraft, self.middle.angles, self.middle.rates, mean)
 
     @cached_property
     def surface_accelerations(self) -> Array:
-        """(steps + 1, s, 6) of the surfaces against the fuselage at the grid times, in W."""
+        """(steps + 1, s, 6) of the surfaces relative to the fuselage at the grid times, in W."""
         return surface_accelerations(self.aircraft, self.angles, self.rates, self.accelerations)
 
     def at_rest(self) -> FlightPlan:
@@ -227,7 +227,7 @@ def flight_plan(
     """Prepare a flight: one schedule for each of the aircraft's hinges.
 
     With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
-    plan is one for half of it: ``plan.flown(model)`` is what flies it, if both wings have the same
+    plan is for half of it: ``plan.flown(model)`` is the model to fly, provided that both wings have the same
     parameters.
     """
     times = grid.halves_s
@@ -248,7 +248,7 @@ class _Motion:
     accelerations: Array
 
     def columns(self, chosen: Sequence[int]) -> _Motion:
-        """Of some of the hinges."""
+        """The motion of some of the hinges."""
         kept = list(chosen)
         return _Motion(self.angles[:, kept], self.rates[:, kept], self.accelerations[:, kept])
 
@@ -263,14 +263,14 @@ def _motion(schedules: Sequence[Schedule], times: Array) -> _Motion:
 
 @dataclass(frozen=True)
 class CommonPath:
-    """Some drives of an aircraft at one angle: the lattice over a range of it, for schedules within it.
+    """Some drives of an aircraft at a common angle: the lattice over a range of it, for schedules within it.
 
-    Plans of different schedules share its nodes, so that another one costs no lattice; models that differ in
-    their links alone may share them too.
+    Plans of different schedules share its nodes, so that a further schedule needs no new lattice; models that
+    differ only in their links may share them too.
 
     low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
-    hinges' own angles. matrices, strips : as of ``OperatorTable``, at equal distances over it. halved : as of
-    ``FlightPlan``.
+    hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
+    as in ``FlightPlan``.
     """
 
     low_rad: float
@@ -281,11 +281,11 @@ class CommonPath:
     halved: bool
 
     def flown(self, model: ChainModel) -> ChainModel:
-        """What flies the plans: the model, or one half of it."""
+        """The model that flies the plans: the given one, or one half of it."""
         return _flown(model, halved=self.halved)
 
     def moves(self, hinge: Hinge) -> bool:
-        """Whether a hinge is one of those that move."""
+        """Whether a hinge moves."""
         return _moves(hinge, self.drives)
 
     def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
@@ -320,9 +320,9 @@ def common_path(
     drives: Sequence[str] | None = None,
     may_halve: bool = False,
 ) -> CommonPath:
-    """Tabulate the lattice for some drives alike between two angles, the others at their held angles.
+    """Tabulate the lattice for some drives together between two angles, the others at their held angles.
 
-    drives : names; None: all. may_halve : as of ``flight_plan``.
+    drives : names; None: all. may_halve : as in ``flight_plan``.
     """
     chosen = None if drives is None else tuple(drives)
     path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
@@ -343,7 +343,7 @@ def common_path(
 
 
 def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
-    """Angles (k, h) of all hinges where some drives (None: all) are at angles (k,), rad, and others hold."""
+    """Angles (k, h) of all hinges when some drives (None: all) are at angles (k,), rad, and others hold."""
     angles = np.empty((angle_rad.size, len(aircraft.hinges)))
     for column, hinge in enumerate(aircraft.hinges):
         angles[:, column] = angle_rad if _moves(hinge, drives) else hinge.angle_rad
@@ -351,7 +351,7 @@ def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Arr
 
 
 def path_schedules(aircraft: Aircraft, drives: Sequence[str] | None, schedule: Schedule) -> list[Schedule]:
-    """A schedule for each hinge: that of the drives which move (None: all), of others their held angle."""
+    """A schedule for each hinge: the given one for the moving drives (None: all), a held angle for others."""
     return [schedule if _moves(hinge, drives) else Hold(hinge.angle_rad) for hinge in aircraft.hinges]
 
 
@@ -371,7 +371,7 @@ def _plan(
     table: OperatorTable,
     wind_N: Array | None = None,
 ) -> FlightPlan:
-    """A plan of a motion, table and wind at the grid's times and middles in turn."""
+    """A plan from a motion, a table and wind at the grid's times and middles in alternation."""
     hinges = surface_rows(model.aircraft, motion.angles, motion.rates)
     if wind_N is None:
         wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
@@ -399,7 +399,7 @@ def _plan(
 
 
 def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
-    """The half of an aircraft that does what the other one does, and its motion; all if there is none."""
+    """One half of an aircraft whose halves move alike, and its motion; the whole if they do not."""
     mirror, half = model.mirror, model.half
     if mirror is None or half is None:
         return model, motion
@@ -410,7 +410,7 @@ def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
 
 
 def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
-    """Rows of the surfaces' motion for the kernels from that of all hinges (k, h), (k, s, HINGE_ROWS).
+    """Rows (k, s, HINGE_ROWS) of the surfaces' motion for the kernels, from that of all hinges (k, h).
 
     See multibody/kernels/hinge.py.
     """
@@ -426,7 +426,7 @@ def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
 
 
 def surface_accelerations(aircraft: Aircraft, angles: Array, rates: Array, accelerations: Array) -> Array:
-    """Time derivative of the surfaces' twist against the fuselage from the hinges' motion, (k, s, 6)."""
+    """Time derivative (k, s, 6) of the surfaces' twist relative to the fuselage, from the hinges' motion."""
     return np.stack(
         [
             relative_motion(
@@ -439,7 +439,7 @@ def surface_accelerations(aircraft: Aircraft, angles: Array, rates: Array, accel
 
 
 def _nodes(length_rad: float, spacing_rad: float) -> int:
-    """Nodes of a lattice table over a path: a cubic needs four."""
+    """Number of nodes of a lattice table over a path: a cubic needs four."""
     return max(4, int(np.ceil(length_rad / spacing_rad)) + 1)
 
 
@@ -459,7 +459,8 @@ def _operator_table(model: ChainModel, angles: Array, spacing: float) -> Operato
     else:
         count = _nodes(travelled[-1], spacing)
         nodes = np.linspace(0.0, travelled[-1], count)
-        # strictly rising abscissae for the inverse: a held shape has the same path length for many times
+        # strictly rising abscissae for the inverse: while a shape is held, many times have the same path
+        # length
         moving = np.concatenate([[True], np.diff(travelled) > 0])
         rows = np.stack([np.interp(nodes, travelled[moving], column[moving]) for column in angles.T], axis=1)
         operators = [operator(row) for row in rows]

@@ -1,4 +1,4 @@
-"""What every model reports of a flight, and the trajectory made of it."""
+"""The record of a flight that every model returns, and the trajectory made from it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from morphcore.simulate.trim import Trim
 
 Array = NDArray[np.float64]
 
-LARGEST_SPEED_RATIO = 10.0  # of the airspeed at the start: no glide gets there
+LARGEST_SPEED_RATIO = 10.0  # multiple of the airspeed at the start that no glide reaches
 
 
-Part = Literal["twist", "loads"]  # of a record: what models leave out unless it is requested
+Part = Literal["twist", "loads"]  # parts of a record that models omit unless requested
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Loads:
 
     velocity_rate_B : (k, 3) time derivative of the components in B of the reference point's velocity, m/s^2.
     hinge_torque : (k, s) of the motors along the hinges' positive coordinates, N m, 0 without a hinge; None
-    of the flexible model.
+    for the flexible model.
     """
 
     velocity_rate_B: Array
@@ -40,8 +40,8 @@ class FlightRecord:
 
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
     point; wind_N : (k, 3) m/s of the air there; angles : (k, h) of all hinges, rad; tips_z : (k, s) tips
-    below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the tips against their
-    roots, nose up, rad, and loads : both None unless requested (`Part`).
+    below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the tips relative to
+    their roots, nose up, rad, and loads : both None unless requested (`Part`).
     """
 
     euler: Array
@@ -59,13 +59,13 @@ class FlightRecord:
 def require_sound(
     history: Array, velocity: Array, flight: Flight, times: Array, within: NDArray[np.bool_] | None = None
 ) -> None:
-    """Check a flight (k times): all of its history (k, rows) finite, no speed absurd, all times ``within``.
+    """Check a flight (k times): history (k, rows) finite, speeds plausible, all times ``within`` the domain.
 
-    velocity : (k, 3) m/s. within : (k,) what the model itself can tell of its domain.
+    velocity : (k, 3) m/s. within : (k,) whether the model's own conditions hold.
 
     Raises
     ------
-    FlightDiverged : with the last sound time.
+    FlightDiverged : with the last valid time.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.sqrt(np.sum(velocity**2, axis=1))
@@ -79,9 +79,9 @@ def require_sound(
 def recorded_trajectory(
     aircraft: Aircraft, times: Array, record: FlightRecord, extra: dict[str, Array]
 ) -> Trajectory:
-    """The trajectory: the angles of all drives and some further columns."""
+    """The trajectory with the angles of all drives and some further columns."""
     drives: dict[str, Array] = {}
-    for column, hinge in enumerate(aircraft.hinges):  # all hinges of a drive turn alike
+    for column, hinge in enumerate(aircraft.hinges):  # all hinges of a drive turn together
         drives.setdefault(hinge.drive, record.angles[:, column].copy())
     phi, theta, psi = record.euler.T.copy()
     trajectory = Trajectory(
@@ -92,6 +92,7 @@ def recorded_trajectory(
         theta=theta,
         psi=psi,
         extra=extra,
+        channels=extra,
     )
     for values in (times, phi, theta, psi, *drives.values()):
         values.setflags(write=False)

@@ -1,7 +1,7 @@
-"""One flight as a request document asks for it: what flies, through which schedules, in which air.
+"""One flight described by a request document: the model, the schedules and the air.
 
-The run is an iterator of steps, so that a caller can show progress and stop; the result is a document with
-the trim, the trajectory, a summary and the time that it took.
+The run is an iterator of steps, so that a caller can show progress and stop it; the result is a document with
+the trim, the trajectory, a summary and the computing time.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ Document = dict[str, Any]
 Clock = Callable[[], float]
 
 ANGLES = ("phi", "theta", "psi")
-VARIATION_STEP_S = 0.01  # the variation is a sum over samples so far apart
+VARIATION_STEP_S = 0.01  # spacing of the samples over which the variation is summed
 
 
 @dataclass(frozen=True)
 class SimulationStep:
-    """How far a flight has come, 0..1, and a sentence to show."""
+    """Progress of a flight, 0..1, and a message to show."""
 
     fraction: float
     message: str
@@ -46,7 +46,7 @@ class SimulationStep:
 
 @dataclass(frozen=True, repr=False)
 class SimulationResult(Shown):
-    """A flown flight and what it cost: wall time of trim, preparation and flight together, s."""
+    """A flown flight and its cost: total wall time of trim, preparation and flight, s."""
 
     model: FlightModel
     simulation: Simulation
@@ -88,21 +88,21 @@ class SimulationRun:
     Parameters
     ----------
     request : SimulateRequest
-        What flies, through which schedules, in which air.
+        The model, the schedules and the air.
     clock : callable
-        Gives the time, s.
+        Returns the time, s.
 
     Raises
     ------
     InvalidInput
-        The model is named by the id that it has in a service.
+        The model is given by an id, which only a service can resolve.
     """
 
     def __init__(self, request: SimulateRequest, clock: Clock = time.perf_counter) -> None:
         model = request.model
         if isinstance(model, KnownModel) and model.known is None:
             raise InvalidInput(
-                "only a service knows a model by its id",
+                "a model id can only be resolved by the service",
                 pointer="/model/model_id",
                 hint="give the model's parameters instead",
             )
@@ -111,19 +111,19 @@ class SimulationRun:
         self._flown: SimulationResult | None = None
 
     def steps(self, stop: Stop | None = None) -> Iterator[SimulationStep]:
-        """Fly; several steps a second.
+        """Fly, with several steps a second.
 
         Parameters
         ----------
         stop : callable, optional
-            Asked between them; True raises Interrupted.
+            Called between steps; True raises Interrupted.
 
         Raises
         ------
         InvalidInput
             A schedule leaves its hinge's range between the angles that it names.
         TrimNotFound, FlightDiverged
-            As of `simulate`.
+            As in `simulate`.
         """
         request, model, air = self.request, self.request.model, self.request.environment
         flown = flown_with(model)
@@ -137,7 +137,7 @@ class SimulationRun:
             elements=model.elements if isinstance(model, FlexibleModel) else DEFAULT_ELEMENTS,
             channels=request.channels, stop=stop,
         ):  # fmt: skip
-            wall_s += self.clock() - begin  # without what the caller does between two steps
+            wall_s += self.clock() - begin  # excludes the caller's work between two steps
             if step.simulation is not None:
                 self._flown = SimulationResult(model, step.simulation, wall_s)
             flown_s = step.fraction * request.duration_s
@@ -161,12 +161,12 @@ class SimulationRun:
 
 
 def simulation_from_document(document: Document, threads: int | None = None) -> SimulationRun:
-    """Return the flight that a request document (the body of ``POST /simulate``) asks for.
+    """Return the flight described by a request document, the body of ``POST /simulate``.
 
     Raises
     ------
     InvalidInput
-        Naming every fault.
+        Lists every fault.
     """
     if threads is not None:
         use_threads(threads)
@@ -188,16 +188,16 @@ def model_document(model: FlightModel, step_s: float) -> Document:
 
 
 def attitude_variation(trajectory: Trajectory) -> float:
-    """Sum over samples 10 ms apart of the squared departures of the Euler angles from their start, rad^2.
+    """Sum over samples 10 ms apart of the squared departures of the Euler angles from the start, rad^2.
 
-    Rows at other (even) distances count for as long as they last.
+    Rows at another (even) spacing are weighted by their duration.
     """
     step_s = trajectory.duration_s / (trajectory.time_s.size - 1)
     return float(np.sum(_departure(trajectory) ** 2) * step_s / VARIATION_STEP_S)
 
 
 def _departure(trajectory: Trajectory) -> Array:
-    """Departure of the Euler angles from their start, (k, 3) rad; full turns count."""
+    """Departure of the Euler angles from the start, (k, 3) rad, unwrapped."""
     return np.asarray(np.unwrap(trajectory.euler, axis=0) - trajectory.euler[0])
 
 

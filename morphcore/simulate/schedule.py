@@ -77,7 +77,7 @@ class ConstantRate:
         steepness = rate / self.ramp_s if self.ramp_s > 0 else 0.0
 
         def ramped(begin: float) -> tuple[Array, Array, Array]:
-            """A rate that rises from 0 to ``rate`` over one ramp and stays."""
+            """A rate that rises from 0 to ``rate`` over one ramp and stays constant."""
             s = np.maximum(t - begin, 0.0)
             rising = s < self.ramp_s
             angle = np.where(rising, 0.5 * steepness * s**2, rate * (s - self.ramp_s / 2))
@@ -101,7 +101,7 @@ class Quadratic:
     start_s: float = 0.0
 
     def motion(self, time_s: ArrayLike) -> HingeMotion:
-        """The motion; the rate falls to zero at once at the end."""
+        """The motion; the rate drops to zero abruptly at the end."""
         t = np.asarray(time_s, dtype=np.float64) - self.start_s
         inside = (t >= 0) & (t < self.duration_s)
         s = np.clip(t / self.duration_s, 0.0, 1.0)
@@ -130,7 +130,7 @@ class Spline:
 
 @dataclass(frozen=True)
 class Tabulated:
-    """A measured history, interpolated differentiably and without overshoot beside flat parts.
+    """A measured history, interpolated differentiably and without overshoot next to flat parts.
 
     Akima (1970), with the weights of makima: exact where the rate is constant, and local, so that
     the corner of a ramp does not ring through the history as it would in a cubic spline. (Where the rate
@@ -155,7 +155,7 @@ class Tabulated:
 
 
 def scheduled(document: documents.AnySchedule) -> Schedule:
-    """Return the motion that a document describes."""
+    """Return the schedule that a document describes."""
     if isinstance(document, documents.Hold):
         return Hold(document.angle_rad)
     if isinstance(document, documents.ConstantRate):

@@ -1,4 +1,4 @@
-"""The longest time step that holds a tolerance on given flights: a model is flown with each and its half."""
+"""The longest time step that meets a tolerance on given flights; each candidate and its half are flown."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 
 CANDIDATES_S = (0.01, 0.005, 0.0025)
 TOLERANCE_RAD = (
-    5e-5  # half of what is asked: parameter sets of a search are stiffer and softer than the guess
+    5e-5  # half of the requirement: parameter sets of a search are stiffer or softer than the guess
 )
-LOOKED_AT_S = 60.0  # of a flight: an hour's in the finest steps would not fit into memory
-HALVED = 4.0 / 3.0  # of the difference between a step and its half: the error of a step of second order
+LOOKED_AT_S = 60.0  # longest part of a flight: an hour in the finest steps would not fit into memory
+HALVED = 4.0 / 3.0  # error of a second-order step relative to the difference between a step and its half
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class StepChoice:
     """A chosen step.
 
     step_s : s. error_rad : estimated error of the attitude with it, rad; infinite if the flight diverged.
-    holds : whether that is within the tolerance (else the step is the shortest candidate).
+    holds : whether the error is within the tolerance (otherwise the step is the shortest candidate).
     """
 
     step_s: float
@@ -52,22 +52,22 @@ def choose_step(
     tolerance_rad: float = TOLERANCE_RAD,
     stop: Stop | None = None,
 ) -> StepChoice:
-    """The longest candidate step whose attitude error is within a tolerance on all flights.
+    """Return the longest candidate step whose attitude error is within a tolerance on all flights.
 
-    The error is 4/3 of the largest difference to half the step (Hairer, Norsett & Wanner 1993, section II.4,
-    order two). The same arguments give the same step: nothing is timed.
+    The error is 4/3 of the largest difference from the flight with half the step (Hairer, Norsett & Wanner
+    1993, section II.4, order two). The choice is deterministic: nothing is timed.
 
     Parameters
     ----------
-    flights : the schedules of all hinges and the (k,) output times, s, of each flight.
-    batch : the one parameter set to fly; None: the physical guess.
-    air_velocity_N : wind at some times; it must not depend on which times are asked for together.
-    may_halve : as of ``flight_plan``; the parameter set must then be alike on both sides.
-    candidates_s : falling, each half of the one before.
+    flights : for each flight, the schedules of all hinges and the (k,) output times, s.
+    batch : the parameter set to fly, only one; None: the physical guess.
+    air_velocity_N : wind at given times; it must not depend on which times are requested together.
+    may_halve : as in ``flight_plan``; the parameter set must then be the same on both sides.
+    candidates_s : in descending order, each half of the previous one.
 
     Raises
     ------
-    TrimNotFound : the model has no trim. Interrupted : ``stop`` said so.
+    TrimNotFound : the model has no trim. Interrupted : ``stop`` returned True.
     """
     batch = physical_guess(model) if batch is None else batch
 
@@ -86,18 +86,18 @@ def choose_step(
             say(f"choosing the time step: {1e3 * step_s:g} ms, flight {number} of {len(tried)}")
             error = max(error, flight.error(step_s))
             if not error <= tolerance_rad:
-                break  # one flight that asks for less is enough
+                break  # one flight that needs a shorter step is enough
         if error <= tolerance_rad:
             return StepChoice(step_s, error, holds=True)
     return StepChoice(float(candidates_s[-1]), error, holds=False)
 
 
 def busiest_part(schedules: Sequence[Schedule], times_s: ArrayLike, longest_s: float = LOOKED_AT_S) -> Array:
-    """The output times that `choose_step` should look at: of a long flight those around its fastest morph.
+    """The output times that `choose_step` should use: for a long flight, those around its fastest morph.
 
     Parameters
     ----------
-    schedules : of the hinges. times_s : (k,), evenly spaced. longest_s : of the part, s.
+    schedules : of the hinges. times_s : (k,), evenly spaced. longest_s : longest duration of the part, s.
     """
     times = np.asarray(times_s, dtype=np.float64)
     rows = max(int(longest_s / (times[1] - times[0]) + 1e-9), 2)
@@ -111,7 +111,7 @@ def busiest_part(schedules: Sequence[Schedule], times_s: ArrayLike, longest_s: f
 
 @dataclass
 class _Tried:
-    """One flight with several steps: its lattice is tabulated once and its trim found once."""
+    """One flight with several steps, whose lattice is tabulated once and whose trim is found once."""
 
     model: ChainModel
     batch: ParameterBatch
@@ -141,8 +141,7 @@ class _Tried:
         """Euler angles (steps + 1, 3) at the grid times."""
         if grid.steps not in self.known:
             halvings, rest = divmod(self.finest.grid.steps, grid.steps)
-            # rows so far apart that no candidate fits between them evenly: grids that are not each other's
-            # halves
+            # no candidate divides the spacing of the rows evenly: the grids are not halves of each other
             nested = rest == 0 and halvings.bit_count() == 1
             plan = self.finest.coarser(grid) if nested else self.plan(self.schedules, grid)
             self.known[grid.steps] = _attitudes(self.model, self.batch, plan, self.trimmed, self.stop)
@@ -164,7 +163,7 @@ def _attitudes(
 
 
 def _difference(coarse: Array, fine: Array) -> float:
-    """Largest difference of attitudes at the coarse grid's times, rad; infinite where a flight diverged."""
+    """Largest difference of attitudes at the coarse grid's times, rad; infinite if a flight diverged."""
     every = (fine.shape[0] - 1) // (coarse.shape[0] - 1)
     apart = np.abs(wrap_angle(coarse - fine[::every]))
     return float(apart.max()) if np.all(np.isfinite(apart)) else np.inf

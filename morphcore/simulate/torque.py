@@ -18,20 +18,20 @@ from morphcore.simulate.plan import FlightPlan
 Array = NDArray[np.float64]
 
 LAG_DECAYS = (L_SLOW_DECAY, L_FAST_DECAY)  # each before its weight
-CHUNK = 64  # instants: bounds the memory of the interpolated operators
+CHUNK = 64  # instants at a time: bounds the memory of the interpolated operators
 
 
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
     """Torque of the hinge motors at every grid time, (steps + 1, h), N m along the positive angles.
 
     Inverse dynamics of the wings with their own accelerations and air loads at that instant; the hinges'
-    accelerations are the schedule's (at its ends those of the morph, not of the rest beside it). Columns are
+    accelerations are the schedule's (at its ends those of the morph, not of the adjacent rest). Columns are
     those of ``plan.angles``: hinges of the model that the plan flies.
 
     Parameters
     ----------
-    constants : of the one parameter set that was flown, thrust included. states : (steps + 1, state_rows) all
-        rows of its state at the grid times.
+    constants : of the flown parameter set, thrust included. states : (steps + 1, state_rows) all rows of its
+    state at the grid times.
     """
     torque, _ = torques_and_rates(model, plan, constants, states)
     return torque
@@ -40,11 +40,11 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
 def torques_and_rates(
     model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array
 ) -> tuple[Array, Array]:
-    """Torque as of `hinge_torques`, and the time derivative of v_B by the equations of motion, (t, 3) m/s^2.
+    """Torque as in `hinge_torques`, and the time derivative (t, 3) of v_B by the equations of motion, m/s^2.
 
     Parameters
     ----------
-    plan : of which `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
+    plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
     states : (t, state_rows).
     """
     rows, columns = model.lattice.operator_shape
@@ -79,7 +79,7 @@ def torques_and_rates(
 
 
 def closing_half_a_step(model: ChainModel, rows: Array) -> Array:
-    """A block's constants (rows, width) whose lag weights are those of half the step they were laid out for.
+    """A block's constants (rows, width) with the lag weights changed to those of half the step.
 
     The lag states of a state stem from the stage in the middle of the step before (see kernels/step.py). With
     the decay e of half a step and the weight w = 1 - (1 - e^2) T / h of a whole one, that of a half is

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
 from morphdata.drives import without_side
+from morphdata.samplefiles.channel_columns import without_gaps
+from morphdata.samplefiles.declared import declared
 from morphdata.samplefiles.fault import said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import read_flight
@@ -31,25 +33,28 @@ class Trajectory(Shown):
     Attributes
     ----------
     name : str
-        Its name, unique among the samples of an identification.
+        Name, unique among the samples of an identification.
     time_s : ndarray, shape (k,)
-        Rising times, s.
+        Increasing times, s.
     drives : mapping of str to ndarray, shape (k,)
-        Angle of each drive that moves, rad, by its name (``sweep_left``), or by its word where both sides
-        move alike (``sweep``).
+        Angle of each moving drive, rad, by its name (``sweep_left``), or by its word if both sides move
+        together (``sweep``).
     phi, theta, psi : ndarray, shape (k,)
         Euler angles from N to B (z-y-x), rad.
     role : {"train", "held_out"}
-        Whether an identification fits it, or only reports it.
+        Whether an identification fits the flight or only reports it.
     weight : float
         Weight of its errors in a fit.
     extra : dict of str to ndarray, shape (k,)
         Other columns.
     of_file : bool
-        Whether ``drives`` are all columns of a file that could be drives, in which case those that the
-        aircraft does not have are left out.
+        Whether ``drives`` holds all columns of a file that could be drives; those that the aircraft does not
+        have are then ignored.
     unreadable : mapping of str to str
-        What is wrong with further columns, by their names.
+        What is wrong with further columns, by name.
+    channels : mapping of str to ndarray, shape (k,)
+        Measured channels by their columns (``p``, ``nz``, ``tip_z_right_wing``, as in
+        ``morphdata.channels``), SI units; NaN where a value is missing.
     """
 
     name: str
@@ -63,6 +68,7 @@ class Trajectory(Shown):
     extra: dict[str, Array] = field(default_factory=dict)
     of_file: bool = False
     unreadable: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sample: InlineSample) -> Trajectory:
@@ -76,6 +82,7 @@ class Trajectory(Shown):
             psi=_column(sample.psi_rad),
             role=sample.role,
             weight=sample.weight,
+            channels={name: _column(without_gaps(values)) for name, values in sample.channels.items()},
         )
 
     @property
@@ -90,12 +97,12 @@ class Trajectory(Shown):
 
     @property
     def sweep_left(self) -> Array:
-        """Angle (k,) of the first drive of the left side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the left side, rad; zeros if there is none."""
         return self._side("left")
 
     @property
     def sweep_right(self) -> Array:
-        """Angle (k,) of the first drive of the right side, rad; zeros where there is none."""
+        """Angle (k,) of the first drive of the right side, rad; zeros if there is none."""
         return self._side("right")
 
     def _side(self, side: str) -> Array:
@@ -106,19 +113,28 @@ class Trajectory(Shown):
 
     @property
     def drive_order(self) -> tuple[str, ...]:
-        """Names of the drives as tables and pictures have them: left before right of each word."""
+        """Names of the drives in the order of tables and figures: left before right for each word."""
         names = list(self.drives)
         words = list(dict.fromkeys(without_side(name) for name in names))
         return tuple(sorted(names, key=lambda name: (words.index(without_side(name)), name)))
 
 
-def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
+def load_trajectory(
+    path: str | Path,
+    *,
+    role: Role = "train",
+    earth: str = "NED",
+    body: str = "FRD",
+    quaternion: str | None = None,
+    columns: Mapping[str, str] | None = None,
+) -> Trajectory:
     """Read a CSV, JSON, Parquet or MATLAB file with the columns t, phi, theta, psi and those of drives.
 
-    The ending of its name tells the kind. A drive's column bears its name (``sweep_left``), or the word of
-    both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``); columns of numbers
-    beside the first ones land in ``extra`` as they are, and in ``drives``, in rad, if they could be drives.
-    Time that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
+    The file extension selects the format. The column of a drive is named after it (``sweep_left``), or after
+    the word of both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``). Other
+    columns of numbers are stored in ``extra`` as they are, in ``drives``, in rad, if they could be drives,
+    and in ``channels``, in SI units, if they are named like channels; only these may have empty cells. Time
+    that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
     object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
 
     Parameters
@@ -127,6 +143,16 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
         The file.
     role : {"train", "held_out"}
         Whether an identification fits the flight, or only reports it.
+    earth : {"NED", "ENU"}
+        Axes of the earth that the file means; attitude and channels are turned to NED.
+    body : {"FRD", "FLU"}
+        Axes of the body that the file means; attitude and channels are turned to FRD.
+    quaternion : {"wxyz", "xyzw"}, optional
+        Order of the attitude's quaternion in columns that are numbered, ``q0`` to ``q3``. The columns ``qw``,
+        ``qx``, ``qy``, ``qz`` need none. It turns vectors of the body into the earth's axes.
+    columns : mapping of str to str, optional
+        Titles of the file's columns by the names that they shall have, with scale and offset:
+        ``{"theta_deg": "PITCH", "sweep_left_deg": "servo_1*0.09-45"}``.
 
     Returns
     -------
@@ -137,7 +163,7 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     ------
     InvalidInput
         The file cannot be read, a column is missing or holds something that is not a finite number, time does
-        not increase, the flight is longer than 600 s, or an angle is no angle in rad.
+        not increase, the flight is longer than 600 s, an angle is no angle in rad, or a quaternion none.
 
     Examples
     --------
@@ -147,21 +173,22 @@ def load_trajectory(path: str | Path, *, role: Role = "train") -> Trajectory:
     (('sweep_left', 'sweep_right'), 1.74)
     """
     path = Path(path)
-    columns = read_flight(path)
+    read = read_flight(path, declared(earth, body, quaternion, columns))
     return Trajectory(
         name=path.stem,
-        time_s=_column(columns.values["t"]),
-        drives={name: _column(angles) for name, angles in columns.drives.items()},
-        **{name: _column(columns.values[name]) for name in ANGLES},  # type: ignore[arg-type]
+        time_s=_column(read.values["t"]),
+        drives={name: _column(angles) for name, angles in read.drives.items()},
+        **{name: _column(read.values[name]) for name in ANGLES},  # type: ignore[arg-type]
         role=role,
-        extra={title: _column(values) for title, values in columns.others.items()},
+        extra={title: _column(values) for title, values in read.others.items()},
         of_file=True,
-        unreadable={name: said_of(fault) for name, fault in columns.unreadable.items()},
+        unreadable={name: said_of(fault) for name, fault in read.unreadable.items()},
+        channels={name: _column(values) for name, values in read.channels.items()},
     )
 
 
 def require_flight(trajectory: Trajectory, pointer: str) -> None:
-    """Raise InvalidInput where a sample makes no sense, by the rules of `morphdata.samplefiles.flight`."""
+    """Raise InvalidInput if a sample violates the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in ANGLES}}
     columns |= trajectory.drives
     called = {name: INLINE.get(name, f"{name}_rad") for name in columns}

@@ -28,11 +28,11 @@ Array = NDArray[np.float64]
 StartMode = Literal["trim", "given"]
 
 MAX_ITERATIONS = 25
-FULL_STEPS = 2  # Newton steps with a Jacobian of their own; later ones reuse it
-ANGLE_TOLERANCE = 1e-11  # rad, of the last Newton step in angle of attack and joint angles
+FULL_STEPS = 2  # Newton steps that compute a Jacobian; later ones reuse it
+ANGLE_TOLERANCE = 1e-11  # rad, limit of the last Newton step in angle of attack and joint angles
 ANGLE_PROBE = 1e-6  # rad; balances truncation and round-off of a forward difference in double precision
 FORCE_PROBE = 1.0  # N and N m; these enter linearly
-LARGEST_STEP = 0.2  # rad in one Newton step: further, the linear model means nothing
+LARGEST_STEP = 0.2  # rad in one Newton step: beyond that the linear model is meaningless
 SLAB = 256  # particles at a time; bounds the memory of the Jacobian's probes
 
 
@@ -54,14 +54,14 @@ class Trim(Shown):
     residual: Array
 
     def require(self) -> Trim:
-        """Itself, if every parameter set is trimmed; else TrimNotFound."""
+        """Return itself if every parameter set is trimmed; otherwise raise TrimNotFound."""
         if not np.all(self.converged):
             raise TrimNotFound(residual=float(np.nanmax(self.residual)), iterations=MAX_ITERATIONS)
         return self
 
 
 def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: StartMode = "trim") -> Trim:
-    """Equilibrium at the plan's first hinge angles, the hinges held.
+    """Find the equilibrium at the plan's first hinge angles, with the hinges held.
 
     With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and
     across it, a constant moment, and the joint angles: the aircraft then flies straight and level. With
@@ -103,7 +103,7 @@ def _state(
     zero = np.zeros(particles)
     air_B = speed * np.stack([np.cos(alpha), zero, np.sin(alpha)], axis=1)
     quaternion = quaternion_from_euler(zero, alpha, zero + psi)
-    # level through the air: the wind carries the aircraft along
+    # level relative to the air: the wind carries the aircraft along
     wind_B = _to_body(quaternion, plan.wind_N[0])
     R_BL, _ = link_poses(model, batch, plan.hinges[0], q_joint)
     lag = np.zeros((particles, model.links, 3))
@@ -142,7 +142,7 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
     moved[1:, :free] = np.diag(probes)
 
     def unbalance(points: Array) -> Array:
-        """What must vanish, (particles, k, free), at points (particles, k, n + 6)."""
+        """Imbalance (particles, k, free) that must vanish, at points (particles, k, n + 6)."""
         repeated = np.repeat(np.arange(particles), points.shape[1])
         flat = points.reshape(-1, n + 6)
         lane_rows = rows[repeated]
@@ -163,20 +163,20 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
             probed = unbalance(x[:, None, :] + moved)
             jacobian = ((probed[:, 1:] - probed[:, :1]) / probes[:, None]).transpose(0, 2, 1)
             off = probed[:, 0]
-        # near the solution the Jacobian hardly changes, and costs as many flights as there are unknowns
+        # near the solution the Jacobian hardly changes, and it costs one evaluation per unknown
         else:
             off = unbalance(x[:, None, :])[:, 0]
         step = _solve(jacobian, -off)
         angles = np.abs(step[:, : n + 1]).max(axis=1)
         step *= np.minimum(1.0, LARGEST_STEP / np.maximum(angles, 1e-300))[:, None]
-        # each stops when it has arrived itself: its trim must not depend on who shares its slab
+        # each particle stops on its own: its trim must not depend on the others in its slab
         x[moving, :free] += np.where(np.isfinite(step), step, 0.0)[moving]
         residual[moving] = np.where(np.isfinite(angles), angles, np.inf)[moving]
         moving &= (residual >= ANGLE_TOLERANCE) & np.isfinite(residual)
         if not np.any(moving):
             break
     force_B, moment_B = _thrust(x, n, given)
-    # forward differences limit the last digits: what has nearly arrived is trimmed well enough
+    # forward differences limit the last digits: nearly converged is good enough
     return Trim(x[:, n], force_B, moment_B, x[:, :n], residual < 1e3 * ANGLE_TOLERANCE, residual)
 
 

@@ -1,7 +1,7 @@
-"""The operations, one descriptor each: to add one, write its module and name it here.
+"""The operations, one descriptor each: to add one, write its module and list it here.
 
-Its work begins in the function that the descriptor's ``begin`` names. Nothing else in the house has to
-change: calls, OpenAPI document, worker, command and page go by this list.
+Its work starts in the function named by the descriptor's ``begin``. Nothing else has to change: calls,
+OpenAPI document, worker, command and page are built from this list.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the house knows about an operation: one value, from which everything else about it is derived."""
+"""The descriptor of an operation, from which everything else about it is derived."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pydantic import BaseModel
 from morphdata.execution import Request
 
 Summary = dict[str, Any]
-Asked = TypeVar("Asked", bound=Request)
+RequestT = TypeVar("RequestT", bound=Request)
 
 
 @dataclass(frozen=True, slots=True)
-class Operation(Generic[Asked]):
+class Operation(Generic[RequestT]):
     """One kind of long work.
 
-    Routes, validation, OpenAPI document, the worker's registry, the command and the page's labels are made
+    Routes, validation, OpenAPI document, the worker's registry, the command and the page's labels are built
     from it.
 
     Attributes
@@ -26,30 +26,30 @@ class Operation(Generic[Asked]):
     name : str
         Name of the command and, after a slash, path of the call.
     noun : str
-        What a request asks for, with its article: "an identification".
+        What is requested, with its article: "an identification".
     title : str
-        What it does, a line.
+        One line on what it does.
     subject, help : str
         The same as a heading of the API's documentation, and as a sentence of the page's help.
     description : str
-        What a caller must know besides.
+        Further information for callers.
     request, result, cost_model : type
-        Models of what goes in, of what comes out, and of what it would cost.
+        Models of the request, the result and the estimated cost.
     cost : callable
-        ``cost(request)`` estimates what it would take before anything runs. Samples and models that the
-        request refers to are inline by then, here and in `summary`.
+        ``cost(request)`` estimates the cost before anything runs. Referenced samples and models are already
+        inline, here and in `summary`.
     summary : callable
-        ``summary(request)`` gives the few small facts that a listing of jobs shows.
+        ``summary(request)`` returns the facts shown in lists of jobs.
     begin : str
-        Where its work begins, ``package.module:function``; only workers import it.
+        The function that starts its work, ``package.module:function``; only workers import it.
     files : tuple of str
-        Names of the files that a job may leave, as shell patterns.
+        Names of the files that a job may produce, as shell patterns.
     deadline_s : callable
-        ``deadline_s(request)`` gives the time, s, after which a running job is ended; None leaves that to the
-        service.
+        ``deadline_s(request)`` returns the time, s, after which a running job is ended; None: the service's
+        default.
     model_in : callable
         ``model_in(result)`` finds the identified model in a result, as an object with its ``model`` and its
-        ``fit``; None where there is none.
+        ``fit``; None if there is none.
     """
 
     name: str
@@ -58,24 +58,24 @@ class Operation(Generic[Asked]):
     subject: str
     help: str
     description: str
-    request: type[Asked]
+    request: type[RequestT]
     result: type[BaseModel]
     cost_model: type[BaseModel]
-    cost: Callable[[Asked], BaseModel]
-    summary: Callable[[Asked], Summary]
+    cost: Callable[[RequestT], BaseModel]
+    summary: Callable[[RequestT], Summary]
     begin: str
     files: tuple[str, ...] = ("result.json",)
-    deadline_s: Callable[[Asked], float | None] = lambda _request: None
+    deadline_s: Callable[[RequestT], float | None] = lambda _request: None
     model_in: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda _result: None
 
 
 def after_budget(report_s: float) -> Callable[[Any], float | None]:
-    """Make the deadline of a search: its own time budget, and time to judge and draw what it found.
+    """Make the deadline of a search: its own time budget, plus time to evaluate and plot its result.
 
     Parameters
     ----------
     report_s : float
-        That time, s.
+        Additional time, s.
     """
 
     def deadline_s(request: Any) -> float | None:

@@ -1,4 +1,4 @@
-"""The operation ``export``, and what it would cost."""
+"""The operation ``export`` and its cost estimate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from morphdata.export import ExportCost, ExportRequest, ExportResult
 from morphdata.formats import FORMATS
 from morphdata.operations.descriptor import Operation
 
-TRIM_CORE_S = 1.0  # the lattice at the reference shape, and its trim; to an order of magnitude
+TRIM_CORE_S = 1.0  # s for the lattice at the reference shape and its trim, to an order of magnitude
 
 
 def _summary(request: ExportRequest) -> dict[str, Any]:
@@ -26,8 +26,8 @@ EXPORT = Operation(
     help="Writes an identified model as a file for other programs.",
     noun="an export",
     title="Export an identified model as a file",
-    description="The file is an artifact of the job. `GET /models/{model_id}/export` makes this job of an "
-    "identified model and answers with the file.",
+    description="The file is an artifact of the job. `GET /models/{model_id}/export` creates this job for an "
+    "identified model and returns the file.",
     request=ExportRequest,
     result=ExportResult,
     cost_model=ExportCost,

@@ -1,4 +1,4 @@
-"""The operation ``identify``, and what it would cost."""
+"""The operation ``identify`` and its cost estimate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from morphdata.aircraft import Surface
-from morphdata.drives import SIDES, Hinge, drive_name
+from morphdata.drives import SIDES, Hinge, drive_name, resolved, shown_drives
 from morphdata.identifiable import corrections
 from morphdata.identify import (
     CostEstimate,
@@ -19,7 +19,7 @@ from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
 from morphdata.vehicle import paired_by_reflection
 
-# nominal figures, to an order of magnitude: what a request leaves out is the solver's choice
+# nominal figures, to an order of magnitude, for settings that a request leaves to the solver
 SWARM_PARTICLES = {"pso": 200, "cma": 32}
 PAPER_PARTICLES = 2500
 SWARM_GENERATIONS = {"pso": 100, "cma": 200}
@@ -28,7 +28,7 @@ DESCENT_ITERATIONS = 20
 DESCENT_TRIALS = 24
 REAL_TIME_FACTOR = 1000.0  # flights of three-link wings on one core; measured by `morphid bench`
 REFERENCE_LINKS = 3
-ASYMMETRIC_RAD = 0.01  # a sample is asymmetric whose sweeps differ, or that rolls or yaws, by more
+ASYMMETRIC_RAD = 0.01  # rad; a sample is asymmetric if its sweeps differ, or it rolls or yaws, by more
 REPORT_TIME_S = 120.0  # uncertainty, plots, writing
 
 
@@ -40,7 +40,7 @@ def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
     request : SamplesRequest
         With the rows of its samples.
     links : int, optional
-        Links per wing; those of the request when left out.
+        Links per wing; default: those of the request.
     """
     links = max(request.model.numbers_of_links()) if links is None else links
     samples = list(request.inline_samples().values())
@@ -61,7 +61,8 @@ def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
 def _parameter_count(request: SamplesRequest, links: int, training: Sequence[InlineSample]) -> int:
     """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections.
 
-    Every flexible surface has its own except mirror images; those of a pair always share the profile drag.
+    Every flexible surface has its own, except that mirror images may share theirs; a pair always shares the
+    profile drag.
     """
     model, surfaces = request.model, request.aircraft.surfaces
     groups = _mirror_groups(surfaces)
@@ -76,7 +77,7 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
 
 
 def _mirror_groups(surfaces: Sequence[Surface]) -> int:
-    """Count the flexible surfaces, mirror images once: a pair has equal values, mirrored."""
+    """Count the flexible surfaces, with mirror images counted once."""
     nameless = [_plainly(each) for each in surfaces if each.flexible]
     return len(paired_by_reflection(nameless, [_reflection(each) for each in nameless]))
 
@@ -90,7 +91,7 @@ def _reflection(surface: Surface) -> Surface:
 
 
 def _mirrored(hinge: Hinge, from_side: str, to_side: str) -> Hinge:
-    """Return a hinge's image on the other side: a rotation vector keeps its y and loses its signs."""
+    """Return a hinge's mirror image: a rotation vector keeps its y and changes the other signs."""
     x, y, z = hinge.axis_B(from_side)
     name = drive_name(hinge, from_side).removesuffix(f"_{from_side}") + f"_{to_side}"
     update = {"name": name, "axis": [-x, y, -z], "position_m": _across(hinge.position_m)}
@@ -98,7 +99,7 @@ def _mirrored(hinge: Hinge, from_side: str, to_side: str) -> Hinge:
 
 
 def _plainly(surface: Surface) -> Surface:
-    """Return a surface without its name, its hinges in one form: a list, with names and vectors."""
+    """Return a surface without its name, with its hinges in normal form: a list, with names and vectors."""
     hinges = [
         hinge.model_copy(
             update={"name": drive_name(hinge, surface.side), "axis": list(hinge.axis_B(surface.side))}
@@ -120,13 +121,13 @@ def _asymmetric(sample: InlineSample) -> bool:
 
 
 def _apart(drives: Mapping[str, Sequence[float]], key: str) -> float:
-    """Largest difference of a drive to that of the other side, rad; to rest where there is none."""
+    """Largest difference between a drive and that of the other side (or rest, if there is none), rad."""
     for side, other in (SIDES, SIDES[::-1]):
         if key.endswith(f"_{side}"):
             angles = drives[key]
             opposite = drives.get(f"{key.removesuffix(side)}{other}", [angles[0]] * len(angles))
             return max(abs(a - b) for a, b in zip(angles, opposite, strict=True))
-    return 0.0  # a word moves both sides
+    return 0.0  # a word moves both sides together
 
 
 def _parameter_sets(search: Search, parameters: int) -> int:
@@ -139,10 +140,13 @@ def _parameter_sets(search: Search, parameters: int) -> int:
 
 
 def samples_summary(request: SamplesRequest) -> dict[str, Any]:
-    """Give what a listing shows of a request with samples."""
+    """Return the summary of a request with samples for lists."""
+    drives = request.aircraft.drives
+    measured = (resolved(sample.drives, drives)[0] for sample in request.inline_samples().values())
     return {
         "aircraft": request.aircraft.name,
         "method": request.search.method,
+        "drives": shown_drives(name for moved in measured for name in moved),
         "samples": [
             {"name": sample.name, "role": sample.role, "rows": len(sample.time_s)}
             for sample in request.inline_samples().values()
@@ -169,7 +173,15 @@ IDENTIFY = Operation(
     cost=cost,
     summary=_summary,
     begin="worker.operations.identification:begin",
-    files=("result.json", "convergence.*", "attitude_*", "residuals_*", "curves_*.csv"),
+    files=(
+        "result.json",
+        "convergence.*",
+        "attitude_*",
+        "residuals_*",
+        "autocorrelation_*",
+        "intervals.*",
+        "curves_*.csv",
+    ),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,
 )

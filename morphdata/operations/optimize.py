@@ -1,15 +1,16 @@
-"""The operation ``optimize``, and what it would cost."""
+"""The operation ``optimize`` and its cost estimate."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from morphdata.drives import shown_drives
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.operations.simulate import STEP_CORE_S
 from morphdata.optimize import OptimizeRequest, OptimizeResult, ScheduleCost
 from morphdata.simulate import DEFAULT_STEP_S
 
-REAL_TIME_FACTOR = 150.0  # on one core: every flight has a schedule, and so a lattice over time, of its own
+REAL_TIME_FACTOR = 150.0  # s on one core: every flight has its own schedule, and so its own lattice over time
 COMPARED_SCHEDULES = 3  # constant rate and both optima
 REPORT_TIME_S = 1800.0  # flights of the flexible model, plots
 
@@ -33,13 +34,14 @@ def _summary(request: OptimizeRequest) -> dict[str, Any]:
         "method": request.search.method,
         "duration_s": request.morph.duration_s,
         "final_rad": request.morph.final_rad,
+        "drives": shown_drives(request.morph.moved(request.aircraft.drives)),
     }
 
 
 OPTIMIZE = Operation(
     name="optimize",
     subject="Morph schedules that disturb the attitude least.",
-    help="Searches the morph schedule that disturbs the attitude least.",
+    help="Finds the morph schedule that disturbs the attitude least.",
     noun="an optimisation",
     title="Find the morph schedule that disturbs the attitude least",
     description="The schedule found with the equivalent model is compared with the constant rate and with "

@@ -1,4 +1,4 @@
-"""The operation ``study``, and what it would cost."""
+"""The operation ``study`` and its cost estimate."""
 
 from __future__ import annotations
 

@@ -5,10 +5,23 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from morphdata.samplefiles.channel_columns import MAX_CHANNELS, channel_columns, without_gaps
+from morphdata.samplefiles.channel_titles import channel_meant
+from morphdata.samplefiles.declared import NOTHING, Declared
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.flight import MAX_ROWS, angle_fault, from_first_row
+from morphdata.samplefiles.frames import (
+    EULER,
+    HERE,
+    QUATERNION,
+    Frames,
+    channels_in_here,
+    euler_in_ned,
+    euler_of_quaternions,
+    quaternion_fault,
+)
 from morphdata.samplefiles.titles import (
     FLIGHT,
     SWEEPS,
@@ -33,20 +46,36 @@ class Wanted:
     names : the columns that are read strictly, and given in SI units.
     optional : those of them that may be missing.
     others : whether further columns of numbers are given too, as they are; those that could be drives are
-        given in any case, in rad.
+        given in any case, in rad, and so are those of channels, in SI units.
     max_rows : a longer file is refused.
+    declared : what the file's owner says about it.
     """
 
     names: tuple[str, ...] = FLIGHT
     optional: tuple[str, ...] = SWEEPS
     others: bool = False
     max_rows: int = MAX_ROWS
+    declared: Declared = NOTHING
+
+    def called(self, titles: Iterable[str]) -> list[str]:
+        """What columns are called by what was declared about them.
+
+        Raises
+        ------
+        FileFault : a declared column is missing.
+        """
+        listed = list(titles)
+        self.declared.require_found(listed)
+        return [self.declared.called(title) for title in listed]
 
     def further(self, titles: Iterable[str]) -> list[str]:
         """Which of the further columns are read."""
         if self.others:
             return [title for title in titles if title]
-        return _preferred([title for title in titles if drive_meant(title) is not None], MAX_DRIVES)
+        listed = list(titles)
+        drives = _preferred([title for title in listed if drive_meant(title) is not None], MAX_DRIVES)
+        channels = [title for title in listed if channel_meant(title) is not None][:MAX_CHANNELS]
+        return [title for title in listed if title in {*drives, *channels}]
 
     def too_many_rows(self) -> FileFault:
         """The fault of a file that is too long."""
@@ -67,7 +96,8 @@ class FlightColumns:
     others : further ones by their own titles, units as they are.
     lines : of a text file the line of each row, from 1; else empty.
     candidates : further ones that could be drives by the drive's name, rad.
-    unreadable : what is wrong with columns that could be drives as well, by the drive's name.
+    unreadable : what is wrong with columns that could be drives or are channels as well, by the name.
+    channels : further ones of channels by the channel's column, SI units; NaN where a value is missing.
     """
 
     values: dict[str, array[float]]
@@ -75,6 +105,7 @@ class FlightColumns:
     lines: Sequence[int] = ()
     candidates: dict[str, array[float]] = field(default_factory=dict)
     unreadable: dict[str, FileFault] = field(default_factory=dict)
+    channels: dict[str, array[float]] = field(default_factory=dict)
 
     @property
     def drives(self) -> dict[str, array[float]]:
@@ -108,6 +139,16 @@ def in_si(values: Numbers, factor: float | None, title: str) -> array[float]:
         row = next(number for number, value in enumerate(scaled) if not math.isfinite(value))
         raise not_finite(title, scaled[row], row)
     return scaled
+
+
+def further_column(values: Iterable[float | None], title: str) -> array[float]:
+    """A further column, units as they are; NaN in the gaps of a channel, which alone may have some.
+
+    Raises
+    ------
+    FileFault : naming the first row that is no finite number.
+    """
+    return without_gaps(values) if channel_meant(title) else in_si(values, 1.0, title)  # type: ignore[arg-type]
 
 
 def not_finite(title: str, value: object, row: int, line: int | None = None) -> FileFault:
@@ -146,14 +187,14 @@ def gathered(
     units: Mapping[str, float | FileFault] | None = None,
     faults: Mapping[str, FileFault] | None = None,
 ) -> FlightColumns:
-    """The columns that were read, with the further ones that could be drives.
+    """The columns that were read, with the further ones that could be drives or are channels.
 
     Parameters
     ----------
     wanted : what was asked for.
     titles : of all columns of the file but the wanted ones.
-    columns : those that were read; the further ones with units as they are.
-    units : of further columns, by title, where they stand apart from the title: factor to rad, or what is
+    columns : those that were read; the further ones with units as they are, and NaN in channels' gaps.
+    units : of further columns, by title, where they stand apart from the title: factor to SI, or what is
         wrong with them.
     faults : what is wrong with further columns that could not be read, by title.
 
@@ -167,6 +208,7 @@ def gathered(
     candidates: dict[str, array[float]] = {}
     kept = _preferred([name for name, (title, _) in meant.items() if title in columns.others], maximum)
     read = wanted.further(titles)
+    columns = in_declared_axes(_as_declared(columns, wanted.declared), wanted.declared.frames)
     for name, (title, factor) in meant.items():
         if title not in columns.others and title in read:
             unreadable[name] = (faults or {}).get(title) or _no_numbers(title)
@@ -177,19 +219,79 @@ def gathered(
                 "leave out the columns that are none",
             )
         else:
-            angles = in_si(columns.others[title], factor, title)
+            angles = _affine(in_si(columns.others[title], factor, title), wanted.declared.affine(name))
             fault = angle_fault(name, angles, shown(title))
             if fault is None:
                 candidates[name] = angles
             else:
                 unreadable[name] = fault
+    channels, broken = channel_columns(titles, columns.others, units or {}, faults or {})
+    channels = {name: _affine(values, wanted.declared.affine(name)) for name, values in channels.items()}
+    channels = channels_in_here(channels, wanted.declared.frames)
+    others = {title: values for title, values in columns.others.items() if _whole(title, values)}
     found = FlightColumns(
-        columns.values, columns.others if wanted.others else {}, columns.lines, candidates, unreadable
+        columns.values,
+        others if wanted.others else {},
+        columns.lines,
+        candidates,
+        unreadable | broken,
+        channels,
     )
     if not found.drives and wanted.optional:
         sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))
         raise next(sided, missing_columns(titles, wanted.names, wanted.optional))
     return found
+
+
+def _as_declared(columns: FlightColumns, declared: Declared) -> FlightColumns:
+    """The columns with declared scales and offsets in those that count."""
+    if not declared.columns:
+        return columns
+    values = {name: _affine(column, declared.affine(name)) for name, column in columns.values.items()}
+    return replace(columns, values=values)
+
+
+def _affine(values: array[float], affine: tuple[float, float] | None) -> array[float]:
+    if affine is None:
+        return values
+    scale, offset = affine
+    return array("d", (scale * value + offset for value in values))
+
+
+def in_declared_axes(columns: FlightColumns, frames: Frames) -> FlightColumns:
+    """The columns with the attitude as Euler angles between NED and FRD.
+
+    Raises
+    ------
+    FileFault : naming the row of a quaternion that is none, or of a pitch angle that is none.
+    """
+    values = dict(columns.values)
+    quaternion = [values.pop(name) for name in QUATERNION if name in values]
+    if quaternion:
+        rows = list(zip(*quaternion, strict=True))
+        for row, components in enumerate(rows):
+            detail = quaternion_fault(components)
+            if detail is not None:
+                line = columns.lines[row] if len(columns.lines) else None
+                hint = "repair the row; a quaternion has four components whose squares add up to 1"
+                raise FileFault("no_rotation", detail, hint, row=row, line=line, title="qw")
+        values |= zip(EULER, euler_of_quaternions(rows, frames), strict=True)
+    elif frames != HERE and "theta" in values:
+        fault = angle_fault("theta", values["theta"], "theta")  # of other axes it is an angle as steep
+        if fault is not None:
+            raise fault
+        rows = list(zip(*(values[name] for name in EULER), strict=True))
+        values |= zip(EULER, euler_in_ned(rows, frames), strict=True)
+    return replace(columns, values={name: values[name] for name in sorted(values, key=_place)})
+
+
+def _place(name: str) -> int:
+    return FLIGHT.index(name) if name in FLIGHT else len(FLIGHT)
+
+
+def _whole(title: str, values: array[float]) -> bool:
+    """Whether a further column has a finite number in each row; only those of channels may have gaps."""
+    return channel_meant(title) is None or all(map(math.isfinite, values))
 
 
 def _meant(

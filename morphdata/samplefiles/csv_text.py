@@ -12,10 +12,14 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import BinaryIO
 
+from morphdata.channels import is_channel
 from morphdata.samplefiles.cells import Clock, Numbers
+from morphdata.samplefiles.channel_columns import is_gap
+from morphdata.samplefiles.channel_titles import channel_meant, channel_unit_factor, channel_units
 from morphdata.samplefiles.columns import FlightColumns, Wanted, gathered, not_finite
 from morphdata.samplefiles.comments import is_comment, is_octave, uncommented
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.frames import QUATERNION
 from morphdata.samplefiles.titles import chosen, drive_meant, known_units, meaning, unit_factor
 
 LONGEST_LINE = 64 * 1024  # characters; one endless line must not fill the memory
@@ -155,12 +159,14 @@ def _titled(line: str, wanted: Wanted) -> tuple[str, list[str], Found]:
     ------
     FileFault : no delimiter gives them; as of the one that gives most.
     """
+    names = (*wanted.names, *QUATERNION)
 
     def known(delimiter: str) -> int:
-        return sum(meaning(cell, wanted.names) is not None for cell in _cells(line, delimiter))
+        called = map(wanted.declared.called, _cells(line, delimiter))
+        return sum(meaning(cell, names) is not None for cell in called)
 
     delimiter = max(DELIMITERS, key=lambda mark: (known(mark), line.count(mark)))
-    cells = _cells(line, delimiter)
+    cells = wanted.called(_cells(line, delimiter))
     return delimiter, cells, chosen(cells, wanted.names, wanted.optional)
 
 
@@ -178,6 +184,7 @@ class _Column:
     numbers: Numbers = field(default_factory=Numbers)
     values: array[float] = field(default_factory=lambda: array("d"))
     fault: FileFault | None = None
+    may_have_gaps: bool = False
 
 
 class _Table:
@@ -194,7 +201,7 @@ class _Table:
         further = [title for position, title in enumerate(titles) if position not in taken]
         read = set(wanted.further(further))
         self._others = [
-            _Column(position, title)
+            _Column(position, title, may_have_gaps=channel_meant(title) is not None)
             for position, title in enumerate(titles)
             if position not in taken and title in read
         ]
@@ -232,7 +239,7 @@ class _Table:
             raise _no_rows()
         self._numbers.require_decimals()
         columns = FlightColumns(
-            values={name: self._columns[name].values for name in self._wanted.names if name in self._columns},
+            values={name: column.values for name, column in self._columns.items()},
             others={column.title: column.values for column in self._sound if self._is_read_right(column)},
             lines=self._lines,
         )
@@ -281,8 +288,9 @@ class _Table:
             column.factor = factor
         for column in self._others:
             cell = row[column.position].strip()
-            if cell.strip("-") and (meant := drive_meant(column.title)) is not None:
-                self._units[column.title] = _unit_of_drive(*meant, cell, column.title, line)
+            meant = drive_meant(column.title) or channel_meant(column.title)
+            if cell.strip("-") and meant is not None:
+                self._units[column.title] = _further_unit(*meant, cell, column.title, line)
 
     def _uneven(self, row: Sequence[str], line: int) -> FileFault:
         hint = "every row must be as long as the title line"
@@ -316,15 +324,17 @@ def _is_no_number(cell: str) -> bool:
     return cell.strip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none")
 
 
-def _unit_of_drive(name: str, factor: float | None, cell: str, title: str, line: int) -> float | FileFault:
-    """The factor to rad that a row of units gives for a column which could be a drive, or what is wrong."""
-    given = unit_factor(name, cell)
+def _further_unit(name: str, factor: float | None, cell: str, title: str, line: int) -> float | FileFault:
+    """The factor to SI that a row of units gives for a drive's or a channel's column, or what is wrong."""
+    channel = is_channel(name)
+    given = channel_unit_factor(name, cell) if channel else unit_factor(name, cell)
     if given is None or factor not in (None, given):
         said = "is not supported" if given is None else "differs from that in its title"
+        known = channel_units(name) if channel else known_units(name)
         return FileFault(
             "unknown_unit" if given is None else "two_units",
             f"the unit {shown(cell)!r} of {shown(title)} {said}",
-            known_units(name) if given is None else "say the unit once",
+            known if given is None else "say the unit once",
             line=line,
             title=title,
         )
@@ -339,6 +349,6 @@ def _append(column: _Column, row: Sequence[str], number: int, line: int) -> bool
         column.fault = fault
         return False
     column.values.append(value)
-    if not math.isfinite(value):
+    if not math.isfinite(value) and not (column.may_have_gaps and is_gap(row[column.position])):
         column.fault = not_finite(column.title, row[column.position].strip(), number, line)
     return column.fault is None

@@ -21,6 +21,11 @@ ROUND_OFF = 1e-6  # rad; of an angle written in few digits
 
 # a flight's columns as they are called inline in a JSON document
 INLINE = {"t": "time_s", **{name: f"{name}_rad" for name in FLIGHT if name != "t"}}
+SLOW_STEP_S = 0.5  # on average: nobody records a flight in which wings move so slowly
+MILLISECONDS_HINT = (
+    "its rows are {:.3g} s apart, which looks like milliseconds: give seconds, or name the unit in a file's "
+    "title (t_ms)"
+)
 TOO_LONG_HINT = f"cut it to at most {LONGEST_FLIGHT_S:g} s, or check that time is in seconds"
 
 
@@ -95,7 +100,9 @@ def _time_faults(times: Sequence[float]) -> Iterator[FileFault]:
             break
     duration_s = times[-1] - times[0]
     if duration_s > LONGEST_FLIGHT_S:
-        yield FileFault("too_long_a_flight", f"the flight takes {duration_s:g} s", TOO_LONG_HINT, title="t")
+        step_s = duration_s / (len(times) - 1)
+        hint = MILLISECONDS_HINT.format(step_s) if step_s > SLOW_STEP_S else TOO_LONG_HINT
+        yield FileFault("too_long_a_flight", f"the flight takes {duration_s:g} s", hint, title="t")
 
 
 def angle_fault(name: str, angles: Sequence[float], called: str) -> FileFault | None:

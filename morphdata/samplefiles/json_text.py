@@ -6,20 +6,25 @@ import json
 import math
 import sys
 from array import array
+from dataclasses import replace
 from typing import Any, BinaryIO
 
+from morphdata.faults import InvalidInput
 from morphdata.samplefiles.cells import Clock, Numbers
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.columns import (
     FlightColumns,
     Wanted,
     column_in_si,
     equally_long,
+    further_column,
     gathered,
-    in_si,
     not_finite,
 )
 from morphdata.samplefiles.comments import is_comment, is_octave
-from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.declared import NOTHING, declared
+from morphdata.samplefiles.fault import TITLES, FileFault, octave_text, shown
+from morphdata.samplefiles.frames import HERE
 from morphdata.samplefiles.titles import chosen
 
 HINT = 'give one object of lists: {"t": [0.0, 0.01], "sweep_left": [...], ...}'
@@ -35,6 +40,8 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     document = _parsed(stream.read())
     if not isinstance(document, dict):
         raise FileFault("not_an_object", "the JSON text is not an object", HINT)
+    wanted = _with_frames(document, wanted)
+    document = _as_called(document, wanted)
     titles = list(document)
     found = chosen(titles, wanted.names, wanted.optional)
     names = {name: titles[position] for name, (position, _) in found.items()}
@@ -63,6 +70,34 @@ def read_json(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     return gathered(wanted, further, columns, faults=faults)
 
 
+def _with_frames(document: dict[str, Any], wanted: Wanted) -> Wanted:
+    """What is wanted, in the axes that the document itself declares as an inline sample does."""
+    axes = document.get("frames")
+    if axes is None:
+        return wanted
+    try:
+        own = declared(**axes).frames
+    except (InvalidInput, TypeError, AttributeError) as error:
+        hint = 'give {"earth": "NED" or "ENU", "body": "FRD" or "FLU"}'
+        raise FileFault("unknown_frames", f"frames cannot be read: {shown(error)}", hint) from None
+    if wanted.declared.frames not in (HERE, own):
+        detail = "the axes in frames are not those that are declared for the file"
+        raise FileFault("two_frames", detail, "declare them once")
+    return replace(wanted, declared=replace(wanted.declared, frames=own))
+
+
+def _as_called(document: dict[str, Any], wanted: Wanted) -> dict[str, Any]:
+    """The document with its columns under the names that were declared."""
+    if wanted.declared == NOTHING:
+        return document
+    called = wanted.called(document)
+    twice = next((name for name in called if name and called.count(name) > 1), None)
+    if twice is not None:
+        detail = f"{shown(twice)} is given and declared, too"
+        raise FileFault("column_twice", detail, "keep one of them", title=TITLES)
+    return dict(zip(called, document.values(), strict=True))
+
+
 def _dates(items: list[Any], title: str) -> list[float]:
     """Times, s, of dates (ISO 8601), from the first one."""
     clock = Clock(1.0, Numbers())
@@ -79,10 +114,11 @@ def _column_of_numbers(title: str, items: list[Any], rows: int) -> array[float]:
     if len(items) != rows:
         detail = f"{shown(title)} has {len(items)} rows, time has {rows}"
         raise FileFault("unequal_lengths", detail, "give equal lengths", title=title)
+    gaps = channel_meant(title) is not None
     for row, item in enumerate(items):
-        if not _is_number(item):
+        if not _is_number(item) and not (gaps and item is None):
             raise not_finite(title, item, row)
-    return in_si(items, 1.0, title)
+    return further_column(items, title)
 
 
 def _is_number(item: object) -> bool:

@@ -6,9 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, equally_long, gathered, in_si
+from morphdata.samplefiles.columns import (
+    FlightColumns,
+    Wanted,
+    column_in_si,
+    equally_long,
+    further_column,
+    gathered,
+)
 from morphdata.samplefiles.comments import is_octave
 from morphdata.samplefiles.fault import FileFault, octave_text, shown
+from morphdata.samplefiles.frames import QUATERNION
 from morphdata.samplefiles.titles import MAX_COLUMNS, chosen, meaning
 
 NUMBERS = frozenset(
@@ -82,7 +90,7 @@ def _contents(stream: BinaryIO) -> Contents:
     try:
         return {name or "": (shape, kind) for name, shape, kind in whosmat(stream)}  # type: ignore[arg-type]
     except TypeError:  # the size of MATLAB's own objects is unknown outside of MATLAB
-        raise _object_fault("") from None
+        raise object_fault("") from None
 
 
 def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns:
@@ -90,27 +98,41 @@ def _read(stream: BinaryIO, contents: Contents, wanted: Wanted) -> FlightColumns
         raise FileFault(
             "too_many_columns", f"the file has {len(contents)} variables", "keep only the six columns needed"
         )
-    if not any(meaning(name, wanted.names) for name in contents):
+    if not any(is_wanted(name, wanted) for name in contents):
         structs = [name for name, (_, kind) in contents.items() if kind == "struct"]
         if len(structs) == 1:
-            return _vectors(_fields(stream, structs[0], contents[structs[0]][0]), wanted)
-        _refuse_containers(contents, structs)
+            fields = _fields(stream, structs[0], contents[structs[0]][0])
+            return vectors(dict(zip(wanted.called(fields), fields.values(), strict=True)), wanted)
+        refuse_containers(contents, structs)
+    named = dict(zip(wanted.called(contents), contents, strict=True))  # ours -> the file's
+    names, others = chosen_vectors({name: contents[title] for name, title in named.items()}, wanted)
+    unread = [name for name in named if name not in names and name not in others]
+    loaded = _loaded(stream, [named[name] for name in (*names, *others)])
+    return vectors({name: loaded[named[name]] for name in (*names, *others)}, wanted, unread)
+
+
+def is_wanted(title: str, wanted: Wanted) -> bool:
+    """Whether a variable is a column that counts."""
+    return meaning(wanted.declared.called(title), (*wanted.names, *QUATERNION)) is not None
+
+
+def chosen_vectors(contents: Contents, wanted: Wanted) -> tuple[list[str], list[str]]:
+    """Variables that are columns which count, and further ones that are read, as long as those."""
     found = chosen(list(contents), wanted.names, wanted.optional)
     names = [list(contents)[position] for position, _ in found.values()]
     for name in names:
-        _require_vector(name, *contents[name], wanted)
-    length = max(contents[names[0]][0])
-    vectors = [
+        require_vector(name, *contents[name], wanted)
+    length = max(contents[names[0]][0], default=0)
+    alike = [
         name
         for name, (shape, kind) in contents.items()
         if name not in names and kind in NUMBERS and _is_vector(shape) and max(shape) == length
     ]
-    others = wanted.further(vectors)
-    unread = [name for name in contents if name not in names and name not in others]
-    return _vectors(_loaded(stream, [*names, *others]), wanted, unread)
+    return names, wanted.further(alike)
 
 
-def _refuse_containers(contents: Contents, structs: list[str]) -> None:
+def refuse_containers(contents: Contents, structs: list[str]) -> None:
+    """Raise FileFault where what is wanted stands in several structs, or in an object."""
     objects = [name for name, (_, kind) in contents.items() if kind in OBJECTS]
     if len(structs) > 1:
         listed = ", ".join(shown(name) for name in structs[:5])
@@ -118,10 +140,11 @@ def _refuse_containers(contents: Contents, structs: list[str]) -> None:
             "several_structs", f"the file holds several structs: {listed}", "save one flight a file"
         )
     if objects:
-        raise _object_fault(objects[0])
+        raise object_fault(objects[0])
 
 
-def _object_fault(name: str) -> FileFault:
+def object_fault(name: str) -> FileFault:
+    """The fault of an object of MATLAB."""
     return FileFault(
         "matlab_object",
         f"{shown(name) or 'a variable'} is an object (timeseries, table, ...), which only MATLAB can read",
@@ -130,9 +153,10 @@ def _object_fault(name: str) -> FileFault:
     )
 
 
-def _require_vector(name: str, shape: tuple[int, ...], kind: str, wanted: Wanted) -> None:
+def require_vector(name: str, shape: tuple[int, ...], kind: str, wanted: Wanted) -> None:
+    """Raise FileFault where a variable is no vector of numbers that is short enough."""
     if kind in OBJECTS:
-        raise _object_fault(name)
+        raise object_fault(name)
     if kind not in NUMBERS:
         hint = "save it as a vector of doubles: theta = double(theta(:))"
         raise FileFault("not_numbers", f"{shown(name)} is of the class {shown(kind)}", hint, title=name)
@@ -162,12 +186,19 @@ def _fields(stream: BinaryIO, name: str, shape: tuple[int, ...]) -> dict[str, An
         raise FileFault("not_a_vector", f"{shown(name)} is a {size} array of structs", AS_STRUCT, title=name)
     struct = _loaded(stream, [name])[name]
     if struct.dtype.names is None:
-        raise _object_fault(name)
+        raise object_fault(name)
     record = struct[0, 0]
     return {field: record[field] for field in struct.dtype.names}
 
 
-def _vectors(arrays: Mapping[str, Any], wanted: Wanted, unread: Sequence[str] = ()) -> FlightColumns:
+def vectors(arrays: Mapping[str, Any], wanted: Wanted, unread: Sequence[str] = ()) -> FlightColumns:
+    """The flight that arrays hold, by the names of their columns.
+
+    Parameters
+    ----------
+    arrays : vectors of numpy.
+    unread : names of further variables, which were not read.
+    """
     titles = list(arrays)
     found = chosen(titles, wanted.names, wanted.optional)
     names = {name: titles[position] for name, (position, _) in found.items()}
@@ -175,7 +206,7 @@ def _vectors(arrays: Mapping[str, Any], wanted: Wanted, unread: Sequence[str] = 
     for name, title in names.items():
         item = arrays[title]
         kind = CLASSES.get(item.dtype.name, item.dtype.name) if hasattr(item, "ravel") else "sparse"
-        _require_vector(title, item.shape, kind, wanted)
+        require_vector(title, item.shape, kind, wanted)
         # Python's own numbers: whole ones of 64 bits are subtracted from each other exactly
         values[name] = column_in_si(name, item.ravel().tolist(), found[name][1], title)
     columns = equally_long(FlightColumns(values), names)
@@ -193,7 +224,7 @@ def _keep_numbers(columns: FlightColumns, arrays: Mapping[str, Any]) -> dict[str
     for title, item in arrays.items():
         if getattr(item, "size", 0) == rows and item.dtype.kind in "iuf":
             try:
-                columns.others[title] = in_si(item.ravel().astype(float), 1.0, title)
+                columns.others[title] = further_column(item.ravel().astype(float).tolist(), title)
             except FileFault as fault:
                 faults[title] = fault
     return faults

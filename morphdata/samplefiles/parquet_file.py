@@ -5,7 +5,14 @@ from __future__ import annotations
 from array import array
 from typing import Any, BinaryIO
 
-from morphdata.samplefiles.columns import FlightColumns, Wanted, column_in_si, gathered, in_si, not_finite
+from morphdata.samplefiles.columns import (
+    FlightColumns,
+    Wanted,
+    column_in_si,
+    further_column,
+    gathered,
+    not_finite,
+)
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.titles import MAX_COLUMNS, chosen
 
@@ -56,7 +63,8 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
         )
     schema = file.schema_arrow
     titles = list(schema.names)
-    found = chosen(titles, wanted.names, wanted.optional)
+    called = wanted.called(titles)
+    found = chosen(called, wanted.names, wanted.optional)
     requested = {titles[position]: name for name, (position, _) in found.items()}
     for title, name in requested.items():
         _require_numbers(schema.field(title).type, title, dates=name == "t")
@@ -65,7 +73,9 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
         for title in dict.fromkeys(titles)
         if title not in requested and titles.count(title) == 1 and _numeric(schema, title)
     ]
-    others = wanted.further(numeric)
+    names = dict(zip(titles, called, strict=True))
+    further_names = set(wanted.further(names[title] for title in numeric))
+    others = [title for title in numeric if names[title] in further_names]
     read, further = _decoded(file, list(requested), others, wanted)
     if not len(read[next(iter(requested))]):
         raise FileFault("no_rows", "the file holds no rows", "give rows of numbers")
@@ -77,10 +87,11 @@ def _read(file: Any, wanted: Wanted) -> FlightColumns:
     columns, faults = FlightColumns(values), {}
     for title, raw in further.items():
         try:
-            columns.others[title] = in_si(raw, 1.0, title)
+            columns.others[names[title]] = further_column(raw, names[title])
         except FileFault as fault:
-            faults[title] = fault
-    return gathered(wanted, [title for title in titles if title not in requested], columns, faults=faults)
+            faults[names[title]] = fault
+    rest = [names[title] for title in titles if title not in requested]
+    return gathered(wanted, rest, columns, faults=faults)
 
 
 def _decoded(

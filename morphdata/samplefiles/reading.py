@@ -9,6 +9,7 @@ from typing import Any, BinaryIO
 
 from morphdata.faults import InvalidInput
 from morphdata.samplefiles.columns import FlightColumns, Wanted
+from morphdata.samplefiles.declared import NOTHING, Declared
 from morphdata.samplefiles.fault import FileFault, shown
 from morphdata.samplefiles.flight import flight_faults
 from morphdata.samplefiles.titles import FLIGHT
@@ -52,7 +53,7 @@ def read_columns(stream: BinaryIO, kind: str, wanted: Wanted | None = None) -> F
     return columns
 
 
-def read_file(path: Path, names: Sequence[str] = FLIGHT) -> FlightColumns:
+def read_file(path: Path, names: Sequence[str] = FLIGHT, declared: Declared = NOTHING) -> FlightColumns:
     """Read the named columns of a file, what could be drives, and its further columns of numbers.
 
     Raises
@@ -64,7 +65,7 @@ def read_file(path: Path, names: Sequence[str] = FLIGHT) -> FlightColumns:
     try:
         kind = kind_of(path.suffix)
         with path.open("rb") as stream:
-            return read_columns(stream, kind, Wanted(names=tuple(names), others=True))
+            return read_columns(stream, kind, Wanted(names=tuple(names), others=True, declared=declared))
     except FileNotFoundError:
         raise InvalidInput(f"{path} does not exist", hint="check the path") from None
     except OSError as error:
@@ -79,15 +80,20 @@ def place_in(path: Path, columns: FlightColumns, row: int) -> str:
     return f"{path}, line {columns.lines[row]}" if len(columns.lines) else f"{path}, row {row}"
 
 
-def read_flight(path: Path) -> FlightColumns:
+def read_flight(path: Path, declared: Declared = NOTHING) -> FlightColumns:
     """Read a file that holds one flight, what could be its drives, and its further columns of numbers.
+
+    Parameters
+    ----------
+    path : of the file.
+    declared : what its owner says about it.
 
     Raises
     ------
     InvalidInput
         As of `read_file`; or time does not increase, the flight is too long, or an angle is not in rad.
     """
-    columns = read_file(path)
+    columns = read_file(path, declared=declared)
     for fault in flight_faults({**columns.values, **columns.drives}):
         place = str(path) if fault.row is None else place_in(path, columns, fault.row)
         raise InvalidInput(f"{place}: {fault.detail}", hint=fault.hint)

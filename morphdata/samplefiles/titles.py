@@ -2,42 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from morphdata.channels import is_channel
+from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
+from morphdata.samplefiles.frames import EULER, QUATERNION
+from morphdata.samplefiles.units import ANGLE_UNITS, TIME_UNITS, UNIT_IN_BRACKETS, plain, unit_pattern
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 SWEEPS = ("sweep_left", "sweep_right")
 ATTITUDE = ("t", "phi", "theta", "psi")  # without these there is no flight
 DRIVE = re.compile(r"[a-z][a-z0-9_]{0,45}")  # the name of a hinge, and its side
 MAX_COLUMNS = 1000  # a file of more is something else, or an attack
-LONGEST_TITLE = 200
+NUMBERED = re.compile(r"q_?\[?([0-3])\]?")  # q0, q_0, q[0]: of a quaternion in an order that nobody knows
 SYNONYMS = {"time": "t"}
-DEGREE = math.pi / 180.0
-TIME_UNITS = {  # -> s
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "μs", "usec", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 1e-9),
-}
-ANGLE_UNITS = {  # -> rad
-    **dict.fromkeys(("rad", "rads", "radian", "radians"), 1.0),
-    **dict.fromkeys(("mrad", "milliradian", "milliradians"), 1e-3),
-    # signs of degree, of ordinals (typed in its place) and of rings above
-    **dict.fromkeys(("deg", "degs", "degree", "degrees", "°", "º", "˚"), DEGREE),
-}
-_UNITS = "|".join(sorted((*TIME_UNITS, *ANGLE_UNITS), key=len, reverse=True))
 # the unit last, after a mark or in brackets: theta_deg, theta [deg], theta/deg, theta, deg, theta in deg
-UNIT = re.compile(rf"(?P<name>.+?)[_./,:;-]*(?:in_)?[\[({{<]?_*(?P<unit>{_UNITS})_*[\])}}>]?")
-BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
-
-
-def plain(text: str) -> str:
-    """A title or unit in small letters, its blanks as underscores."""
-    return re.sub(r"\s+", "_", text[:LONGEST_TITLE].strip().strip('"').strip().lower())
+UNIT = unit_pattern((*TIME_UNITS, *ANGLE_UNITS))
 
 
 def unit_factor(name: str, unit: str) -> float | None:
@@ -73,6 +55,8 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
     >>> drive_meant("Fold_left [deg]"), drive_meant("cant"), drive_meant("p_rad_s")
     (('fold_left', 0.017453292519943295), ('cant', None), None)
     """
+    if channel_meant(title) is not None:
+        return None
     whole = plain(title)
     factor = None
     match = UNIT.fullmatch(whole)
@@ -86,7 +70,7 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
 
 def drive_in_brackets(title: str) -> str | None:
     """The drive that a title could mean whose unit in brackets is none that is read; None for all others."""
-    match = BRACKETS.fullmatch(plain(title))
+    match = UNIT_IN_BRACKETS.fullmatch(plain(title))
     name = None if match is None else match["name"].rstrip("_")
     return name if name and _could_be_a_drive(name) else None
 
@@ -104,7 +88,7 @@ def chosen(
     Parameters
     ----------
     titles : of all columns.
-    names : the columns that are wanted.
+    names : the columns that are wanted; a quaternion may stand in the place of phi, theta, psi.
     optional : those of them that may be missing.
 
     Returns
@@ -122,8 +106,9 @@ def chosen(
             f"keep the {len(names)} that count: {', '.join(names)}",
         )
     found: dict[str, tuple[int, float | None]] = {}
+    attitude = set(ATTITUDE) <= set(names)
     for position, title in enumerate(titles):
-        meant = meaning(title, names)
+        meant = meaning(title, (*names, *QUATERNION) if attitude else names)
         if meant is None:
             continue
         name, factor = meant
@@ -136,10 +121,18 @@ def chosen(
                 title=TITLES,
             )
         found[name] = position, factor
-    missing = [name for name in names if name not in found and name not in optional]
+    left_out = _other_attitude(found) if attitude else ()
+    found = {name: column for name, column in found.items() if name not in left_out}
+    missing = [name for name in names if name not in {*found, *left_out, *optional}]
     if missing:
         raise missing_columns(titles, names, missing)
     return found
+
+
+def _other_attitude(found: Collection[str]) -> tuple[str, ...]:
+    """Which columns of attitude do not count: Euler angles come first, if they are complete."""
+    has_quaternion = all(name in found for name in QUATERNION)
+    return EULER if has_quaternion and not all(name in found for name in EULER) else QUATERNION
 
 
 def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> FileFault:
@@ -154,8 +147,14 @@ def missing_columns(titles: Sequence[str], names: Sequence[str], missing: Sequen
 
 def _way_out(titles: Sequence[str], names: Sequence[str], missing: Sequence[str]) -> str:
     """What to do about missing columns: where one stands there in a unit that is not read, that."""
+    numbered = [title for title in titles if NUMBERED.fullmatch(plain(title))]
+    if len(numbered) == len(QUATERNION) and set(EULER) & set(missing):
+        return (
+            f"{', '.join(map(shown, numbered))} may be a quaternion in the order w, x, y, z or x, y, z, w: "
+            "declare which (--quaternion wxyz), or name its columns qw, qx, qy, qz"
+        )
     for title in titles:
-        match = BRACKETS.fullmatch(plain(title))
+        match = UNIT_IN_BRACKETS.fullmatch(plain(title))
         if match and SYNONYMS.get(match["name"], match["name"]) in missing:
             return f"the unit of {shown(title)!r} is not read: {known_units(match['name'])}"
     drives = "; other drives of the aircraft by their names" if SWEEPS[0] in names else ""

@@ -20,7 +20,7 @@ COLUMNS = ("at UTC", "action", "outcome", "owner", "target", "address")
 @audit.command("ls")
 @reports_errors
 def list_entries(
-    owner: Annotated[str | None, typer.Option(help="Only deeds of this owner.")] = None,
+    owner: Annotated[str | None, typer.Option(help="Only actions of this owner.")] = None,
     action: Annotated[
         str | None, typer.Option(help="Only actions of this kind, such as auth.refused.")
     ] = None,
@@ -28,7 +28,7 @@ def list_entries(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """List the newest deeds: jobs posted, cancelled and deleted, keys made and refused."""
+    """List the newest actions: jobs posted, cancelled and deleted, keys made and refused."""
     from app.audit import repository
 
     with service_database(data_dir) as database, database.read() as session:

@@ -40,7 +40,9 @@ def bench(
             figures: dict[str, Any] = run_benchmarks(quick, samples_dir=samples, sections=only or None)
     except (Interrupted, KeyboardInterrupt):  # the second: pressed twice
         raise CommandError(
-            "stopped", code=Exit.INTERRUPTED, hint="no figures: they stand side by side"
+            "stopped",
+            code=Exit.INTERRUPTED,
+            hint="there are no figures yet: compared figures are measured in alternation",
         ) from None
     except MorphError as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None

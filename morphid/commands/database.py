@@ -23,7 +23,7 @@ database = typer.Typer(help="Migrate, back up and restore the database.", no_arg
 def upgrade_database(
     revision: Annotated[str, typer.Argument()] = "head", data_dir: options.DataDir = None
 ) -> None:
-    """Migrate the database up: MORPHID_DATABASE_URL's, else the one in the data directory."""
+    """Migrate the database up: that of MORPHID_DATABASE_URL, else the one in the data directory."""
     from app.database import upgrade
 
     migrate(upgrade, settings_for(data_dir=data_dir).database_url, revision)
@@ -48,7 +48,7 @@ def backup_database(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Copy the SQLite database to FILE while the service goes on."""
+    """Copy the SQLite database to FILE while the service keeps running."""
     from morphid.backup import backup
 
     _show("copied to", backup(settings_for(data_dir=data_dir).database_url, target), as_json=as_json)

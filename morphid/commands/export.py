@@ -1,4 +1,4 @@
-"""What ``morphid export`` has beside its request: the known model, and the written file."""
+"""Additions of ``morphid export`` to its request: the known model, and the written file."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def _fill(request: Request, values: Values) -> None:
 
 
 def _put_origin(request: Request, path: Path) -> None:
-    """Fill in how well the model fits its samples, where the file says so."""
+    """Fill in how well the model fits its samples, if the file contains it."""
     found = read_json(path)
     if "model" not in found:
         return
     option = f"--parameters {path}"
-    if "origin" in found:  # of an exported model
+    if "origin" in found:  # the file is an exported model
         request.put("/origin", found["origin"], option)
         return
     for name in ("fit", "verdict"):
@@ -50,7 +50,7 @@ def _save(answer: Answer, path: Path) -> None:
 
 
 def show_export(result: Mapping[str, Any]) -> None:
-    """Print what was written, for people."""
+    """Print a summary of the written file."""
     stdout().print(f"{result['format']} file of {result['size_bytes']} bytes, SHA-256 {result['sha256']}")
 
 

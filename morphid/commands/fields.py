@@ -1,6 +1,6 @@
-"""The options of a command out of the fields of its request: type, choices, default and help are the field's.
+"""Options of a command, built from the fields of its request: type, choices, default and help.
 
-What a value may be is judged by the request alone; the command line only reads it.
+Values are validated by the request only; the command line just parses them.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from morphdata.options import Option
 from morphid.exits import CommandError, Exit
 from morphid.files import read_json
 
-MAX_SHOWN = 10_000  # larger limits help nobody
+MAX_SHOWN = 10_000  # larger limits are not worth showing
 
 
 @dataclass(frozen=True)
 class FieldOption:
-    """An option of a command, and the field that it fills in.
+    """An option of a command, and the field that it sets.
 
     Parameters
     ----------
     pointer : JSON pointer of the field.
     flag : as the user writes it.
     parameter : of the command's function.
-    read : makes the field's value of what was given on the command line.
+    read : converts the text of the command line to the field's value.
     """
 
     pointer: str
@@ -45,9 +45,9 @@ class Form(NamedTuple):
 
     Parameters
     ----------
-    kind : type that the command line's parser gives.
-    metavar : stands for the value in the help; None for the type's name.
-    read : makes the field's value of it.
+    kind : type returned by the command line's parser.
+    metavar : placeholder of the value in the help; None for the type's name.
+    read : converts it to the field's value.
     remark : for the help.
     """
 
@@ -58,7 +58,7 @@ class Form(NamedTuple):
 
 
 def field_options(request: type[BaseModel]) -> list[FieldOption]:
-    """Find the fields of a request that are options; where several have one flag, the first has it."""
+    """Find the fields of a request that are options; if several have the same flag, the first gets it."""
     found: dict[str, FieldOption] = {}
     for option in _options(request, ""):
         found.setdefault(option.flag, option)
@@ -67,7 +67,7 @@ def field_options(request: type[BaseModel]) -> list[FieldOption]:
 
 def _options(model: type[BaseModel], pointer: str) -> Iterator[FieldOption]:
     own = get_annotations(model)
-    # what a request adds to another's is what it is about
+    # fields that a request adds to its base come first
     for name, field in sorted(model.model_fields.items(), key=lambda item: item[0] not in own):
         at = f"{pointer}/{name}"
         mark = next((item for item in field.metadata if isinstance(item, Option)), None)
@@ -80,7 +80,7 @@ def _options(model: type[BaseModel], pointer: str) -> Iterator[FieldOption]:
 
 
 def _kinds(annotation: Any) -> list[Any]:
-    """List the types that a field may have, out of unions and annotations, None aside."""
+    """List the possible types of a field, from unions and annotations, without None."""
     origin = get_origin(annotation)
     if origin is Annotated:
         return _kinds(get_args(annotation)[0])
@@ -150,7 +150,7 @@ def _list_form(flag: str, item: Any) -> Form:
 
 
 def _limits(field: FieldInfo) -> str | None:
-    """Show the smallest and the largest whole number that a field takes, where both are known."""
+    """Show the smallest and the largest integer that a field accepts, if both are known."""
     low, high = (
         next((getattr(item, name) for item in field.metadata if hasattr(item, name)), None)
         for name in ("ge", "le")
@@ -159,7 +159,7 @@ def _limits(field: FieldInfo) -> str | None:
 
 
 def _numbers(flag: str, text: str, kind: Callable[[str], Any], example: str) -> list[Any]:
-    """Read numbers with commas between them; ``example`` has as many as are wanted, or any number."""
+    """Parse comma-separated numbers; ``example`` has the required number of them, or any."""
     try:
         found = [kind(word) for word in text.split(",")]
     except ValueError:
@@ -182,7 +182,7 @@ def _ranges(flag: str, texts: Sequence[str]) -> dict[str, list[float]]:
             found[name] = [float(low), float(high)]
         except ValueError:
             raise CommandError(
-                f"{flag} {text}: this is no NAME=LOW:HIGH",
+                f"{flag} {text}: not of the form NAME=LOW:HIGH",
                 code=Exit.USAGE,
                 hint=f"write {flag} lift_factor=0.8:1.2; repeat it for further parameters",
             ) from None

@@ -7,31 +7,32 @@ from typing import Any
 
 from morphid.commands.operation import Particulars
 from morphid.model_table import at_bound_line, model_table
-from morphid.screen import fit_table, stdout
-from morphid.verdict import verdict
+from morphid.screen import fit_table, statistics_table, stdout
 
 USE = "Fly the model with morphid simulate --parameters, or find a morph for it with morphid optimize."
+GRADE_COLOURS = {"good": "green", "usable": "yellow", "poor": "red", "failed": "red"}
 
 
 def show_model(result: Mapping[str, Any]) -> None:
     """Print what came out and whether it may be believed, for people."""
     show_fit(result)
-    fits = result["fit"]
-    # results of earlier versions do not say how much moves in a sample
-    if result.get("model") is not None and fits and all("range_rad" in fit for fit in fits):
-        show_verdict(result, USE)
+    show_verdict(result, USE)
 
 
 def show_fit(result: Mapping[str, Any]) -> None:
     """Print how well the samples are met, and the model."""
-    stdout().print(fit_table(result))
+    console = stdout()
+    console.print(fit_table(result))
+    table = statistics_table(result)
+    if table is not None:
+        console.print(table)
     if result.get("model") is None:
-        stdout().print("No model: no candidate flew the fitted samples.")
+        console.print("No model: no candidate flew the fitted samples.")
         return
-    stdout().print(model_table(result))
+    console.print(model_table(result))
     line = at_bound_line(result)
     if line:
-        stdout().print(line, markup=False, soft_wrap=True)
+        console.print(line, markup=False, soft_wrap=True)
 
 
 def show_verdict(result: Mapping[str, Any], use: str) -> None:
@@ -39,14 +40,21 @@ def show_verdict(result: Mapping[str, Any], use: str) -> None:
 
     Parameters
     ----------
+    result : of an identification; those of earlier versions have no verdict.
     use : what to do with a model that is not poor.
     """
-    found, console = verdict(result, use), stdout()
-    console.print(f"Verdict: {found.grade}", style="bold")
-    for reason in found.reasons:
+    found, console = result.get("verdict"), stdout()
+    if not found:
+        return
+    grade = found["grade"]
+    console.print(f"Verdict: {grade}", style=f"bold {GRADE_COLOURS.get(grade, '')}".strip())
+    for reason in found["reasons"]:
         console.print(f"  {reason}", markup=False, soft_wrap=True)
-    console.print("What to do next", style="bold")
-    for step in found.next_steps:
+    usable = grade in ("good", "usable")
+    steps = [*([use] if usable else []), *(found.get("next_steps") or ())]
+    if steps:
+        console.print("What to do next", style="bold")
+    for step in steps:
         console.print(f"  {step}", markup=False, soft_wrap=True)
 
 

@@ -1,4 +1,4 @@
-"""``morphid jobs``: look after the jobs of a service."""
+"""``morphid jobs``: manage the jobs of a service."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def show_job(
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Show one job, and its result when there is one."""
+    """Show one job, and its result if there is one."""
     from morphid.service import Service
 
     with Service(url, api_key) as service:
@@ -86,7 +86,7 @@ def watch_job(
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Follow a job to its end; the exit code reflects its outcome. With --json, one line per change."""
+    """Follow a job to its end; the exit code is that of its outcome. With --json, one line per change."""
     from morphid.service import Service
 
     with Service(url, api_key) as service:
@@ -94,13 +94,13 @@ def watch_job(
 
 
 def _follow(service: Service, job: str, *, as_json: bool) -> NoReturn:
-    """Show a job until it has ended, and exit as it did."""
+    """Show a job until it has ended, and exit with the code of its outcome."""
     last: dict[str, Any] = {}
     with meter() as bar:
         for seen in service.watch(job):
             if as_json:
                 if seen != last and not print_json_line(seen):
-                    raise typer.Exit(int(Exit.OK))  # `| head`: seen enough
+                    raise typer.Exit(int(Exit.OK))  # the reader has left, as with `| head`
             else:
                 bar.show(seen.get("progress"), seen["status"])
             last = seen
@@ -120,7 +120,7 @@ def rerun_job(
         typer.Option(
             "--set",
             metavar="POINTER=VALUE",
-            help="Ask for something else there: `--set /search/seed=2`; repeat. VALUE is JSON, or a text.",
+            help="Change a value of the request: `--set /search/seed=2`; repeatable. VALUE is JSON, or text.",
         ),
     ] = None,
     watch: Annotated[bool, typer.Option("--watch", help="Follow the new job to its end.")] = False,
@@ -128,7 +128,7 @@ def rerun_job(
     api_key: options.ApiKey = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Post a job's request again, as it was or changed, and print the new job's id."""
+    """Post a job's request again, unchanged or with changes, and print the new job's id."""
     from morphid.request import changed
     from morphid.service import Service
 

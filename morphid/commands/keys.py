@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 keys = typer.Typer(help="Make, list and revoke API keys.", no_args_is_help=True, epilog=options.EXIT_CODES)
 
-QUOTAS = "Quotas"  # group of options
+QUOTAS = "Quotas"  # heading of a group of options
 AFTER = re.compile(r"(\d{1,5})\s*([dh])")
 STATE_COLOURS = {"active": "green", "expired": "yellow", "revoked": "red"}
 COLUMNS = ("prefix", "owner", "name", "state", "scopes", "last use UTC", "expires UTC")
@@ -31,13 +31,13 @@ COLUMNS = ("prefix", "owner", "name", "state", "scopes", "last use UTC", "expire
 @keys.command("create")
 @reports_errors
 def create_key(
-    owner: Annotated[str, typer.Option(help="Whose key: keys of one owner see the same jobs and models.")],
-    name: Annotated[str, typer.Option(help="A name to recognise it by.")],
+    owner: Annotated[
+        str, typer.Option(help="Owner of the key; keys of one owner see the same jobs and models.")
+    ],
+    name: Annotated[str, typer.Option(help="A name to recognise the key.")],
     scope: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Scope; may be repeated. All but `metrics` when left out: see `morphid keys scopes`."
-        ),
+        typer.Option(help="Scope; repeatable. Default: all but `metrics`; see `morphid keys scopes`."),
     ] = None,
     expires: Annotated[str | None, typer.Option(help="When: `90d`, `12h`, or a date in UTC.")] = None,
     max_jobs: Annotated[
@@ -80,7 +80,7 @@ def list_keys(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """List the keys: whose, what for, what they may do, when they were used; never their secrets."""
+    """List the keys with owner, name, scopes and last use, without their secrets."""
     from app.keys import repository
 
     with service_database(data_dir) as database, database.read() as session:
@@ -98,7 +98,7 @@ def revoke_key(
     data_dir: options.DataDir = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Revoke a key; running services refuse it two seconds later."""
+    """Revoke a key; running services refuse it within two seconds."""
     from app.keys import service
 
     with service_database(data_dir) as database, _refusals(), database.write() as session:
@@ -111,7 +111,7 @@ def revoke_key(
 
 @keys.command("scopes")
 def list_scopes(as_json: options.AsJson = False) -> None:
-    """List what a key may be allowed to do."""
+    """List the scopes that a key can have."""
     from app.keys.records import SCOPE_MEANINGS
 
     if as_json:
@@ -132,7 +132,7 @@ def _refusals() -> Iterator[None]:
 
 
 def _scopes(names: Sequence[str]) -> list[Scope]:
-    """Turn names into scopes; the usual ones when there are none."""
+    """Convert names to scopes; without names, the usual ones."""
     from app.keys.records import USUAL_SCOPES, Scope
 
     known = {scope.value: scope for scope in Scope}
@@ -145,7 +145,7 @@ def _scopes(names: Sequence[str]) -> list[Scope]:
 
 
 def moment_of(text: str) -> float:
-    """Read ``90d``, ``12h`` or a date in the future (UTC unless it says otherwise), s since 1970 UTC."""
+    """Parse ``90d``, ``12h`` or a future date (UTC unless stated otherwise) to s since 1970 UTC."""
     now = datetime.now(UTC)
     after = AFTER.fullmatch(text.strip())
     try:
@@ -157,7 +157,7 @@ def moment_of(text: str) -> float:
             moment = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
     except (ValueError, OverflowError):
         raise CommandError(
-            f"{text!r} is no time", code=Exit.USAGE, hint="say `90d`, `12h` or `2027-01-31`"
+            f"{text!r} is no time", code=Exit.USAGE, hint="write `90d`, `12h` or `2027-01-31`"
         ) from None
     if moment <= now:
         raise CommandError(f"{text!r} has passed", code=Exit.USAGE, hint="a key needs a future")
@@ -165,7 +165,7 @@ def moment_of(text: str) -> float:
 
 
 def _document(key: ApiKey) -> dict[str, Any]:
-    """Give a key as JSON, without its secret, which nobody knows."""
+    """Return a key as JSON, without its secret, which is not stored."""
     moments = ("created_at", "expires_at", "revoked_at", "last_used_at")
     return {
         **{name: getattr(key, name) for name in ("id", "owner", "name", "prefix", "state")},

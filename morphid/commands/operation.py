@@ -1,4 +1,4 @@
-"""The command of an operation, made of its descriptor; what is particular to one stands in its own module."""
+"""The command of an operation, built from its descriptor; additions of an operation have their own module."""
 
 from __future__ import annotations
 
@@ -55,16 +55,16 @@ def nothing(*_given: Any) -> None:
 
 @dataclass(frozen=True)
 class Particulars:
-    """What a command has besides the fields of its request.
+    """Additions of a command to the fields of its request.
 
     Parameters
     ----------
-    show : prints a result for people.
-    options : its own options, by the names of their values.
-    fill : ``fill(request, values)`` puts the values of its own options into the request, after aircraft and
-        flight and before the other fields.
-    fills : flags of those fields that `fill` puts in itself.
-    out : help of ``--out``, a file that `save` writes; "" where there is none.
+    show : prints a result in readable form.
+    options : its additional options, by the names of their values.
+    fill : ``fill(request, values)`` puts the values of its additional options into the request, after
+    aircraft and flight and before the other fields.
+    fills : flags of the fields that `fill` sets itself.
+    out : help of ``--out``, a file that `save` writes; "" if there is none.
     save : ``save(answer, path)`` writes it.
     """
 
@@ -77,7 +77,7 @@ class Particulars:
 
 
 def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., None]:
-    """Make the function of a command, as typer wants it."""
+    """Make the function of a command for typer."""
     fields = field_options(operation.request)
     vehicle = [option for option in fields if option.pointer in ("/aircraft", "/flight")]
     others = [option for option in fields if option not in vehicle]
@@ -93,7 +93,7 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
             request.add_samples(matching_files(values["sample"], "--sample"), "train", "--sample")
             held_out = matching_files(values["held_out"] or [], "--held-out")
             request.add_samples(held_out, "held_out", "--held-out")
-        for option in vehicle:  # first, for the aircraft says which drives there are
+        for option in vehicle:  # first, because the aircraft determines the drives
             _fill_field(request, option, values[option.parameter.name])
         own.fill(request, values)
         for option in (option for option in others if option.flag not in own.fills):
@@ -106,7 +106,7 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
     made = reports_errors(command)
     made.__name__ = operation.name
     made.__doc__ = f"{operation.title}."
-    made.__signature__ = Signature(  # type: ignore[attr-defined]  # what typer goes by
+    made.__signature__ = Signature(  # type: ignore[attr-defined]  # read by typer
         [
             *(option.parameter for option in vehicle),
             *_parameters(SAMPLES if has_samples else {}),
@@ -136,7 +136,7 @@ def _parameters(annotations: Mapping[str, Any]) -> list[Parameter]:
 
 
 def _fill_field(request: Request, option: FieldOption, given: Any) -> None:
-    """Put the value of an option into the field that it stands for; what is not given is left out."""
+    """Put the value of an option into its field, unless it was not given."""
     if given is None or given == []:
         return
     value = option.read(given)

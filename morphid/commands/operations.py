@@ -1,4 +1,4 @@
-"""A command for every operation there is."""
+"""One command for every operation."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ def operation_commands() -> Iterator[Callable[..., None]]:
 
 
 def particulars_of(operation: str) -> Particulars:
-    """Find what is particular to the command of an operation; most need nothing."""
+    """Find the additions of an operation's command; most have none."""
     return PARTICULARS.get(operation, Particulars())

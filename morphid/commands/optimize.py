@@ -1,4 +1,4 @@
-"""What ``morphid optimize`` has besides its request: the known model, the written schedule, the tables."""
+"""Additions of ``morphid optimize`` to its request: the known model, the written schedule, the tables."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MODELS = ("rigid", "equivalent", "flexible")
 SCHEDULES = {"constant": "constant rate", "rigid_optimum": "rigid optimum", "optimum": "optimum"}
 REACHED = {"max_rate_rad_s": "rad/s", "max_accel_rad_s2": "rad/s²", "max_hinge_torque_nm": "N m"}
-ROW_STEP_S = 0.01  # of the written schedule, as the example flights
+ROW_STEP_S = 0.01  # s between rows of the written schedule, as in the example flights
 
 
 def _fill(request: Request, values: Values) -> None:
@@ -43,7 +43,7 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
 
     found = result["schedule"]
     spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
-    drives = sorted(result.get("drives", SWEEPS))  # results of earlier versions have no others
+    drives = sorted(result.get("drives", SWEEPS))  # the only one in results of earlier versions
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
@@ -52,7 +52,7 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
 
 
 def show_schedule(result: Mapping[str, Any]) -> None:
-    """Print what came out, for people."""
+    """Print the result in readable form."""
     stdout().print(variation_table(result))
     if result.get("pareto"):
         stdout().print(front_table(result["pareto"]))
@@ -65,7 +65,7 @@ def show_schedule(result: Mapping[str, Any]) -> None:
 
 
 def variation_table(result: Mapping[str, Any]) -> Table:
-    """Compare the schedules: attitude variation (rad^2) in the models that flew them, and what they reach."""
+    """Compare the schedules: attitude variation (rad^2) by model; largest rate, acceleration and torque."""
     reduction, model = result.get("reduction_percent"), result.get("reduction_model")
     caption = None
     if reduction is not None:

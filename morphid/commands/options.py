@@ -1,4 +1,4 @@
-"""Options that several commands share, and what they become in a request."""
+"""Options shared by several commands, and their place in a request."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ EXIT_CODES = (
 KNOWN_MODEL = frozenset({"--parameters", "--model-id"})  # see `put_known_model`
 HOW_IDENTIFIED = ("lattice", "step_s", "start")  # next to the parameters of an identified model
 
-# groups of options, as a command's help shows them
+# headings of option groups in a command's help
 model_option = partial(typer.Option, rich_help_panel=MODEL)
 answer_option = partial(typer.Option, rich_help_panel=OUTPUT)
 
 
 class Core(StrEnum):
-    """What keeps the velocity of a lattice's vortices finite."""
+    """Law that keeps the velocity of a lattice's vortices finite."""
 
     LINE = "line"
     SMOOTHED = "smoothed"
 
 
 def setting(name: str, default: str, what: str, **more: Any) -> Any:
-    """Describe an option that is a setting of the service: the option, then its variable, then the default.
+    """Declare an option for a setting of the service, in the order option, variable, default.
 
-    The option's own default is None, for `morphid.configured.settings_for` reads the others.
+    The option's own default is None, because `morphid.configured.settings_for` reads the others.
     """
     return typer.Option(
         f"--{name.replace('_', '-')}",
@@ -53,17 +53,17 @@ DataDir = Annotated[
 ]
 Host = Annotated[str | None, setting("host", "127.0.0.1", "Address the API listens on.")]
 Port = Annotated[
-    int | None, setting("port", "8000", "Port of the API; 0 takes a free one.", min=0, max=65535)
+    int | None, setting("port", "8000", "Port of the API; 0 selects a free one.", min=0, max=65535)
 ]
 Workers = Annotated[int | None, setting("workers", "1", "Jobs that run at once.", min=1, max=1024)]
 
-# of commands that talk to a service anyway
+# for commands that always use a service
 Url = Annotated[str, typer.Option("--url", envvar=URL_VARIABLE, help="Address of the service.")]
 API_KEY_HELP = "Key of the service; prefer MORPHID_API_KEY, which does not appear in process listings."
 ApiKey = Annotated[
     str | None, typer.Option("--api-key", envvar=KEY_VARIABLE, show_default=False, help=API_KEY_HELP)
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 AtUrl = Annotated[
     str | None,
@@ -77,7 +77,7 @@ Plots = Annotated[Path | None, answer_option("--plots", help="Write plots and cu
 
 
 def put_known_model(request: Request, parameters: Path | None, model_id: str | None, url: str | None) -> None:
-    """Fill in an equivalent model that is known already: a file, or the id of a model at a service."""
+    """Fill in a known equivalent model: from a file, or by the id of a model at a service."""
     if (parameters is None) == (model_id is None):
         raise CommandError(
             f"{'no' if parameters is None else 'more than one'} equivalent model is given",
@@ -88,7 +88,7 @@ def put_known_model(request: Request, parameters: Path | None, model_id: str | N
     if parameters is not None:
         found = _parameters_in(parameters)
         request.put("/model/parameters", found, f"--parameters {parameters}")
-        # written out, so that one option (`--core smoothed`) changes that alone
+        # written out, so that one option (`--core smoothed`) changes only that field
         for name in HOW_IDENTIFIED:
             request.put(f"/model/{name}", deepcopy(found.get(name)), f"--parameters {parameters}")
         return
@@ -96,20 +96,20 @@ def put_known_model(request: Request, parameters: Path | None, model_id: str | N
         raise CommandError(
             f"--model-id {model_id} names a model at a service",
             code=Exit.USAGE,
-            hint="say at which one with --url, or give --parameters",
+            hint="name the service with --url, or give --parameters",
         )
     request.put("/model/model_id", model_id, "--model-id")
 
 
 def _parameters_in(path: Path) -> dict[str, Any]:
-    """Give the model in an identification's result, or the model that the file is."""
+    """Return the model in an identification's result, or the model file itself."""
     found = read_json(path)
     if isinstance(found, dict):
         found = found.get("model", found)
     if not isinstance(found, dict) or "links_per_wing" not in found:
         raise CommandError(
-            f"--parameters {path}: there is no equivalent model in it",
+            f"--parameters {path}: it contains no equivalent model",
             code=Exit.INVALID_INPUT,
-            hint="give the file that `morphid identify --json` wrote, or the `model` in it",
+            hint="give the file written by `morphid identify --json`, or the `model` in it",
         )
     return found

@@ -23,15 +23,17 @@ VERDICTS = {True: "[green]met[/]", False: "[red]missed[/]", None: ""}
 
 @reports_errors
 def paper(
-    out: Annotated[Path, typer.Option(help="Folder of the report; a run that was stopped goes on there.")],
-    quick: Annotated[bool, typer.Option("--quick", help="Everything, smaller: minutes.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of all searches. Same seed, same figures.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the report; a stopped run continues there.")],
+    quick: Annotated[bool, typer.Option("--quick", help="Everything at reduced size, in minutes.")] = False,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of all searches. The same seed gives the same figures.")
+    ] = 1,
     core: Annotated[
         options.Core, typer.Option(help="Core of the vortices in all models.")
     ] = options.Core.LINE,
     samples: Annotated[
         Path | None,
-        typer.Option(help="Folder with another program's flights; the examples' where they are at hand."),
+        typer.Option(help="Folder with another program's flights; default: the examples, if available."),
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the kernels.")] = None,
     as_json: options.AsJson = False,
@@ -65,7 +67,7 @@ def paper(
 
 
 def _work_off(runner: StageRunner) -> None:
-    """Run all stages under a progress bar; Ctrl-C leaves what is done."""
+    """Run all stages under a progress bar; Ctrl-C keeps finished stages."""
     try:
         with meter() as bar, first_interrupt() as interrupted, closing(runner.steps()) as steps:
             for stage, progress in steps:
@@ -74,17 +76,17 @@ def _work_off(runner: StageRunner) -> None:
                     break
             else:
                 return
-    except KeyboardInterrupt:  # the second one, which does not wait for the step's end
+    except KeyboardInterrupt:  # the second Ctrl-C, which does not wait for the end of the step
         pass
     raise CommandError(
         "stopped",
         code=Exit.INTERRUPTED,
-        hint=f"the same command goes on from where it was; stages are in {runner.folder}",
+        hint=f"run the same command again to continue; stages are in {runner.folder}",
     )
 
 
 def _samples(folder: Path | None) -> Path | None:
-    """The folder of another program's flights: as given, or the example flights of a source tree."""
+    """The folder of another program's flights: as given, or that of the source tree's example flights."""
     if folder is None:
         folder = Path(__file__).resolve().parents[2] / "examples"
         return folder if (folder / "aircraft.json").is_file() else None

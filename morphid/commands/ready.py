@@ -1,4 +1,4 @@
-"""``morphid ready``: may work begin? For health checks of containers, and scripts that wait for a service."""
+"""``morphid ready``: readiness check for containers, and for scripts that wait for a service."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POLL_S = 0.5
 @reports_errors
 def ready(
     worker: Annotated[bool, typer.Option("--worker", help="Check only this machine's worker.")] = False,
-    wait: Annotated[float, typer.Option(min=0.0, help="Keep looking for so long, s.")] = 0.0,
+    wait: Annotated[float, typer.Option(min=0.0, help="Keep trying for this long, s.")] = 0.0,
     data_dir: options.DataDir = None,
 ) -> None:
     """Exit with 0 if jobs submitted now will run, otherwise with 6."""
@@ -34,13 +34,13 @@ def ready(
             stdout().print(sentence, soft_wrap=True)
             return
         if time.monotonic() >= deadline:
-            hint = "`morphid doctor` says more, and the logs of its parts"
+            hint = "see `morphid doctor` and the logs of the service's processes"
             raise CommandError(sentence, code=Exit.ENVIRONMENT, hint=hint)
         time.sleep(POLL_S)
 
 
 def _look(settings: Settings, *, worker_here: bool) -> tuple[bool, str]:
-    """Return whether all is well (`worker_here`: whether a worker of this machine is), and what was seen."""
+    """Return whether all is well (with `worker_here`, only a worker of this machine), and a description."""
     from app.database import Database
     from app.health.broker import BROKER_GOOD, broker_state
     from app.health.service import database_state

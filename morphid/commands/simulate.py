@@ -1,4 +1,4 @@
-"""What ``morphid simulate`` has besides its request: model, schedule, the written flight, the table."""
+"""Additions of ``morphid simulate`` to its request: model, schedule, the written flight, the table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from morphdata.drives import BOTH
+from morphdata.drives import BOTH, shown_names
 from morphdata.faults import InvalidInput
 from morphdata.options import SCHEDULE
 from morphdata.schedules import load_schedules
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 schedule_option = partial(typer.Option, rich_help_panel=SCHEDULE)
 
-FLIGHT_FILE = "flight.csv"  # among what a simulation leaves behind
+FLIGHT_FILE = "flight.csv"  # among the files of a simulation
 
 
 class Model(StrEnum):
-    """What flies."""
+    """The model to fly."""
 
     RIGID = "rigid"
     EQUIVALENT = "equivalent"
@@ -63,7 +63,7 @@ def _put_schedules(
     drive: str | None,
     duration: float | None,
 ) -> None:
-    """Fill in what the drives do, and for how long to fly."""
+    """Fill in the schedules of the drives and the duration of the flight."""
     if table is not None and rate is None and final is None and drive is None:
         end_s = _put_table(request, table)
     elif table is None and rate is not None and final is not None:
@@ -109,21 +109,29 @@ def _put_rate(request: Request, rate: float, final: float, drive: str | None) ->
             code=Exit.INVALID_INPUT,
             hint="give a positive rate in rad/s, and a final angle in rad other than 0",
         )
+    drives = aircraft_drives(request) or {}
+    words = list(dict.fromkeys(each.word for each in drives.values()))
+    if drive is None and len(words) > 1:
+        raise CommandError(
+            f"--rate does not say which drive moves, and the aircraft has {', '.join(words)}",
+            code=Exit.INVALID_INPUT,
+            hint=f"name it: --drive {words[0]}; to choose from: {shown_names(drives)}",
+        )
     document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
-    words = f"--rate {rate:g} --final {final:g}"
+    given = f"--rate {rate:g} --final {final:g}"
     request.put(
-        f"/schedules/{drive or BOTH}", document, words if drive is None else f"{words} --drive {drive}"
+        f"/schedules/{drive or BOTH}", document, given if drive is None else f"{given} --drive {drive}"
     )
     return abs(final) / rate
 
 
 def show_flight(result: Mapping[str, Any]) -> None:
-    """Print what came out, for people."""
+    """Print the result in readable form."""
     stdout().print(flight_table(result))
 
 
 def flight_table(result: Mapping[str, Any]) -> Table:
-    """Show how a flight started, how far the attitude went, and what it cost."""
+    """Show the start of a flight, the range of its attitude, and its cost."""
     trim, summary, cost = (result.get(part) or {} for part in ("trim", "summary", "cost"))
     tips, largest = trim.get("tip_z_m") or {}, summary.get("max_abs_rad") or {}
     table = new_table("what", "value", title=f"Flight of the {result['model']['kind']} model")
@@ -146,7 +154,7 @@ SIMULATE = Particulars(
         "model": Annotated[
             Model | None,
             options.model_option(
-                "--model", help="What flies.", show_default="equivalent with --parameters, else rigid"
+                "--model", help="The model to fly.", show_default="equivalent with --parameters, else rigid"
             ),
         ],
         "schedule": Annotated[
@@ -170,7 +178,7 @@ SIMULATE = Particulars(
             str | None,
             schedule_option(
                 "--drive",
-                help="With --rate: the drive that moves, fold_left, or fold for both sides; needed where the "
+                help="With --rate: the drive that moves, fold_left, or fold for both sides; needed if the "
                 "aircraft has several kinds.",
             ),
         ],
@@ -181,6 +189,6 @@ SIMULATE = Particulars(
     },
     fill=_fill,
     fills=options.KNOWN_MODEL,
-    out="Write the flight, CSV, columns as the samples'.",
+    out="Write the flight as CSV, with the columns of samples.",
     save=_save,
 )

@@ -1,4 +1,4 @@
-"""What ``morphid study`` shows."""
+"""Output of ``morphid study``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from morphid.screen import new_table, short, stdout
 
 
 def show_study(result: Mapping[str, Any]) -> None:
-    """Print what came out, for people."""
+    """Print the result in readable form."""
     stdout().print(study_table(result))
     recommended = result.get("recommended") or {}
     if recommended.get("reason"):
@@ -22,7 +22,7 @@ def show_study(result: Mapping[str, Any]) -> None:
 def study_table(result: Mapping[str, Any]) -> Table:
     """Show accuracy and cost per number of links, below those of the rigid model."""
     table = new_table(
-        *("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search"),
+        *("links", "bodies", "unknowns", "J fit", "J held", "φ", "θ", "ψ", "flight", "search", "verdict"),
         title="Study: J in rad², fitted and held out; RMS of φ, θ, ψ in mrad; flight in ms",
         caption="* recommended; flight: wall time of one of 2 s on one core",
         left=0,
@@ -41,6 +41,7 @@ def study_table(result: Mapping[str, Any]) -> Table:
             *("" if rms.get(a) is None else f"{1e3 * rms[a]:.2f}" for a in ("phi", "theta", "psi")),
             "" if row.get("flight_s") is None else f"{1e3 * row['flight_s']:.3g}",
             "" if row.get("identify_s") is None else f"{row['identify_s']:.1f} s",
+            (row.get("verdict") or {}).get("grade", ""),
         )
     return table
 

@@ -1,1 +1,1 @@
-"""``morphid doctor``: what is wrong with this installation, line by line, each with its remedy."""
+"""``morphid doctor``: checks this installation and suggests a remedy for every problem."""

@@ -1,4 +1,4 @@
-"""What an examination finds."""
+"""Findings of an examination."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from functools import partial
 
 
 class State(StrEnum):
-    """How good or bad it is."""
+    """Severity of a finding."""
 
     OK = "ok"
-    WARN = "warn"  # it works, but not as it should or not for long
+    WARN = "warn"  # it works, but not properly or not for long
     FAIL = "fail"  # it does not work
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report: what was examined, what was seen, and the remedy where it is not ok."""
+    """One line of the report: what was examined, the observation, and a remedy if it is not ok."""
 
     state: State
     name: str
@@ -33,9 +33,9 @@ ok, warn, fail = (partial(Finding, state) for state in (State.OK, State.WARN, St
 
 
 def examined(checks: Sequence[tuple[str, Check]]) -> Iterator[Finding]:
-    """Make the checks one after the other; one that breaks is a finding too."""
+    """Run the checks one after the other; a check that fails to run is a finding too."""
     for name, check in checks:
         try:
             yield from check()
-        except Exception as error:  # noqa: BLE001 - the doctor must finish his round
+        except Exception as error:  # noqa: BLE001 - all checks must be run
             yield fail(name, f"could not be examined: {type(error).__name__}: {error}", "please report this")

@@ -17,7 +17,7 @@ from pathlib import Path
 from morphid.doctor.findings import Finding, fail, ok, warn
 from worker.numerics import share_cores, takes_files, usable_cores
 
-EXTRAS = ("server", "telemetry")  # of the installation; what only developers need is not examined
+EXTRAS = ("server", "telemetry")  # of the installation; development tools are not examined
 CONSTRAINTS = Path(__file__).resolve().parents[2] / "constraints.txt"
 COMPILE_WITHIN_S = 120.0
 MIN_MEMORY = 2 * 2**30  # bytes; the kernels' compiler alone takes 0.5 GiB
@@ -35,12 +35,12 @@ print(json.dumps({"cache": getattr(blend._cache, "cache_path", None), "numba": n
 
 
 def python() -> Iterator[Finding]:
-    """Which Python it is; one that is too old cannot load this command."""
+    """Report the Python version; one that is too old cannot load this command."""
     yield ok("python", f"Python {platform.python_version()} at {sys.executable}")
 
 
 def packages() -> Iterator[Finding]:
-    """Is everything there that is required, in a version that will do, and the one that was tested."""
+    """Check that all required packages are installed, in an accepted and preferably a tested version."""
     from packaging.requirements import Requirement
 
     wrong: list[str] = []
@@ -59,7 +59,7 @@ def packages() -> Iterator[Finding]:
     if wrong:
         yield fail("packages", "; ".join(wrong), "pip install -c constraints.txt 'morphid[server]'")
         return
-    yield ok("packages", "everything that is required is there")
+    yield ok("packages", "all required packages are installed")
     yield from _differing()
 
 
@@ -83,7 +83,7 @@ def _differing() -> Iterator[Finding]:
         more = f" and {len(other) - 5} more" if len(other) > 5 else ""
         yield warn("constraints", shown + more, "pip install -c constraints.txt 'morphid[server]'")
     else:
-        yield ok("constraints", "the versions that the tests ran with")
+        yield ok("constraints", "all in the tested versions")
 
 
 def _version(name: str) -> str | None:
@@ -94,7 +94,7 @@ def _version(name: str) -> str | None:
 
 
 def compiler() -> Iterator[Finding]:
-    """Does numba compile, and can what it compiled be kept."""
+    """Check that numba compiles and that compiled code can be cached."""
     remedy = "pip install -c constraints.txt morphid; the message of the compiler says more"
     try:
         done = subprocess.run(
@@ -125,7 +125,7 @@ def compiler() -> Iterator[Finding]:
 
 
 def cores(workers: int) -> Iterator[Finding]:
-    """Do the workers have a core each, and memory."""
+    """Check that there are enough cores and memory for the workers."""
     here, usable = os.cpu_count() or 1, usable_cores()
     limited = (
         "" if usable == here else f" (of {here}; the rest is excluded by CPU affinity or a container quota)"
@@ -155,11 +155,11 @@ def _memory_limit() -> int:
     try:
         return min(installed, int(CGROUP_MEMORY.read_text("ascii")))
     except (OSError, ValueError):
-        return installed  # no limit that we could read
+        return installed  # no readable limit
 
 
 def files() -> Iterator[Finding]:
-    """May the API open a file for each of its clients."""
+    """Check that the API may open a file for each of its clients."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     remedy = "raise it: `ulimit -n 65536`, LimitNOFILE= of systemd, `ulimits:` of docker-compose.yml"
     limit = soft if hard == resource.RLIM_INFINITY else hard  # the API raises its own soft limit
@@ -175,7 +175,7 @@ def files() -> Iterator[Finding]:
 
 
 def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
-    """Can the data directory be written, and is there room."""
+    """Check that the data directory is writable and has free space."""
     folder = home.expanduser().resolve()
     if not takes_files(folder):
         yield fail(
@@ -205,7 +205,7 @@ def data_dir(home: Path, *, sqlite: bool) -> Iterator[Finding]:
 
 
 def _file_system(folder: Path) -> str:
-    """Type of the file system that holds `folder`; empty where there is no /proc."""
+    """Type of the file system of `folder`; empty without /proc."""
     found = ("", "")
     try:
         for line in Path("/proc/mounts").read_text("utf-8", "surrogateescape").splitlines():

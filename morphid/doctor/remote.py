@@ -1,4 +1,4 @@
-"""A service from outside, as its clients see it."""
+"""Checks of a service from outside, as clients see it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SKEW_S = 5.0  # the Date header has whole seconds
 
 
 def served_version(client: httpx.Client) -> str | None:
-    """Version of the service at a client's address, None when there is none."""
+    """Version of the service at a client's address; None if there is none."""
     import httpx
 
     try:
@@ -31,7 +31,7 @@ def served_version(client: httpx.Client) -> str | None:
 
 
 def service(url: str, api_key: str | None) -> Iterator[Finding]:
-    """Does it live, is it ready, do our key and our clock fit."""
+    """Check that the service is alive and ready, and that our key and clock fit."""
     import httpx
 
     try:
@@ -57,7 +57,7 @@ def _service(client: httpx.Client, url: str, api_key: str | None) -> Iterator[Fi
     took_s = time.monotonic() - began
     version = served_version(client)
     if version is None:
-        yield fail("service", f"{url} answers {alive.status_code}, but is no MorphID", "correct --url")
+        yield fail("service", f"{url} answers {alive.status_code}, but is not MorphID", "correct --url")
         return
     if version != VERSION:
         yield warn(

@@ -1,4 +1,4 @@
-"""The doctor's round: which checks are made, in which order."""
+"""The checks of the doctor, in order."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def round_here(data_dir: Path | None) -> Iterator[Finding]:
 
 
 def _own_broker() -> Iterator[Finding]:
-    """`morphid serve` brings its own where none is named; its password is known to its children only."""
+    """`morphid serve` starts its own broker if none is configured; only its processes know the password."""
     from morphid.broker import find_server
     from morphid.exits import CommandError
 

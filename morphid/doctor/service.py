@@ -1,4 +1,4 @@
-"""The service on this machine, from behind: settings, database, broker, workers, jobs, port."""
+"""Internal checks of the service on this machine: settings, database, broker, workers, jobs, port."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from typing import Any
 
 from morphid.doctor.findings import Finding, fail, ok, warn
 
-SKEW_S = 2.0  # leases are the database's own; this only makes times in logs hard to compare
-STUCK_S = 600.0  # a job that waits so long while a slot is free
-ORPHANED_S = 120.0  # a lease that ran out so long ago was reaped by nobody
+SKEW_S = 2.0  # s; leases use the database's clock, so this only makes times in logs hard to compare
+STUCK_S = 600.0  # s that a job may wait while a slot is free
+ORPHANED_S = 120.0  # s; a lease that expired longer ago has not been reaped
 DELIVERY_LATE_S = 3600.0
 MIN_BROKER = (6, 2)
 OTHERS_MAY = stat.S_IROTH | stat.S_IWOTH
-LARGE_DATABASE = 2 * 2**30  # bytes; its pages are not read one by one
+LARGE_DATABASE = 2 * 2**30  # bytes; the pages of a larger database are not all read
 
 
 def unsafe(settings: Any) -> Iterator[Finding]:
-    """Do the settings let in whom they should not."""
+    """Check that the settings do not expose the service."""
     from app.loopback import is_loopback
 
     beyond = not is_loopback(settings.host)
     if beyond and not settings.demands_keys:
         yield warn(
             "settings",
-            f"everyone who reaches {settings.host}:{settings.port} may use and read everything",
+            f"anyone who can reach {settings.host}:{settings.port} may use and read everything",
             "leave out MORPHID_ALLOW_OPEN and MORPHID_AUTH=off; make keys with `morphid keys create`",
         )
     elif settings.webhook_allow_private:
         yield warn(
             "settings",
             "webhooks may go to private addresses",
-            "leave out MORPHID_WEBHOOK_ALLOW_PRIVATE where others can post jobs",
+            "leave out MORPHID_WEBHOOK_ALLOW_PRIVATE if others can post jobs",
         )
     else:
         keys = "demanded" if settings.demands_keys else "not required: only this machine has access"
@@ -44,7 +44,7 @@ def unsafe(settings: Any) -> Iterator[Finding]:
 
 
 def database(settings: Any) -> Iterator[Finding]:
-    """Can it be reached, is it migrated, sound, durable, and does its clock agree with ours."""
+    """Check that the database is reachable, migrated, sound and durable, with the same clock as ours."""
     from sqlalchemy.exc import SQLAlchemyError
 
     from app.database import database_time, schema_revision
@@ -122,7 +122,7 @@ def _sqlite(session: Any, settings: Any) -> Iterator[Finding]:
 
 
 def _exposed(file: Path) -> Finding:
-    """Say what became of a database that others could read: opening it closes one that is ours."""
+    """Report a database that others could read; opening our own makes it private."""
     if file.stat().st_mode & OTHERS_MAY:
         sentence = f"{file} can be read by every user of this machine"
         return warn("permissions", sentence, f"chmod 700 {file.parent}")
@@ -147,7 +147,7 @@ def _postgres(session: Any) -> Iterator[Finding]:
 
 
 def broker(url: str) -> Iterator[Finding]:
-    """Does it answer to our password, and does it keep what it is given."""
+    """Check that the broker accepts our password and keeps messages."""
     from app.health.broker import NOT_CHECKED, broker_client, broker_state
     from app.observability.logs import masked
 
@@ -169,7 +169,7 @@ def broker(url: str) -> Iterator[Finding]:
     if not int(info.get("aof_enabled", 0)):
         yield warn(
             "broker journal",
-            "messages do not survive its restart: jobs then begin a second later",
+            "messages do not survive its restart: jobs then start a second later",
             "appendonly yes",
         )
     else:
@@ -184,7 +184,7 @@ def broker(url: str) -> Iterator[Finding]:
 
 
 def work(settings: Any) -> Iterator[Finding]:
-    """Are there workers, and do jobs move."""
+    """Check that there are workers and that jobs make progress."""
     from sqlalchemy import func, select
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -229,7 +229,7 @@ def work(settings: Any) -> Iterator[Finding]:
         yield fail(
             "jobs",
             f"the oldest has waited {seen.oldest_queued_s:.0f} s though {free} slots are free",
-            "do the workers use this database (MORPHID_DATABASE_URL)? Their logs say what keeps them",
+            "check that the workers use this database (MORPHID_DATABASE_URL), and see their logs",
         )
     else:
         yield ok("jobs", f"{seen.jobs['queued']} queued, {seen.jobs['running']} running")
@@ -238,7 +238,7 @@ def work(settings: Any) -> Iterator[Finding]:
 
 
 def keys(settings: Any) -> Iterator[Finding]:
-    """Is there a key where one is demanded."""
+    """Check that there is a key if keys are required."""
     from sqlalchemy import func, or_, select
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -263,7 +263,7 @@ def keys(settings: Any) -> Iterator[Finding]:
 
 
 def port(host: str, number: int) -> Iterator[Finding]:
-    """Is the port free, or ours."""
+    """Check that the port is free, or ours."""
     from morphid.broker import bound_port, in_url
     from morphid.connections import client_for
     from morphid.doctor.remote import TIMEOUT_S, served_version
@@ -279,7 +279,9 @@ def port(host: str, number: int) -> Iterator[Finding]:
         version = served_version(client)
     if version is None:
         yield fail(
-            "port", f"{host}:{number}: {reason}, by something else than MorphID", "choose another with --port"
+            "port",
+            f"{host}:{number}: {reason}, by another program than MorphID",
+            "choose another with --port",
         )
     else:
         yield ok("port", f"MorphID {version} serves {host}:{number}")

@@ -35,6 +35,19 @@ def sample_document(name: str) -> Document:
     }
 
 
+def channel_columns(name: str) -> Document:
+    """The channels of one example file, as fields of a document."""
+    with (EXAMPLES / f"{name}.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    units = {"p": "rad_s", "q": "rad_s", "r": "rad_s", "vx": "m_s", "vy": "m_s", "vz": "m_s"}
+    six = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
+    return {
+        f"{title}_{units.get(title, 'm')}": [float(row[title]) for row in rows]
+        for title in rows[0]
+        if title not in six
+    }
+
+
 @lru_cache(maxsize=1)
 def _example() -> Document:
     return {

@@ -143,7 +143,7 @@ def test_a_good_spelling_stays(url: str) -> None:
         ("rediss://h?ssl_cert_reqs=maybe", "required, optional or none"),
         ("redis://h?ssl_cert_reqs=none", "rediss://"),
         ("redis://h?no_such=1", "unknown option 'no_such'"),
-        ("rediss://h/queue", "no number of a database"),
+        ("rediss://h/queue", "not a database number"),
         ("unix://run/valkey.sock", "full path"),
         ("unix://", "full path"),
     ],

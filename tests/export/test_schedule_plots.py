@@ -113,7 +113,7 @@ def test_the_front_shows_what_it_beats() -> None:
     lines = {line.get_label(): line.get_xydata() for line in axes.lines}
     np.testing.assert_array_equal(lines["optimum: the front"], [[1.2, 11.5], [2.0, 11.0]])
     np.testing.assert_array_equal(lines["constant rate"], [[1.2, 11.8], [2.0, 19.6]])
-    np.testing.assert_array_equal(lines["optimum, but a shorter one is as good"], [[1.6, 12.0]])
+    np.testing.assert_array_equal(lines["optimum, but a shorter morph is as good"], [[1.6, 12.0]])
     assert axes.get_ylim()[0] == 0.0
     assert axes.get_ylim()[1] > 19.6
 

@@ -42,7 +42,7 @@ def test_columns_are_drives_and_words_in_rad_and_degrees() -> None:
 
 
 def test_a_simulated_trajectory_is_a_sample() -> None:
-    """Its channels are taken and not used."""
+    """Its channels are no drives."""
     sample = InlineSample.parse(
         {**EXAMPLE_SAMPLE, "p_rad_s": MOVED, "alpha_rad": MOVED, "nz": MOVED, "tip_z_left_wing_m": MOVED}
     )
@@ -149,3 +149,31 @@ def test_a_fold_on_one_side_is_an_asymmetric_sample() -> None:
         cost(IdentifyRequest.parse(pair)).parameters
         == cost(IdentifyRequest.parse(EXAMPLE_REQUEST)).parameters
     )
+
+
+def test_channels_are_kept_in_si_units_with_gaps() -> None:
+    """Degrees are converted, null is a gap, and a document written out is the same sample again."""
+    gapped = [None, 0.0, 1.0, 2.0]
+    sample = InlineSample.parse({**EXAMPLE_SAMPLE, "p_rad_s": gapped, "q_deg_s": gapped, "alpha_deg": MOVED})
+    assert sample.channels["p"] == gapped
+    assert sample.channels["q"][0] is None
+    np.testing.assert_allclose(sample.channels["q"][1:], np.deg2rad(gapped[1:]))
+    assert list(sample.drives) == ["sweep_left", "sweep_right"]
+    assert InlineSample.parse(sample.model_dump(exclude_none=True)) == sample
+
+
+@pytest.mark.parametrize(
+    ("columns", "code", "pointer"),
+    [
+        ({"p_rad_s": MOVED[:3]}, "unequal_lengths", "/p_rad_s"),
+        ({"p_rad_s": [None] * 4}, "no_values", "/p_rad_s"),
+        ({"p_rad_s": MOVED, "p_deg_s": MOVED}, "given_twice", "/p_rad_s"),
+        ({"p_rad_s": [0.0, 0.0, "x", 0.0]}, "float_type", "/p_rad_s/2"),
+        ({"fold_rad": [0.0, None, 0.0, 0.0]}, "float_type", "/fold_rad/1"),
+        ({"theta_rad": [0.0, None, 0.0, 0.0]}, "float_type", "/theta_rad/1"),
+        ({"p_mrad_s": MOVED}, "unknown_field", "/p_mrad_s"),
+    ],
+)
+def test_what_is_no_channel_is_refused(columns: Any, code: str, pointer: str) -> None:
+    """By name and row; a gap in a drive or an angle, too."""
+    assert refusal(**columns)[:2] == (code, pointer)

@@ -94,7 +94,7 @@ def test_ctrl_c_says_how_to_go_on(interrupts: int, monkeypatch: pytest.MonkeyPat
     before = signal.getsignal(signal.SIGINT)
     ended = RUNNER.invoke(app, ["paper", "--out", str(tmp_path)])
     assert ended.exit_code == Exit.INTERRUPTED
-    assert "goes on from where it was" in ended.stderr
+    assert "run the same command again to continue" in ended.stderr
     assert runner.closed
     assert signal.getsignal(signal.SIGINT) is before
 

@@ -1,7 +1,7 @@
-"""What an operation offers a worker, and where its work begins.
+"""The interface between operations and workers.
 
 The descriptor of an operation names a function ``begin(request, threads) -> Work``. Its module is imported on
-first use, because the pool's parent process must never load the compiler.
+first use because the pool's parent process must never load the compiler.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Step:
 
     ``progress`` has a ``fraction`` (0..1), a ``phase`` and a ``message``; that of a search also
     ``generation``, ``best_cost`` and ``flights``. The ``checkpoint`` is the complete state: work resumed from
-    it ends bit-identically. An empty one means that the next attempt starts again.
+    it ends bit-identically. If it is empty, the next attempt starts from the beginning.
     """
 
     progress: Document
@@ -33,7 +33,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result document of finished or interrupted work, and its files by name."""
+    """The result document of finished or interrupted work, with its files by name."""
 
     document: Document
     artifacts: Mapping[str, bytes] = field(default_factory=dict)
@@ -42,8 +42,8 @@ class Outcome:
 class Work(Protocol):
     """Long work as an iterator of steps with serialisable state.
 
-    `steps` and `outcome` raise `Interrupted` soon after ``stop()`` has turned true, and a `MorphError` when
-    the request cannot be carried out.
+    `steps` and `outcome` raise `Interrupted` soon after ``stop()`` returns True, and a `MorphError` if the
+    request cannot be carried out.
     """
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
@@ -53,7 +53,7 @@ class Work(Protocol):
         """Return the result at the last step's checkpoint, with all its files."""
 
     def best_so_far(self, checkpoint: bytes) -> Outcome | None:
-        """Return the result at any checkpoint within a second; None where there is none before the end."""
+        """Return the result at any checkpoint within a second; None if there is none before the end."""
 
 
 @runtime_checkable
@@ -61,26 +61,26 @@ class SpreadWork(Work, Protocol):
     """Work whose steps can be computed in parts by several workers."""
 
     def tasks(self, checkpoint: bytes, max_parts: int) -> list[bytes] | None:
-        """Divide the step after a checkpoint into independent parts; None for a step that has none."""
+        """Divide the step after a checkpoint into independent parts; None if it cannot be divided."""
 
     def fly(self, task: bytes, stop: Stop) -> bytes:
-        """Return the outcome of one part, which does not depend on the worker or on the other parts."""
+        """Return the outcome of one part, independent of the worker and of the other parts."""
 
     def combine(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Return the step after a checkpoint from the outcomes of all its parts, in their order."""
+        """Return the step after a checkpoint from the outcomes of all its parts, in order."""
 
 
 Begin = Callable[[Document, int], Work]
 
 
 class UnknownOperation(MorphError):
-    """This worker does not know the operation of a job; a newer one may."""
+    """This worker does not know the operation of a job; a newer worker may."""
 
     code = "unknown_operation"
 
 
 def find_operation(name: str) -> Begin:
-    """Import the function that begins an operation; raise `UnknownOperation` where there is none."""
+    """Import the function that starts an operation; raise `UnknownOperation` if there is none."""
     try:
         operation = operation_named(name)
     except LookupError as error:

@@ -13,7 +13,7 @@ NO_CHECKPOINT = b""
 
 
 class ExportWork:
-    """An export as the runner sees it: one step, which takes about a second.
+    """An export as work: a single step of about a second.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ class ExportWork:
         yield Step({"fraction": 1.0, "phase": "export", "message": message}, NO_CHECKPOINT)
 
     def outcome(self, checkpoint: bytes) -> Outcome:  # noqa: ARG002 - the file is in the export
-        """Give the file, and what there is to say of it."""
+        """Return the file and its description."""
         document = self._export.to_document()
         return Outcome(document, {**result_file(document), self._export.format.file: self._export.data()})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
-        """Give nothing: half a file is no result."""
+        """Return None: half a file is not a result."""
         return
 
 
@@ -45,7 +45,7 @@ def begin(request: Document, threads: int) -> ExportWork:
 
     Raises
     ------
-    InvalidInput : the model is not of this aircraft.
+    InvalidInput : the model belongs to another aircraft.
     """
     del threads
     return ExportWork(Export(ExportRequest.parse(request)))

@@ -27,7 +27,7 @@ class IdentificationWork(SearchWork):
         self._identification = run
 
     def tasks(self, checkpoint: bytes, max_parts: int) -> list[bytes] | None:
-        """Divide the next step's search points; None where the step needs more than their costs."""
+        """Divide the next step's search points; None if the step needs more than their costs."""
         try:
             task = self._identification.task(checkpoint)
         except UnreadableCheckpoint:  # `steps` begins again
@@ -39,7 +39,7 @@ class IdentificationWork(SearchWork):
         return _packed(self._identification.task_costs(_unpacked(task), stop))
 
     def combine(self, checkpoint: bytes, outcomes: Sequence[bytes], elapsed_s: float) -> Step:
-        """Continue the search with the costs of all parts; begin again where the checkpoint is unreadable."""
+        """Continue the search with the costs of all parts; restart it if the checkpoint is unreadable."""
         costs = np.concatenate([_unpacked(outcome) for outcome in outcomes])
         try:
             return shown(self._identification.tell(checkpoint, costs, wall_s=elapsed_s))

@@ -1,4 +1,4 @@
-"""A search of the library as work: one adapter for every operation."""
+"""Adapter from a search of the library to the work of an operation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 RESULT_FILE = "result.json"
 PROGRESS = ("fraction", "generation", "best_cost", "flights", "phase", "message")
-BEGUN_AGAIN = ", begun again: what was saved is of another version"
+BEGUN_AGAIN = ", restarted: the saved state is of another version"
 
 
 class SearchWork:
@@ -36,18 +36,18 @@ class SearchWork:
         self._stop: Stop = lambda: False
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
-        """Search; begin again, with a note, where the checkpoint cannot be read."""
+        """Search; restart, with a note, if the checkpoint cannot be read."""
         self._stop = stop
         try:
             for step in self._run.steps(checkpoint=checkpoint, stop=stop):
                 yield shown(step)
         except UnreadableCheckpoint:
-            log.warning("a checkpoint cannot be read: the search begins again", exc_info=True)
+            log.warning("a checkpoint cannot be read: the search starts again", exc_info=True)
             for step in self._run.steps(stop=stop):
                 yield shown(step, BEGUN_AGAIN)
 
     def outcome(self, checkpoint: bytes) -> Outcome:
-        """Return the result with its plots and tables; stops between two flights or plots."""
+        """Return the result with its plots and tables; can stop between two flights or plots."""
         with stoppable(self._stop):
             result = self._run.result(checkpoint)
             document = result.to_document()

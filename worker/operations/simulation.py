@@ -17,13 +17,13 @@ NO_CHECKPOINT = b""
 
 
 class SimulationWork:
-    """A flight as work; it takes seconds, keeps no checkpoint, and starts again to the same trajectory."""
+    """A flight as work. It takes seconds and keeps no checkpoint; a restart gives the same trajectory."""
 
     def __init__(self, run: SimulationRun) -> None:
         self._run = run
 
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
-        """Fly from the start, whatever an earlier attempt has done."""
+        """Fly from the start, regardless of earlier attempts."""
         again = "" if checkpoint is None else ", restarted from the beginning"
         for step in self._run.steps(stop=stop):
             progress = {"fraction": step.fraction, "phase": "flight", "message": f"{step.message}{again}"}
@@ -37,7 +37,7 @@ class SimulationWork:
         return Outcome(document, {**result_file(document), **files})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
-        """Return None: half a flight is no result."""
+        """Return None: half a flight is not a result."""
         return
 
 

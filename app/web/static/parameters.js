@@ -77,12 +77,21 @@ function remark(name, result, undetermined) {
   return said.filter(Boolean).join("; ") || null;
 }
 
+const COLUMNS_OF_PARAMETERS = 4;
+
+/* A Cramer-Rao bound, per cent of the value: beyond ten times the value it says no more than that. */
+function boundText(percent) {
+  if (!known(percent)) return "";
+  return percent > 1000 ? "> 1000" : show.number(percent, 2);
+}
+
 /* The row of a parameter, and one below it where there is something to say. */
 function parameterRows({ name, title, value }, result, undetermined) {
   const [shown, spread] = showMeasured(value, underCurrentNames(result.uncertainty?.interval_95)[name]);
   const why = remark(name, result, undetermined), grey = undetermined.has(name) ? "undetermined" : "";
-  const row = element("tr", { class: grey }, element("th", { scope: "row" }, title), element("td", { class: "number" }, shown), element("td", { class: "number" }, spread));
-  return why ? [row, element("tr", { class: "remark" }, element("td", { colspan: 3 }, why))] : [row];
+  const cells = [shown, spread, boundText(underCurrentNames(result.uncertainty?.cramer_rao_percent)[name])];
+  const row = element("tr", { class: grey }, element("th", { scope: "row" }, title), ...cells.map((text) => element("td", { class: "number" }, text)));
+  return why ? [row, element("tr", { class: "remark" }, element("td", { colspan: COLUMNS_OF_PARAMETERS }, why))] : [row];
 }
 
 /* The identified model as a table; result: {model, uncertainty, search}, the last two where they are known. The model
@@ -91,12 +100,13 @@ function modelCard(result, title = "Identified model") {
   if (!result.model) return card(title, {}, element("p", {}, "None was found yet that flies the samples."));
   const undetermined = undeterminedNames(result.uncertainty);
   const measured = Object.keys(result.uncertainty?.interval_95 ?? {}).length > 0;
-  const heads = [["", null], ["Value", "number"], [measured ? "95 % interval" : "", "number"]];
+  const bounded = Object.keys(result.uncertainty?.cramer_rao_percent ?? {}).length > 0;
+  const heads = [["", null], ["Value", "number"], [measured ? "95 % interval" : "", "number"], [bounded ? "Cramér–Rao, %" : "", "number"]];
   const head = element("thead", {}, element("tr", {}, ...heads.map(([text, kind]) => (text ? element("th", { scope: "col", class: kind }, text) : element("td")))));
   const bodies = parameterGroups(result.model).map(([group, rows]) => element(
     "tbody",
     {},
-    element("tr", {}, element("th", { class: "group", scope: "rowgroup", colspan: 3 }, group)),
+    element("tr", {}, element("th", { class: "group", scope: "rowgroup", colspan: COLUMNS_OF_PARAMETERS }, group)),
     ...rows.flatMap((row) => parameterRows(row, result, undetermined)),
   ));
   return card(

@@ -4,16 +4,18 @@
 const number = (text) => ({ text, number: true });
 const count = (value, unit) => `${value} ${unit}${value === 1 ? "" : "s"}`;
 const ANGLES = [["phi", "φ"], ["theta", "θ"], ["psi", "ψ"]];
+const LETTERS = Object.fromEntries(ANGLES);
 const RMS_TITLES = ANGLES.map(([, letter]) => number(`RMS ${letter}, mrad`));
 
 /* ---- requests in few words ---- */
 
 const links = (asked) => (asked.links_per_wing ? count(asked.links_per_wing, "link") : null);
+const drives = (asked) => asked.drives?.join(", ").replaceAll("_", " ");
 const DESCRIBED = {
-  identify: (asked) => [links(asked), asked.method],
-  study: (asked) => [`${asked.compared_links.join(", ")} links`, asked.method],
-  simulate: (asked) => [`${asked.model} model`, links(asked), `${asked.duration_s} s`],
-  optimize: (asked) => [`to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
+  identify: (asked) => [drives(asked), links(asked), asked.method],
+  study: (asked) => [drives(asked), `${asked.compared_links.join(", ")} links`, asked.method],
+  simulate: (asked) => [drives(asked), `${asked.model} model`, links(asked), `${asked.duration_s} s`],
+  optimize: (asked) => [drives(asked), `to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
   export: (asked) => [links(asked), asked.format],
 };
 const OPERATIONS = document.body.dataset.operations.split(" ");
@@ -37,6 +39,42 @@ function warningsCard(warnings) {
   return card(count(warnings.length, "warning"), { help: "warnings", kind: "warnings" }, element("ul", {}, ...items));
 }
 
+const GRADES = {
+  good: "The model may be used as it is.",
+  usable: "The model may be used with the reservations below.",
+  poor: "Do not rely on this model.",
+  failed: "There is no model.",
+};
+
+/* Whether a model may be believed, why, and what to do next; null of results of earlier versions. */
+function verdictCard(verdict, title = "Verdict") {
+  if (!verdict) return null;
+  const list = (sentences) => element("ul", {}, ...sentences.map((sentence) => element("li", {}, sentence)));
+  const steps = verdict.next_steps ?? [];
+  return card(
+    title, { help: "verdict", kind: `verdict ${verdict.grade}` },
+    element("p", { class: "row" }, grade(verdict), element("b", {}, GRADES[verdict.grade] ?? "")),
+    list(verdict.reasons),
+    ...(steps.length ? [element("p", {}, element("b", {}, "What to do next")), list(steps)] : []),
+  );
+}
+
+function grade(verdict) {
+  return element("span", { class: `pill ${verdict.grade}` }, verdict.grade);
+}
+
+/* Theil's coefficient with its parts, and what the residuals of each sample are like. */
+function residualsCard(fits) {
+  const share = (part) => (known(part) ? `${show.number(100 * part, 2)} %` : "–");
+  const rows = fits.flatMap((fit) => Object.entries(fit.statistics ?? {}).filter(([, found]) => known(found.theil)).map(([channel, found]) => [
+    fit.sample, LETTERS[channel] ?? channel.replaceAll("_", " "), show.number(found.theil, 2), share(found.theil_bias), share(found.theil_variance), share(found.theil_covariance),
+    show.number(found.lag_1, 2), found.white === true ? "yes" : found.white === false ? "no" : "–", show.number(found.drive_correlation, 2),
+  ]));
+  if (!rows.length) return null;
+  const titles = ["Sample", "Channel", ...["Theil's U", "bias", "variance", "covariance", "lag 1", "white", "with drives"].map(number)];
+  return card("Residuals", { help: "residuals" }, table(titles, rows, { stack: true }));
+}
+
 function fitCard(fits, title = "Fit") {
   const share = (fit) => (known(fit.J_identified) && fit.J_rigid > 0 ? show.percent(fit.J_identified / fit.J_rigid) : "–");
   const rows = fits.map((fit) => [
@@ -51,13 +89,14 @@ function studyCards(result) {
   const chosen = result.rows.findIndex((row) => row.links_per_wing === result.recommended?.links_per_wing);
   const rows = result.rows.map((row) => [
     count(row.links_per_wing, "link"), String(row.bodies), String(row.parameters), show.cost(row.J_train), show.cost(row.J_held_out),
-    ...ANGLES.map(([angle]) => show.milliradians(row.rms_rad[angle])), show.milliseconds(row.flight_s), show.duration(row.identify_s),
+    ...ANGLES.map(([angle]) => show.milliradians(row.rms_rad[angle])), show.milliseconds(row.flight_s), show.duration(row.identify_s), row.verdict ? grade(row.verdict) : "–",
   ]);
-  const titles = ["Links per wing", ...["Bodies", "Unknowns", "J fitted, rad²", "J held out, rad²"].map(number), ...RMS_TITLES, ...["One flight, ms", "Identified in"].map(number)];
+  const titles = ["Links per wing", ...["Bodies", "Unknowns", "J fitted, rad²", "J held out, rad²"].map(number), ...RMS_TITLES, ...["One flight, ms", "Identified in", "Verdict"].map(number)];
   const reason = result.recommended?.reason ? element("p", {}, `Recommended: ${result.recommended.reason}`) : null;
   const cards = [card("Accuracy and cost", { help: "study" }, reason, table(titles, rows, { marked: chosen, stack: true }))];
   if (chosen >= 0) {
     const row = result.rows[chosen];
+    cards.push(...[verdictCard(row.verdict, `Verdict on ${count(row.links_per_wing, "link")} per wing`)].filter(Boolean));
     cards.push(fitCard(row.fit, `Fit with ${count(row.links_per_wing, "link")} per wing`), modelCard({ search: result.search, ...row }, "Recommended model"));
   }
   return cards;
@@ -142,7 +181,7 @@ function exportCards(result) {
 }
 
 const RESULT_CARDS = {
-  identify: (result) => [fitCard(result.fit), modelCard(result)],
+  identify: (result) => [fitCard(result.fit), modelCard(result), residualsCard(result.fit)],
   study: studyCards,
   simulate: simulateCards,
   optimize: optimizeCards,
@@ -150,7 +189,7 @@ const RESULT_CARDS = {
 };
 
 function resultCards(operation, result) {
-  return [warningsCard(result.warnings), ...(RESULT_CARDS[operation]?.(result) ?? [])].filter(Boolean);
+  return [verdictCard(result.verdict), warningsCard(result.warnings), ...(RESULT_CARDS[operation]?.(result) ?? [])].filter(Boolean);
 }
 
 /* ---- files ---- */

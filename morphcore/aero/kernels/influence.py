@@ -1,8 +1,8 @@
 """Velocities induced by all vortex rings of a lattice and by their straight wake.
 
-Every edge of the lattice is computed once and handed to the one or two rings it belongs to. The last row's
-aft edge and the wake's first edge cancel exactly, so neither exists here: a ring of the last row with its
-wake is a horseshoe of three edges and two legs. The point index is innermost and contiguous.
+Every edge of the lattice is computed once and added to the one or two rings it belongs to. The last row's aft
+edge and the wake's first edge cancel exactly and are omitted: a ring of the last row with its wake is a
+horseshoe of three edges and two legs. The point index is innermost and contiguous.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ def ring_influence(
     ----------
     points : (3, p) m. corners : (c, 3) ring corners, m.
     edge_start, edge_end : (e,) corner indices. edge_core : (e,) core radius, m.
-    edge_plus, edge_minus : (e,) ring whose circulation runs along the edge and the one against it, -1 for
-        none.
+    edge_plus, edge_minus : (e,) ring whose circulation runs along the edge, and ring whose circulation runs
+    against it; -1 for none.
     leg_start : (l,) corner index on the trailing edge; leg_plus, leg_minus, leg_core : (l,) as for edges.
-    smoothed : whether the law of the core is "smoothed", else "line".
+    smoothed : True for the core law "smoothed", False for "line".
     wake : (3,) unit vector of the free stream. scratch : (3, p).
     out : (3, r, p) velocity, 1/m.
     """
@@ -56,7 +56,7 @@ def ring_influence(
         start, end = edge_start[edge], edge_end[edge]
         px, py, pz = corners[start, 0], corners[start, 1], corners[start, 2]
         ex, ey, ez = corners[end, 0] - px, corners[end, 1] - py, corners[end, 2] - pz
-        # the law is chosen outside the loops over the points, which stay without a branch
+        # the law is chosen outside the loops over the points, to keep them free of branches
         if smoothed:
             core2 = edge_core[edge] ** 2
             for p in range(count):

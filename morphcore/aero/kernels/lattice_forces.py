@@ -1,4 +1,4 @@
-"""Kutta-Joukowski forces and profile drag of a lattice on its sections, while velocities change."""
+"""Kutta-Joukowski forces and profile drag of a lattice on its sections, for changing velocities."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from morphcore.jit import entry_kernel, kernel
 
 @entry_kernel
 def place_lattice(parts, place, stream_B):
-    """Put the lattice on the sections of ``place``, wake along stream_B (3,); its normal influence."""
+    """Put the lattice on the sections of ``place``, wake along stream_B (3,); compute normal influence."""
     place_points(parts, place, stream_B)
     normal_influence(parts, place)
 
@@ -41,7 +41,7 @@ def add_rider_force(R, arm, fx, fy, fz, out):
 
 @entry_kernel
 def blocked_flow(parts, place, twists, wind_B, out):
-    """Normal velocity (r,) that the circulations have to bring about at the control points, m/s.
+    """Normal velocity (r,) that the circulations have to induce at the control points, m/s.
 
     ``twists`` (k, 6) of the sections in their axes; wind_B (3,).
     """
@@ -57,11 +57,11 @@ def blocked_flow(parts, place, twists, wind_B, out):
 
 @entry_kernel
 def section_forces(parts, place, gamma, twists, wind_B, still, out):
-    """Force vectors (k, 6) on the sections, in their axes, for circulations as they act (r,).
+    """Force vectors (k, 6) on the sections, in their axes, for the acting circulations (r,).
 
     Each bound edge bears density * gamma * velocity x edge, half on each end corner; its middle moves with
-    the mean of its corners. Profile drag of each strip is along the velocity of its middle. ``still`` : of
-    `induced_velocity`, 0 for exact.
+    the mean of its corners. Profile drag of each strip is along the velocity of its middle. ``still`` :
+    tolerance of `induced_velocity`, 0 for exact.
     """
     induced_velocity(parts, place, gamma, still)
     for c in range(place.corners.shape[0]):

@@ -1,10 +1,10 @@
-"""A lattice in one place: its normal influence, and the velocity that all circulations together induce.
+"""A lattice in one position: its normal influence, and the velocity induced by all circulations together.
 
-Where the circulations are one set at a time, influence on every point need not be kept by ring and component:
-control points keep its normal part only, and the velocity at the edges is summed edge by edge, each with its
-net circulation, at the price of one product with a kept matrix. The distance of every point from every
-corner serves all edges that meet there. The point index is innermost; loops write to one array each, which
-lets the compiler take them by vectors.
+With one set of circulations at a time, influence need not be stored for every point, ring and component:
+control points keep the normal part only, and the velocity at the edges is summed edge by edge, each with its
+net circulation, at the cost of one product with a stored matrix. The distance of every point from every
+corner serves all edges that meet there. The point index is innermost; each loop writes to one array, which
+lets the compiler vectorise it.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ IntArray = NDArray[np.int64]
 
 
 class LatticeParts(NamedTuple):
-    """What of a lattice never changes (c corners, r rings, e bound edges, l wake legs, t strips).
+    """The constant parts of a lattice (c corners, r rings, e bound edges, l wake legs, t strips).
 
     Lines : (e + l,) bound edges, then legs; ``line_end`` of a leg is -1. line_plus, line_minus : the ring
-    whose circulation runs along the line and the one against it, r for none. line_core : core radius, m, to
+    whose circulation runs along the line, and the one against it; r for none. line_core : core radius, m, to
     the fourth, "smoothed" squared. ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on :
     sections and places of riders, as in `moving_lattice.Riders`. stretch : 1 / beta of Goethert's rule.
     density : kg/m^3.
@@ -128,7 +128,7 @@ def place_points(parts, place, stream_B):
         place.stretched[c, 1] = y + along * u[1]
         place.stretched[c, 2] = z + along * u[2]
     for p in range(rings):
-        place.summed[p] = inf  # of another place
+        place.summed[p] = inf  # data of another place
         control = place.control_velocity[p]  # not yet in use
         _ride(place.R_BS[parts.control[p]], place.x_B[parts.control[p]], parts.control_arm[p], control)
         along = more * (control[0] * u[0] + control[1] * u[1] + control[2] * u[2])
@@ -179,7 +179,7 @@ def _normal(corners, of_ring, side, out, p):
 
 @kernel
 def _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, smoothed, out):
-    """Factors k of a segment's velocity -k (e x a) at points; the law is chosen outside the loops."""
+    """Factors k of a segment's velocity -k (e x a) at points; the core law is chosen outside the loops."""
     length2 = ex * ex + ey * ey + ez * ez
     if smoothed:
         for p in range(out.size):
@@ -216,7 +216,7 @@ def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, smoothed, out):
 
 @kernel
 def _project(x, y, z, px, py, pz, ex, ey, ez, nx, ny, nz, k):
-    """k times (e x a) . n, in place of k."""
+    """Replace k by k times (e x a) . n."""
     for p in range(k.size):
         ax, ay, az = px - x[p], py - y[p], pz - z[p]
         cx, cy, cz = ey * az - ez * ay, ez * ax - ex * az, ex * ay - ey * ax
@@ -231,7 +231,7 @@ def _add(factor, k, out):
 
 @kernel
 def _subtract_turned(k, y, z, py, pz, ey, ez, out):
-    """One component of k (e x a) off ``out``."""
+    """Subtract one component of k (e x a) from ``out``."""
     for p in range(k.size):
         out[p] -= k[p] * (ey * (pz - z[p]) - ez * (py - y[p]))
 
@@ -249,7 +249,7 @@ def _along(parts, place, line):
 
 @inlined
 def normal_influence(parts, place):
-    """Fill in the normal velocity at every control point of every ring of unit circulation, wake included."""
+    """Compute the normal velocity at every control point from every unit ring, wake included."""
     rings = place.normals.shape[1]
     place.influence[:] = 0.0
     k = place.row[:rings]
@@ -272,10 +272,10 @@ def normal_influence(parts, place):
 
 @inlined
 def induced_velocity(parts, place, gamma, still):
-    """Fill in the lines' net circulations and the velocity (3, e) that they induce at the edges' middles.
+    """Compute the lines' net circulations and the velocity (3, e) that they induce at the edges' middles.
 
-    gamma : (r,) of the rings. The velocity stays as it is where no circulation has moved by more than
-    ``still`` of the largest since it was summed in this place.
+    gamma : (r,) of the rings. The velocity is kept if no circulation has changed by more than ``still`` of
+    the largest since it was summed in this place.
     """
     rings = place.normals.shape[1]
     largest, moved = 0.0, 0.0
@@ -327,8 +327,9 @@ def _sum_induced(parts, place, gamma):
 def refine(influence, inverse, right, residual, tolerance, maximum, gamma):
     """Improve gamma (r,) until ``influence`` (r + 1, r), ring by point, times it gives right (r,).
 
-    With the inverse (r, r) of a like matrix, point by ring: what is left goes down by the part by which both
-    differ. Returns whether that came below ``tolerance`` times the largest of right in ``most`` passes.
+    Uses the inverse (r, r), point by ring, of a similar matrix: each pass reduces the residual in proportion
+    to the difference of the two. Returns whether it fell below ``tolerance`` times the largest element of
+    right within ``most`` passes.
     """
     rings = right.size
     scale = 0.0

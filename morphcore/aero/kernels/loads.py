@@ -1,7 +1,7 @@
 """Air loads on chains of flat links from a reduced lattice operator shared by all lanes.
 
 The lattice is fixed on the undeformed surface; its strips ride on the links. A strip that spans a joint
-belongs to both links by the fractions of its width (``overlap``), so that loads are continuous in the
+belongs to both links in proportion to its width on each (``overlap``), so that loads are continuous in the
 division lengths. The operator maps the normal velocity of the strips (two inputs each: at the link axis, and
 its slope along the chord) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
 follow (see aero/operator.py for their derivation):
@@ -12,7 +12,7 @@ follow (see aero/operator.py for their derivation):
     3  w_x   induced normal velocity weighted by the bound spanwise circulation, m/s
     4  w_y   the same for the chordwise edges, m/s
 
-Everything is in link axes; velocities are those of the structure relative to the air at rest.
+All quantities are in link axes; velocities are those of the structure relative to still air.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
 
 @kernel
 def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
-    """Fill in what the circulation answers to: a link's (v_z, omega_x, omega_y) after lag, times lift factor.
+    """Compute the motion that drives the circulation: lagged (v_z, omega_x, omega_y) times lift factor.
 
     ``slow`` and ``fast`` hold both exponentials carried to the present for a motion that stayed at
-    ``previous``; what its linear change since then adds, in proportion to the lag weights of the link, is
-    added here.
+    ``previous``; the contribution of its linear change since then, in proportion to the lag weights of the
+    link, is added here.
     """
     if (
         not_in_lanes(link, lanes)
@@ -69,7 +69,7 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
 
 @kernel
 def strip_inputs(lanes, surface, ranges, overlap, effective, inputs):
-    """Normal velocity of each strip of a surface at the link axis and its slope along x: two rows a strip."""
+    """Normal velocity of each strip of a surface at the link axis and its slope along x: two rows each."""
     if not_in_lanes(overlap, lanes) or not_in_lanes(effective, lanes) or not_in_lanes(inputs, lanes):
         return
     strip0, strips = surface[STRIP0], surface[STRIPS]
@@ -146,7 +146,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         for l in range(len(lanes)):
             row[l] = 0.0
     number = surface[LINK0] + k
-    slope = strips[surface[STRIP0], 2]  # one for the whole surface: taper is linear
+    slope = strips[surface[STRIP0], 2]  # one slope for the whole surface: taper is linear
     for j in range(ranges[number, 0], ranges[number, 1]):
         pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
         part = overlap[pair : pair + 2]
@@ -174,7 +174,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
         ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
         g0, g1, g2 = sums[0, l], sums[1, l], sums[2, l]
-        # a slanted trailing edge cuts spanwise air too; its slope times chord times yaw rate is left out
+        # a slanted trailing edge also meets spanwise flow; slope times chord times yaw rate is neglected
         vy_slope = uy * slope
         wz_slope = wz * slope
         lift = ux * g0 - wz * g1 - vy_slope * g0 - wz_slope * sums[3, l]

@@ -1,18 +1,18 @@
 """Velocity induced by straight vortices, regularised by a core of one of two laws.
 
-Segments and semi-infinite legs are written without the difference of nearly equal numbers of the textbook
-form (Katz & Plotkin 2001, equation 10.115), which on the vortex's extension, where the true velocity
-vanishes, divides rounding noise by the squared distance from the line and ends in 0/0. On a straight wing
-every edge lies in line with its neighbours.
+Segments and semi-infinite legs avoid the cancellation in the textbook form (Katz & Plotkin 2001, equation
+10.115). On the vortex's extension, where the true velocity vanishes, that form divides rounding noise by the
+squared distance from the line and ends in 0/0; and on a straight wing every edge is in line with its
+neighbours.
 
 "Line" is the core of Vatistas (Vatistas, Kozel & Mih 1991, n = 2): a factor h^2 / sqrt(h^4 + core^4), with h
 the distance from the vortex's *line*, so that a vortex cut in two induces what the whole one does.
 
 "Smoothed" adds a cut-off to the denominator of the product form,
 ``(|a| + |b|) / (|a||b| (|a||b| + a.b) + core^2 l^2)`` (van Garrel 2003, ECN-C--03-079, whose cut-off has no
-unit; the l^2 of the segment's length makes it a length, as in OpenFAST's OLAF). Beside the middle of a long
-vortex it is a factor h^2 / (h^2 + 2 core^2), which at four cores still takes 11 per cent ("line": 0.2), and a
-vortex cut in two does not induce what the whole one does.
+unit; the l^2 of the segment's length makes it a length, as in OpenFAST's OLAF). Near the middle of a long
+vortex it is a factor h^2 / (h^2 + 2 core^2), which at a distance of four cores still removes 11 per cent
+("line": 0.2), and a vortex cut in two does not induce what the whole one does.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from math import sqrt
 from morphcore.jit import inlined
 
 FOUR_PI = 12.566370614359172
-# keeps a point that sits on a corner from 0 * inf; far below any product of lengths (m^2 and m^8)
+# avoids 0 * inf for a point on a corner; far below any product of lengths (m^2 and m^8)
 TINY = 1e-150
 
 
@@ -37,9 +37,9 @@ def segment_strength(a, b, dot, cross2, length2, core4):
     # (ab + dot)(ab - dot) = cross2, and one of the two factors is always a sum: alongside (dot < 0) the
     # singular 1 / cross2 meets the core's cross2 and drops out; beyond the ends nothing is singular
     root = sqrt(cross2 * cross2 + core4 * length2 * length2 + TINY)
-    beside = dot <= 0.0
-    above = ab - dot if beside else cross2
-    below = 1.0 if beside else ab + dot
+    alongside = dot <= 0.0
+    above = ab - dot if alongside else cross2
+    below = 1.0 if alongside else ab + dot
     return (a + b) * above / (FOUR_PI * ab * below * root)
 
 
@@ -47,10 +47,10 @@ def segment_strength(a, b, dot, cross2, length2, core4):
 def leg_strength(a, along, cross2, core4):
     """Factor k of a leg's velocity -k (u x a), 1/m; "line". ``along`` is a . u, else as above."""
     root = sqrt(cross2 * cross2 + core4)
-    # along < 0: the point lies downstream of the start, beside the leg
-    beside = along <= 0.0
-    above = a - along if beside else cross2
-    below = 1.0 if beside else a + along
+    # along < 0: the point lies downstream of the start, next to the leg
+    alongside = along <= 0.0
+    above = a - along if alongside else cross2
+    below = 1.0 if alongside else a + along
     return above / (FOUR_PI * (a + TINY) * below * root)
 
 

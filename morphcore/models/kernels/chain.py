@@ -1,7 +1,7 @@
 """Accelerations of the equivalent model's tree: a fuselage with chains of links on hinges, over lanes.
 
-Strings the passes together: twists from root to tips, air loads, articulated inertias from tips to root,
-accelerations from root to tips. The rows are those of layout.py.
+Combines the passes: twists from root to tips, air loads, articulated inertias from tips to root,
+accelerations from root to tips. Rows as in layout.py.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def body_axes(lanes, state, wind, gravity, scratch):
 
 @kernel
 def start_base(lanes, constants, twist, shared, inertia, force):
-    """Fuselage inertia, its bias force v x* I v, less the constant force and moment."""
+    """Set the fuselage's inertia and its bias force v x* I v minus the constant force and moment."""
     if (
         not_in_lanes(constants, lanes)
         or not_in_lanes(twist, lanes)
@@ -105,8 +105,8 @@ def start_base(lanes, constants, twist, shared, inertia, force):
 
 
 @kernel
-def clear(lanes, block):  # noqa: ARG001 - every kernel is called with its lanes
-    """Zero some rows, as one long vector."""
+def clear(lanes, block):  # noqa: ARG001 - every kernel takes the number of lanes
+    """Set some rows to zero, as one long vector."""
     rows = block.reshape(-1)
     for i in range(rows.size):
         rows[i] = 0.0
@@ -129,12 +129,13 @@ def accelerations(
     inputs,
     outputs,
 ):
-    """Base and joint accelerations of a block for joint forces and added diagonal found in the scratch block.
+    """Base and joint accelerations of a block, for joint forces and added diagonal in the scratch block.
 
-    ``hinges`` (s, HINGE_ROWS), ``hinge_accelerations`` (s, 6): motion of the surfaces against the fuselage.
+    ``hinges`` (s, HINGE_ROWS), ``hinge_accelerations`` (s, 6): motion of the surfaces relative to the
+    fuselage.
 
-    Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, joint
-    accelerations and the links' twists in theirs.
+    Leaves the spatial acceleration of the fuselage (without gravity) in rows S_BASE_ACCELERATION, and joint
+    accelerations and the links' twists in their own rows.
     """
     links = ranges.shape[0]
     joints = links - surfaces.shape[0]

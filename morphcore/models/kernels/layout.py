@@ -1,4 +1,4 @@
-"""How a lane's state, constants and scratch are laid out in rows."""
+"""Layout of a lane's state, constants and scratch in rows."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.multibody.kernels.gimbal import JOINT_ROWS
 
 # rows of the state: attitude quaternion of R_NB, omega_B, v_B, position in N; then joint angles, joint rates,
-# and for each link the slow and the fast lag state and the motion they follow (3 rows each, all slow ones
-# first)
+# and for each link the slow and the fast lag state and the motion that they follow (3 rows each, all slow
+# ones first)
 OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
 # rows of a lane's constants: force and moment in B, then links, stiffness, damping, overlap
 FORCE_C, MOMENT_C, LINKS_C = 0, 3, 6

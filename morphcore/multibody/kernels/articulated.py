@@ -1,8 +1,8 @@
-"""Articulated bodies over lanes: what links, gimbals and hinges have in common.
+"""Articulated bodies over lanes: operations shared by links, gimbals and hinges.
 
 Featherstone (2008), table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics), with the three
-revolutes of a gimbal joined into one joint of three degrees of freedom, which is the same by elimination of
-its massless frames.
+revolutes of a gimbal combined into one joint of three degrees of freedom, which is equivalent because its
+frames are massless.
 
 Rows of the lane arrays ((rows, width), see lanes.py):
 
@@ -18,14 +18,14 @@ from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
 # rows of a link's constants: its mass properties (mass, m x, m y, Ixx, Iyy, Izz, Ixy) and the offset of its
-# joint along y; then those of the air, which aero/kernels/loads.py names
+# joint along y; then the aerodynamic rows, named in aero/kernels/loads.py
 L_MASS, L_OFFSET = 0, 7
 LINK_ROWS = 16
 
 
 @inlined
 def inverse_symmetric(a00, a01, a02, a11, a12, a22):
-    """Inverse of a symmetric, well scaled 3 x 3 matrix by cofactors: its six distinct elements."""
+    """Inverse of a symmetric, well-scaled 3 x 3 matrix by cofactors: its six distinct elements."""
     m00, m01, m02 = a11 * a22 - a12 * a12, a02 * a12 - a01 * a22, a01 * a12 - a02 * a11
     m11, m12, m22 = a00 * a22 - a02 * a02, a01 * a02 - a00 * a12, a00 * a11 - a01 * a01
     inverse = 1.0 / (a00 * m00 + a01 * m01 + a02 * m02)
@@ -110,7 +110,7 @@ def shifted_inertia(
 
 @inlined
 def carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia, force, l):
-    """Rotate by R and move by p the articulated inertia and force of one lane, in place."""
+    """Rotate by R and shift by p the articulated inertia and force of one lane, in place."""
     a0, a1, a2, a3, a4, a5 = congruence(
         r00, r01, r02, r10, r11, r12, r20, r21, r22,
         inertia[0, l], inertia[1, l], inertia[2, l], inertia[3, l], inertia[4, l], inertia[5, l],
@@ -147,7 +147,7 @@ def carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia,
 
 @kernel
 def add_link(lanes, link, twist, wrench, inertia, force):
-    """Add a flat link's rigid inertia and its bias force v x* I v - wrench to what it carries already."""
+    """Add a flat link's rigid inertia and its bias force v x* I v - wrench to those already accumulated."""
     if not_in_lanes(link, lanes) or not_in_lanes(twist, lanes) or not_in_lanes(wrench, lanes):
         return
     if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
@@ -238,8 +238,8 @@ def accumulate(lanes, inertia, force, total_inertia, total_force):
 def accumulate_pair(lanes, inertia, force, total_inertia, total_force):
     """Add a surface's articulated inertia and force, and those of its mirror image, to the fuselage's.
 
-    Under reflection about the x-z plane the components (wx, wz, v_y) change their sign: products of two that
-    do, or of two that do not, are doubled, the others cancel.
+    Under reflection about the x-z plane the components (wx, wz, v_y) change sign. Products of two components
+    that both change or both keep their sign are doubled, the others cancel.
     """
     if (
         not_in_lanes(inertia, lanes)

@@ -1,13 +1,13 @@
 """Geometrically exact beam elements on SE(3): forces, tangents, and the poses of sections between the nodes.
 
 An element joins node a to node b; its strain is the logarithm ``d`` of their relative pose, H_b = H_a exp(d),
-against that at rest. Poses between them are H_a exp(s d), s in 0..1: a helix, whose deformation is constant,
-free of shear locking, and blind to rigid motion. Sonneville, Cardona & Brüls (2014).
+minus that at rest. Poses between them are H_a exp(s d), s in 0..1: a helix of constant deformation, free of
+shear locking and unaffected by rigid motion. Sonneville, Cardona & Brüls (2014).
 
-The stiffness (6, 6) that belongs to ``d`` is the inverse of the element's exact flexibility under loads at
-its nodes (Magnus' expansion: a linearly varying curvature appears in ``d`` as a shear of length^3 / 12 times
-its slope; MacNeal 1978 found the same "residual bending flexibility" for the linear element). So one element
-is exact in small bending under nodal loads, where the bare helix would be wrong by length^2.
+The stiffness (6, 6) conjugate to ``d`` is the inverse of the element's exact flexibility under loads at its
+nodes (Magnus' expansion: a linearly varying curvature appears in ``d`` as a shear of length^3 / 12 times its
+slope; MacNeal 1978 found the same "residual bending flexibility" for the linear element). So one element is
+exact in small bending under nodal loads, where the bare helix would be wrong by length^2.
 
 Inertia is integrated at Gauss points with the exact velocity and acceleration of the helix.
 
@@ -63,15 +63,15 @@ def internal_force(rest, stiffness, damping, d, d_rate, strain, sigma):
 def beam_forces(
     ends, rest, stiffness, damping, mass, gauss, series, R, x, V, A, gravity_N, v, poses, strains, rates, out
 ):
-    """Add to out (n, 6) the forces that internal strain, inertia and weight ask of the nodes, in node axes.
+    """Add to out (n, 6) the forces that strain, inertia and weight require at the nodes, in node axes.
 
-    In motion without other loads they vanish. ``gauss``, ``series`` : the Gauss points and their
+    They vanish in motion without other loads. ``gauss``, ``series`` : the Gauss points and their
     `helix.helix_series`. ``strains`` and ``rates`` (e, 6) return d and its rate; ``v`` (VECTOR_SCRATCH, 6)
     and ``poses`` (2, 4, 3) are scratch. Returns the number of the first element that turned by more than
     `se3.LARGEST_ANGLE`, else -1.
 
-    Weight is inertia against free fall: translation with the acceleration of gravity is rigid, and rigid
-    motion passes through the helix unchanged.
+    Weight is inertia relative to free fall: translation with the acceleration of gravity is a rigid motion,
+    which the helix reproduces exactly.
     """
     u, w, u1, u2, u1_rate, u2_rate = v[0], v[1], v[2], v[3], v[4], v[5]
     twist, acceleration, momentum, force, sigma = v[6], v[7], v[8], v[9], v[10]
@@ -186,7 +186,7 @@ def body_force(inertia, V, A, gravity_B, v, out):
 
 @entry_kernel
 def body_forces(nodes, inertia, R, V, A, gravity_N, v, out):
-    """Add to out (n, 6) what inertia and weight of bodies (k, 6, 6) ask of the nodes (k,) they sit on."""
+    """Add to out (n, 6) the forces that inertia and weight of bodies (k, 6, 6) require at nodes (k,)."""
     for k in range(nodes.size):
         node = nodes[k]
         gravity = v[4]
@@ -199,7 +199,7 @@ def body_forces(nodes, inertia, R, V, A, gravity_N, v, out):
 
 @entry_kernel
 def place_sections(ends, fractions, series, elements, strains, R, x, v, poses, R_out, x_out, blocks):
-    """Poses of sections for strains as given, and the maps between their twists and the nodes'.
+    """Poses of sections for given strains, and the maps between their twists and the nodes'.
 
     Section k lies at ``fractions[k]`` of ``elements[k]``, with its `helix.helix_series` in series[k]. R_out
     (k, 3, 3), x_out (k, 3); blocks (k, 2, 3, 3) of `helix.helix_map`. An element below zero, -1 - node,
@@ -388,10 +388,10 @@ def invert(matrix, out):
 def eliminate(ends, tangents, diagonals, inverses, couplings, m):
     """Block elimination of open chains, tips -> roots; elements of a chain are numbered from its root.
 
-    ``tangents`` (e, 12, 12) of the elements; ``diagonals`` (n, 6, 6) come with what sits on the nodes besides
-    the elements and go with the condensed matrices; a root's is then the whole chain's as felt there.
-    ``inverses`` and ``couplings`` (e, 6, 6) belong to each element's outer node: its inverse, and the inverse
-    times the coupling to the inner node.
+    ``tangents`` (e, 12, 12) of the elements. ``diagonals`` (n, 6, 6) contain on entry the matrices of
+    everything else at the nodes, and on return the condensed matrices; the one of a root is then that of its
+    whole chain. ``inverses`` and ``couplings`` (e, 6, 6) belong to each element's outer node: its inverse,
+    and the inverse times the coupling to the inner node.
     """
     for element in range(ends.shape[0]):
         for side in range(2):
@@ -426,7 +426,7 @@ def condense(ends, tangents, inverses, v, right):
 
 @entry_kernel
 def substitute(ends, couplings, right):
-    """Roots -> tips: from condensed right sides (n, 6) with the roots' solution to the solution."""
+    """Roots -> tips: from condensed right-hand sides (n, 6) with the roots' solution to the full solution."""
     for element in range(ends.shape[0]):
         a, b = ends[element, 0], ends[element, 1]
         for i in range(6):

@@ -76,7 +76,7 @@ def gimbal_twist(lanes, twist_parent, link, q, v, joint, twist):
 def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
     """Articulate inertia and bias force through a gimbal: I - U D^-1 U^T and p + U D^-1 u.
 
-    ``tau`` (3 rows) is the joint force, ``added`` (3 rows) what the implicit step adds to the joint-space
+    ``tau`` (3 rows) is the joint force, ``added`` (3 rows) the implicit step's addition to the joint-space
     diagonal.
     """
     if not_in_lanes(tau, lanes) or not_in_lanes(added, lanes) or not_in_lanes(joint, lanes):
@@ -184,7 +184,7 @@ def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
 
 @kernel
 def carry_through_gimbal(lanes, link, joint, inertia, force):
-    """Express what a link carries, in place, in its parent's axes and at its parent's origin."""
+    """Transform a link's accumulated inertia and force, in place, to its parent's axes and origin."""
     if (
         not_in_lanes(link, lanes)
         or not_in_lanes(joint, lanes)

@@ -1,13 +1,13 @@
 """Twists between the nodes of an element, and the virtual work of forces there.
 
-On the helix H_a exp(s d) the twist at s is V_a + P (V_b - V_a), whatever moves the nodes, with P(s, d) the
+On the helix H_a exp(s d) the twist at s is V_a + P (V_b - V_a) for any motion of the nodes, with P(s, d) the
 function g(x) = (1 - e^(-s x)) / (1 - e^(-x)) of x = ad(d): with P_a and P_b the maps of both nodes' twists,
-P_b = s T(s d) T(d)^-1 and P_a = e^(-s ad) - P_b e^(-ad) = 1 - P_b, as e^(-s x) - g e^(-x) = 1 - g. Node axes
-and the section's own axes alike, so a time derivative is taken of components.
+P_b = s T(s d) T(d)^-1 and P_a = e^(-s ad) - P_b e^(-ad) = 1 - P_b, as e^(-s x) - g e^(-x) = 1 - g. Twists are
+in node axes and in the section's own axes, so time derivatives are those of the components.
 
-Powers of ad beyond the second need no further brackets. With W = w~, N = v~ of d = [w; v], z = -|w|^2 and
-m = w . v, W^3 = z W, and ad^k has W^k in its blocks on the diagonal and below them the derivative of W^k
-along N. So with alpha(z), beta(z) the odd and even part of g's series,
+Powers of ad above the second need no further brackets. With W = w~, N = v~ of d = [w; v], z = -|w|^2 and m =
+w . v, W^3 = z W, and ad^k has W^k in its blocks on the diagonal and below them the derivative of W^k along N.
+So with alpha(z), beta(z) the odd and even part of g's series,
 
     P = s + alpha ad + beta ad^2 - 2 m E (alpha' ad + beta' ad^2),
 
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from morphcore.jit import kernel
 
-TERMS = 13  # of each series in z: (1.5 / 2 pi)^26 is below rounding at `se3.LARGEST_ANGLE`
+TERMS = 13  # terms of each series in z: (1.5 / 2 pi)^26 is below rounding at `se3.LARGEST_ANGLE`
 TERMS_SMALL = 6  # (0.3 / 2 pi)^12 is
 SMALL = 0.09  # rad^2
 
@@ -44,7 +44,7 @@ def helix_series(fractions: ArrayLike) -> NDArray[np.float64]:
 
 @kernel
 def helix_terms(z):
-    """How many terms of the series reach rounding."""
+    """Number of terms of the series down to rounding."""
     return TERMS_SMALL if z > -SMALL else TERMS
 
 
@@ -106,7 +106,7 @@ def helix_twist(inner, outer, blocks, out):
 
 @kernel
 def subtract_helix_force(force, blocks, inner, outer):
-    """Subtract the shares of a force vector (6,) on a section from those of its nodes (which may be one)."""
+    """Subtract a section's force vector (6,), shared between its nodes (possibly the same), from theirs."""
     for j in range(3):
         moment, push = 0.0, 0.0
         for i in range(3):

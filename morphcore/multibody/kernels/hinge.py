@@ -1,7 +1,7 @@
 """Surfaces of prescribed motion in the articulated-body pass (Featherstone 2008, section 9.2).
 
-A surface moves against the fuselage as its hinges say together, see `multibody.hinges`: their number costs
-nothing here.
+A surface moves relative to the fuselage by the combined motion of its hinges, see `multibody.hinges`: their
+number does not affect the cost here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ H_ROTATION, H_TWIST, H_ORIGIN = 0, 9, 15
 
 @kernel
 def hinge_twist(lanes, twist_base, hinge, acceleration, twist, bias):
-    """Twist of a surface's first link and its acceleration but for the base's.
+    """Twist of a surface's first link, and its acceleration without the base's.
 
     acceleration : (6,) time derivative of the relative twist in W.
     """
@@ -54,7 +54,7 @@ def hinge_twist(lanes, twist_base, hinge, acceleration, twist, bias):
 
 @kernel
 def carry_through_hinge(lanes, hinge, inertia, force):
-    """Express what a surface carries, in place, in B at the fuselage reference point."""
+    """Transform a surface's accumulated inertia and force, in place, to B at the fuselage reference point."""
     if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
         return
     r00, r01, r02 = hinge[0], hinge[1], hinge[2]

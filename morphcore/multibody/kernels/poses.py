@@ -10,8 +10,8 @@ from morphcore.multibody.kernels.se3 import exponential
 def move_poses(increments, R, x, scratch):
     """Multiply every pose, R (n, 3, 3) and x (n, 3), from the right by exp(increment), (n, 6).
 
-    The product of rotations is put back onto the orthogonal matrices, R (3 I - R^T R) / 2, so that rounding
-    does not add up over a flight. ``scratch`` (7, 3).
+    The product of rotations is re-orthogonalised by R (3 I - R^T R) / 2, so that rounding does not accumulate
+    over a flight. ``scratch`` (7, 3).
     """
     turn, offset, turned = scratch[:3], scratch[3], scratch[4:7]
     for n in range(increments.shape[0]):

@@ -2,7 +2,7 @@
 
 A pose is a rotation R (3, 3), body components to reference components, with a position x (3,). A twist is
 [omega; v] in body components, angular part first, and so is the logarithm ``d`` of a relative pose: H_b = H_a
-exp(d). ``ad(d)`` is the bracket of Lie's algebra, Featherstone's (2008, equation 2.31) motion cross product.
+exp(d). ``ad(d)`` is the Lie bracket, Featherstone's (2008, equation 2.31) motion cross product.
 
 Tangents: (exp d)^-1 d/dt exp(d) = T(d) d', T(d) = sum (-1)^k ad(d)^k / (k + 1)!. Sources: Sonneville, Cardona
 & Brüls (2014), appendix A; Bullo & Murray (1995) for the closed form of the inverse.
@@ -14,7 +14,7 @@ import math
 
 from morphcore.jit import kernel
 
-# B_2k / (2 k)! of Bernoulli's numbers, k = 0..12: x / 2 coth(x / 2) = sum b_k x^(2 k). The series in the
+# B_2k / (2 k)! with the Bernoulli numbers, k = 0..12: x / 2 coth(x / 2) = sum b_k x^(2 k). The series in the
 # angle of an element converges like (angle / 2 pi)^(2 k): to 1e-12 at LARGEST_ANGLE.
 BERNOULLI = (
     1.0,
@@ -131,7 +131,7 @@ def even_series_with_slope(z):
 
 @kernel
 def logarithm(R, x, d):
-    """Logarithm d (6,) of a pose that turns by less than LARGEST_ANGLE; returns False beyond."""
+    """Logarithm d (6,) of a pose that turns by less than LARGEST_ANGLE; returns False otherwise."""
     sx, sy, sz = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
     sine2 = sx * sx + sy * sy + sz * sz
     cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
@@ -175,7 +175,7 @@ def inverse_tangent_coefficients(z):
 
 @kernel
 def to_body(R, x, motion, out):
-    """Adjoint of the inverse pose: a motion vector in the reference frame, moved to the body at (R, x).
+    """Adjoint of the inverse pose: transforms a motion vector from the reference frame to the body at (R, x).
 
     out = [R^T omega; R^T (v + omega x x)]; out must not be motion.
     """
@@ -190,7 +190,7 @@ def to_body(R, x, motion, out):
 
 @kernel
 def add_from_body(R, x, force, out):
-    """Transpose of ``to_body``: out += a force vector at the body (R, x), moved to the reference frame."""
+    """Transpose of ``to_body``: adds to out a force vector at the body (R, x), in the reference frame."""
     fx = R[0, 0] * force[3] + R[0, 1] * force[4] + R[0, 2] * force[5]
     fy = R[1, 0] * force[3] + R[1, 1] * force[4] + R[1, 2] * force[5]
     fz = R[2, 0] * force[3] + R[2, 1] * force[4] + R[2, 2] * force[5]

@@ -1,4 +1,4 @@
-"""What the report's templates show and the stages' results do not hold as it stands."""
+"""Values that the report's templates show and that are derived from the stages' results."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from morphcore.paper.stages import Results
 Document = dict[str, Any]
 
 MIN_PLAIN = 1e-4  # smaller limits are written with a power of ten
-ALIKE_RAD = 0.05  # schedules no further apart are called nearly one
+ALIKE_RAD = 0.05  # rad; schedules closer than this are called nearly identical
 OTHER_MORPHS = {
     "swarm_morph": "optimum, the paper's swarm of 50",
-    "free_morph": "optimum, angles at the knots free too",
+    "free_morph": "optimum, with free angles at the knots",
     "unsettled_morph": "optimum searched without a settling window",
 }
 
 
 def limit(value: float) -> str:
-    """A limit as it was set."""
+    """A limit as set."""
     return f"{value:g}" if value >= MIN_PLAIN else number(value)
 
 
@@ -36,17 +36,17 @@ def mid_span(surface: Surface) -> SectionProperties:
 
 
 def deviation(ours: float, theirs: float | None) -> float | None:
-    """Distance of our value from theirs as a share of theirs."""
+    """Deviation of our value from theirs as a share of theirs."""
     return abs(ours / theirs - 1.0) if theirs else None
 
 
 def percent_change(value: float | None, reference: float | None) -> float | None:
-    """Change of a value against a reference, per cent; None where one of them is missing."""
+    """Change of a value relative to a reference, per cent; None if one of them is missing."""
     return None if value is None or not reference else 100.0 * (value / reference - 1.0)
 
 
 def change(results: Results, schedule: str) -> float | None:
-    """Change of a schedule's variation against constant rate in the flexible model, per cent."""
+    """Change of a schedule's variation relative to constant rate in the flexible model, per cent."""
     variation = results["morph"]["variation"]
     return percent_change(variation[schedule]["flexible"], variation["constant"]["flexible"])
 
@@ -83,7 +83,7 @@ def schedules(results: Results) -> list[Document]:
         other, flexible = results[name], flown(results)[name]["variation_rad2"]
         variation = dict(other["variation"]["optimum"])
         if other["morph"]["settle_s"] != SETTLE_S:
-            variation = dict.fromkeys(variation)  # searched, and summed, over another window
+            variation = dict.fromkeys(variation)  # searched and summed over another window
         rows.append(
             {
                 "name": name,
@@ -99,7 +99,7 @@ def schedules(results: Results) -> list[Document]:
 
 
 def windows(results: Results) -> list[Document]:
-    """Variation of three schedules in the flexible model, rad^2, over the morph and with what follows."""
+    """Variation of three schedules in the flexible model, rad^2, over the morph and with the settling."""
     unsettled, curves = flown(results)["unsettled_morph"], results["morph"]["curves"]
     labels = {
         "constant": "constant rate",

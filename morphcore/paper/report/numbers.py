@@ -10,11 +10,11 @@ from morphcore.export.figure import scientific
 
 NOTHING = "–"
 STILL_RAD = 1e-10
-SMALL, LARGE = 1e-3, 1e5  # numbers beyond are written with a power of ten
+SMALL, LARGE = 1e-3, 1e5  # larger numbers are written with a power of ten
 
 
 def prettified(text: str) -> str:
-    """A sentence of the library with powers of ten as people write them."""
+    """A sentence of the library with typeset powers of ten."""
     shown = re.sub(r"\b\d\.?\d*e-\d+\b", lambda found: number(float(found[0]), 2), text)
     return shown.replace("rad^2", "rad²")
 
@@ -22,7 +22,7 @@ def prettified(text: str) -> str:
 def inline_svg(svg: bytes, prefix: str, label: str) -> str:
     """An SVG document as an element of a page: no prologue, no metadata, ids with a prefix of their own.
 
-    ``label`` is for those who do not see it.
+    ``label`` is for screen readers.
     """
     text = svg.decode("utf-8")
     text = text[text.index("<svg") :]
@@ -33,13 +33,13 @@ def inline_svg(svg: bytes, prefix: str, label: str) -> str:
     text = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', text)
     text = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", text)
     tag, rest = text.split(">", 1)
-    # the page rules the width; the shape is in the viewBox
+    # the page sets the width; the viewBox keeps the aspect ratio
     tag = re.sub(r'\s(width|height|version)="[^"]*"', "", tag)
     return f'{tag} role="img" aria-label="{escape(label)}">{rest}'
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """A number with so many digits; a dash for None."""
+    """A number with ``digits`` digits; a dash for None."""
     if value is None:
         return NOTHING
     if value < 0.0:
@@ -59,24 +59,24 @@ def milliseconds(value_s: float | None) -> str:
 
 
 def mrad(value_rad: float | None, digits: int = 2) -> str:
-    """An angle in mrad; round-off of one that does not move is nothing."""
+    """An angle in mrad; the round-off of an angle that does not move is shown as zero."""
     if value_rad is not None and abs(value_rad) < STILL_RAD:
         return "0"
     return NOTHING if value_rad is None else number(1e3 * value_rad, digits)
 
 
 def percent(share: float | None, digits: int = 2) -> str:
-    """A share of one in per cent."""
+    """A share as a percentage."""
     return NOTHING if share is None else f"{number(100.0 * share, digits)} %"
 
 
 def signed_percent(value_percent: float | None) -> str:
-    """A change in per cent with its sign."""
+    """A change in per cent with sign."""
     return NOTHING if value_percent is None else f"{value_percent:+.2f} %".replace("-", "−")
 
 
 def minutes(value_s: float) -> str:
-    """A time for people."""
+    """A time in minutes."""
     return f"{value_s:.0f} s" if value_s < 120.0 else f"{value_s / 60.0:.1f} min"
 
 

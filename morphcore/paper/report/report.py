@@ -1,4 +1,4 @@
-"""The whole report out of the stages' results: one HTML file, its figures as JSON, the flights as CSV."""
+"""The whole report from the stages' results: one HTML file, its figures as JSON, the flights as CSV."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Document = dict[str, Any]
 
 REPORT, SUMMARY, FLIGHTS = "report.html", "summary.json", "flights"
 HEADLINE = "Equivalent modelling of a sweep-morphing aircraft, reproduced"
-COMMON_FLIGHT = "rate_0.5"  # also among the independent program's
+COMMON_FLIGHT = "rate_0.5"  # also among the independent program's flights
 SECTIONS = {  # templates and their headings
     "summary": "What came out",
     "setup": "Set-up",
@@ -42,7 +42,7 @@ FORMATS = ("milliseconds", "minutes", "mrad", "number", "percent", "prettified",
 
 
 def templates() -> Environment:
-    """The templates, with what they format and compute by."""
+    """The templates with their filters and functions."""
     found = Environment(
         loader=PackageLoader("morphcore.paper.report"),
         autoescape=True,
@@ -80,11 +80,11 @@ def _max_or_none(values: Iterable[float | None]) -> float | None:
 
 def _picture(anchor: str, caption: str, drawn: Figure) -> Markup:
     svg = rendered(anchor, drawn, ("svg",))[f"{anchor}.svg"]
-    return Markup(numbers.inline_svg(svg, anchor, caption))  # noqa: S704 - drawn here, its texts escaped
+    return Markup(numbers.inline_svg(svg, anchor, caption))  # noqa: S704 - drawn here, with escaped texts
 
 
 def report_page(settings: PaperSettings, finished: Mapping[str, Finished]) -> str:
-    """The report as HTML without references to anything outside.
+    """The report as self-contained HTML.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def requirements_of(settings: PaperSettings, finished: Mapping[str, Finished]) -
 
 
 def summary_document(settings: PaperSettings, finished: Mapping[str, Finished]) -> Document:
-    """The run for machines: settings, machine, requirements, seconds of each stage."""
+    """The run in machine-readable form: settings, machine, requirements, seconds of each stage."""
     where = list(finished.values())[-1].where
     return {
         "quick": settings.quick,
@@ -133,7 +133,7 @@ def summary_document(settings: PaperSettings, finished: Mapping[str, Finished]) 
 
 
 def write_report(settings: PaperSettings, finished: Mapping[str, Finished], folder: Path) -> Path:
-    """Write the report, what it says for machines, and the truth's flights as samples; gives its path."""
+    """Write the report, its machine-readable summary, and the truth's flights as samples; return its path."""
     flights = folder / FLIGHTS
     flights.mkdir(parents=True, exist_ok=True)
     for sample in samples_of(finished["truth"].result):

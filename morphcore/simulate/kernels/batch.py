@@ -22,8 +22,8 @@ def fly(
     hinges : (t, s, HINGE_ROWS); hinge_accelerations : (t, s, 6); operators : (t, rows, columns); wind : (t,
     3). constants : (b, rows, width). step : s. number : steps made before. state : (b, rows, width), advanced
     in place. slopes : (b, SLOPES, mechanical rows, width), the blocks' memory. middle : (rows, width);
-    scratch, inputs, outputs : (rows, width), the caller's own. record : (t, r, b, width): the first r rows of
-    the state after each step.
+    scratch, inputs, outputs : (rows, width), provided by the caller. record : (t, r, b, width): the first r
+    rows of the state after each step.
     """
     for n in range(record.shape[0]):
         for b in range(first, last):

@@ -3,12 +3,12 @@
 Generalised-alpha on SE(3) as `simulate.flexible` describes it. A step starts from the acceleration carried on
 straight from the last two, places the lattice and the sections' maps there (third order off), and iterates on
 the whole equations of its end, air loads included, with the structure's factored matrix, the air's part left
-out; a step in which the iteration slows down asks for a new matrix and is flown again. The circulations
-follow by refinement with the inverse of an earlier influence matrix, to `REFINED`; a step that does not get
-there hands back its matrix for a new inverse and is flown again.
+out; if the iteration slows down, the step requests a new matrix and is flown again. The circulations follow
+by refinement with the inverse of an earlier influence matrix, to `REFINED`; a step that does not reach it
+hands back its matrix for a new inverse and is flown again.
 
-The parts of a step are pasted into the one kernel: compiled apart, each would be optimised once more with all
-that it calls.
+The parts of a step are inlined into one kernel: compiled separately, each would be optimised again together
+with everything it calls.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 TOLERANCE = 1e-8  # rad/s and m/s, of the last Newton step's change of the velocities
-SLOW = 0.1  # of the last iteration's change: then the matrix may be too old
+SLOW = 0.1  # share of the last iteration's change: slower convergence means that the matrix may be too old
 MAX_ITERATIONS = 50
-REFINED = 1e-12  # what is left of the flow through the panels, of its largest before
+REFINED = 1e-12  # remaining flow through the panels, relative to its largest value before
 STILL = 1e-7  # of the largest circulation: smaller changes within a step leave the induced velocities
-MAX_PASSES = 8  # of refinement; beyond, the inverse is renewed
+MAX_PASSES = 8  # passes of refinement; if more are needed, the inverse is renewed
 FLOWN, INVERSE_WANTED, MATRIX_WANTED, LOST, BENT_TOO_FAR = 0, 1, 2, 3, 4
 # numbers of a record before those of the tips: R_NB row by row, twist, position, twist rate of the fuselage
 RECORD = 24
@@ -60,7 +60,8 @@ RECORD = 24
 def lag_after(lag, before, after, decay, mean):
     """A lag state after a step over which the circulation runs straight from ``before`` to ``after``.
 
-    The exact solution of T dz/dt = circulation - z. decay : exp(-h / T). mean : of the decay, over the step.
+    The exact solution of T dz/dt = circulation - z. decay : exp(-h / T). mean : mean of the decay over the
+    step.
     """
     return decay * lag + (mean - decay) * before + (1.0 - mean) * after
 
@@ -159,7 +160,7 @@ def fly_steps(structure, parts, place, path, rule, state, trial, scratch, record
     """Fly from row ``first`` to row ``last`` of the path; states move in place.
 
     ``trial`` is a State of scratch. records (k, RECORD + 2 tips) gets a row for every time. ``fresh`` : the
-    matrix was formed in the first step itself. Returns the row reached and what stopped the flight there.
+    matrix was formed in the first step itself. Returns the row reached and the reason for stopping there.
     """
     row = first
     while True:
@@ -174,7 +175,7 @@ def fly_steps(structure, parts, place, path, rule, state, trial, scratch, record
 
 @inlined
 def _record(structure, state, out):
-    """Attitude, twist, position and twist rate of the fuselage; the tips' z in B from their roots and twist.
+    """Record the fuselage's attitude, twist, position and twist rate, and the tips' z in B and twist.
 
     A tip's twist is recorded as its sine: element (x, z) of the rotation from its axes to the root's.
     """
@@ -198,7 +199,7 @@ def _record(structure, state, out):
 
 @inlined
 def _moved(structure, path, rule, state, trial, scratch, row):
-    """Where the trial's twist rates lead at the end of a step; the roots' part of them is set."""
+    """Move the trial to the end of a step by its twist rates; the roots' part of these is set."""
     h = rule.step_s
     increments = scratch.right
     for n in range(trial.A.shape[0]):
@@ -230,7 +231,7 @@ def _moved(structure, path, rule, state, trial, scratch, row):
 
 @inlined
 def _place(structure, parts, place, trial, scratch, wind_B):
-    """Put sections and lattice where the trial is."""
+    """Place sections and lattice at the trial state."""
     place_sections(
         structure.ends,
         structure.section_fraction,
@@ -263,7 +264,7 @@ def _place(structure, parts, place, trial, scratch, wind_B):
 
 @inlined
 def _tie_roots(structure, path, small, row):
-    """small[0] = the inverse of what fuselage and all chains weigh at the reference point."""
+    """small[0] = inverse of the condensed matrix of fuselage and all chains at the reference point."""
     for i in range(6):
         for j in range(6):
             small[1, i, j] = structure.diagonals[0, i, j]
@@ -296,8 +297,8 @@ def _solve(structure, path, small, right, vector, row):
 def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh):
     """One step to ``row``; returns a status, FLOWN if it was made.
 
-    A matrix is given up when the iteration slows to twice the pace that one ``fresh`` in its step has: what
-    the air does to it, no new matrix would mend.
+    A matrix is discarded when convergence is twice as slow as with one that is ``fresh`` in its step:
+    slowness due to the air loads would not improve with a new matrix.
     """
     nodes, rings = state.A.shape[0], state.circulation.size
     wind_B, right = scratch.vector[0], scratch.right

@@ -9,8 +9,8 @@ from morphcore.jit import entry_kernel
 def blend(weights, first, nodes, out):
     """Weighted sums of neighbouring nodes: out[k] = sum over i of weights[k, i] nodes[first[k] + i].
 
-    weights : (k, i); first : (k,); nodes : (n, m); out : (k, m). Not the library's matrix product, whose
-    threads would fight with ours over a few hundred kilobytes.
+    weights : (k, i); first : (k,); nodes : (n, m); out : (k, m). The library's matrix product is avoided
+    because its threads would compete with ours over a few hundred kilobytes.
     """
     for k in range(out.shape[0]):
         row = out[k]

@@ -10,9 +10,9 @@ from morphcore.multibody.kernels.se3 import ad, add_from_body, composed_pose, to
 def follow_fuselage(roots, R_BW, origin_B, axis, rate, acceleration, R, x, V, A, v):
     """Poses, twists and twist rates of the roots (s,) from node 0, the fuselage.
 
-    R_BW (s, 3, 3), origin_B (s, 3) m: the root seen from the fuselage; its twist against that is axis rate in
-    W, axis (s, 6) and rate (s,); acceleration (s, 6) the twist's time derivative. R, x, V, A of all nodes; v
-    (3, 6) is scratch.
+    R_BW (s, 3, 3), origin_B (s, 3) m: pose of the root relative to the fuselage; its relative twist is axis
+    rate in W, axis (s, 6) and rate (s,); acceleration (s, 6) is the twist's time derivative. R, x, V, A of
+    all nodes; v (3, 6) is scratch.
     """
     for s in range(roots.size):
         node = roots[s]
@@ -35,14 +35,14 @@ def gather_roots(roots, R_BW, origin_B, forces, out):
 
 @entry_kernel
 def spread_to_roots(roots, R_BW, origin_B, motion, out):
-    """Write a motion vector (6,) of the fuselage, moved to each root (s,), into out (n, 6)."""
+    """Write a motion vector (6,) of the fuselage, carried to each root (s,), into out (n, 6)."""
     for s in range(roots.size):
         to_body(R_BW[s], origin_B[s], motion, out[roots[s]])
 
 
 @entry_kernel
 def gather_root_matrices(roots, R_BW, origin_B, matrices, v, m, out):
-    """Add to out (6, 6) the matrices (n, 6, 6) felt at the roots (s,), moved to the fuselage.
+    """Add to out (6, 6) the matrices (n, 6, 6) at the roots (s,), transformed to the fuselage.
 
     out += Ad^T matrix Ad with Ad of `se3.to_body`. v (3, 6) and m (2, 6, 6) are scratch.
     """

@@ -1,33 +1,33 @@
 """One time step of a block: a W-method of one stage, implicit in joint stiffness, exact in the lag.
 
-The stage lies in the middle of the step; what it starts from is carried there by the slopes of the two steps
-before (h: the step, k: slopes in the middles of steps, A: a matrix that stands for the stiff part):
+The stage lies in the middle of the step; the state is predicted there from the slopes of the two previous
+steps (h: the step, k: slopes in the middles of steps, A: a matrix that approximates the stiff part):
 
     U = u + h (7/8 k1 - 3/8 k2),            k1, k2: of the last step and of the one before
     k = F(t + h/2, U) + h A (9 k - 15 k1 + 6 k2) / 16
     u' = u + h k
 
-7/8 and -3/8 integrate the line through k1 and k2 over half a step, so U is right to O(h^3). The weights on
-A sum to nothing and so leave k right to O(h^2) for *any* A; with the midpoint rule the step is of second
-order. It belongs to the W-methods that remember the slopes of former steps (Podhaisky, Schmitt & Weiner
-2002, Appl. Numer. Math. 42, the two-step W-methods).
+7/8 and -3/8 integrate the line through k1 and k2 over half a step, so U is right to O(h^3). The weights on A
+sum to zero and so leave k right to O(h^2) for *any* A; with the midpoint rule the step is of second order. It
+belongs to the W-methods that reuse the slopes of earlier steps (Podhaisky, Schmitt & Weiner 2002, Appl.
+Numer. Math. 42, the two-step W-methods).
 
 Where A is exact, it acts on u + h/2 k1 + GAMMA h (k - k1). At infinite stiffness both roots of that recursion
-are -1/3 with GAMMA = 9/16, the least there is: fast joints die out; and an oscillation of whatever frequency
-does not grow (tests/simulate/test_step.py).
+are -1/3 with GAMMA = 9/16, the smallest possible modulus: fast joints die out, and no oscillation grows,
+whatever its frequency (tests/simulate/test_step.py).
 
 A holds the diagonal joint stiffness K and damping C with the mass matrix of the stage, A = [[0, I], [-M^-1 K,
 -M^-1 C]]: then the implicit equations are the articulated-body pass with g C + g^2 K, g = GAMMA h, added to
 the joint-space diagonal.
 
-At the start there are no slopes yet. A stage of linearly implicit Euler stands for both: its error, of first
-order, enters the slopes of two steps, and the flight stays of second order.
+At the start there are no slopes yet. A stage of linearly implicit Euler replaces both: its error, of first
+order, enters the slopes of two steps only, and the flight stays of second order.
 
 The lag states are linear filters of the links' motion, some faster than a step. They are stepped exactly,
-from stage to stage, for a motion that changes linearly between (Cox & Matthews 2002, J. Comput. Phys. 176,
+from stage to stage, for a motion that changes linearly in between (Cox & Matthews 2002, J. Comput. Phys. 176,
 the quadrature of ETD2), whatever the lag time, zero included. Each stage closes its filter with its own
-motion, so that force and motion belong to one instant. In the state, which belongs to the end of a step, they
-are carried on by half a step for a motion that stays as in the last stage, ``previous``.
+motion, so that force and motion belong to the same instant. In the state, which belongs to the end of a step,
+they are advanced by half a step for a motion that stays as in the last stage, ``previous``.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from morphcore.multibody.kernels.articulated import LINK_ROWS
 
 GAMMA = 9.0 / 16.0
 LAST, BEFORE = 7.0 / 8.0, -3.0 / 8.0  # the predictor's weights of the slopes k1 and k2
-SLOPES = 3  # slots of a block's memory: step n writes its slope to slot n modulo 3
+SLOPES = 3  # slots of a block's slope memory: step n writes to slot n modulo 3
 
 
 # A lane loop as short as one row's arithmetic is unrolled by the compiler before it could become vector
@@ -66,7 +66,7 @@ def predict(state, last, before, step, out):
 
 @inlined
 def remembered(slope1, slope2, step):
-    """The part w = -h (15 k1 - 6 k2) / 16 of what A acts on."""
+    """The part w = -h (15 k1 - 6 k2) / 16 of the vector that A multiplies."""
     return -step * ((GAMMA - BEFORE) * slope1 + BEFORE * slope2)
 
 
@@ -146,13 +146,13 @@ def joint_slopes(lanes, v, acceleration, last_rate, before_rate, step, angle_slo
 
 @inlined
 def carried(lag_state, motion, decay):
-    """A lag state half a step on, for a motion that stays."""
+    """A lag state half a step later, for a constant motion."""
     return motion + decay * (lag_state - motion)
 
 
 @kernel
 def lag_to_stage(lanes, link, slow, fast, previous, stage_slow, stage_fast, stage_previous):
-    """Carry a link's lag states over the half step up to a stage, for a motion that stays."""
+    """Carry a link's lag states over the half step up to a stage, for a constant motion."""
     if not_in_lanes(link, lanes) or not_in_lanes(slow, lanes) or not_in_lanes(fast, lanes):
         return
     if not_in_lanes(previous, lanes) or not_in_lanes(stage_slow, lanes) or not_in_lanes(stage_fast, lanes):
@@ -173,7 +173,7 @@ def lag_to_stage(lanes, link, slow, fast, previous, stage_slow, stage_fast, stag
 
 @kernel
 def lag_from_stage(lanes, link, twist, stage_slow, stage_fast, slow, fast, previous):
-    """Close a link's filters with a stage's twist (rows as in ``lagged_motion``), half a step on."""
+    """Close a link's filters with a stage's twist (rows as in ``lagged_motion``), half a step later."""
     if (
         not_in_lanes(link, lanes)
         or not_in_lanes(twist, lanes)
@@ -207,7 +207,7 @@ def copy(source, out):
 
 @kernel
 def finish(lanes, state, slope, step):
-    """state += h k, with the attitude quaternion made unit again."""
+    """state += h k, with the attitude quaternion renormalised."""
     if not_in_lanes(state, lanes):
         return
     rows, rates = state.reshape(-1), slope.reshape(-1)
@@ -295,10 +295,10 @@ def step_block(
 ):  # fmt: skip
     """Advance a block by one step; ``strips``, ``hinges``, ``operator``, ``wind`` in its middle.
 
-    ``number``: how many steps the flight has made. ``slopes`` (SLOPES, mechanical rows, width): the block's
-    memory, filled here at the first step. ``hinge_accelerations`` (s, 6) hold the change of the hinges'
-    rates over the step, divided by its length: where a schedule's acceleration jumps, the momentum that the
-    wings exchange with the fuselage is then still exact.
+    ``number``: number of steps flown so far. ``slopes`` (SLOPES, mechanical rows, width): the block's memory,
+    filled here at the first step. ``hinge_accelerations`` (s, 6) hold the change of the hinges' rates over
+    the step, divided by its length: where a schedule's acceleration jumps, the momentum that the wings
+    exchange with the fuselage is then still exact.
     """
     links = ranges.shape[0]
     coordinates = 3 * (links - surfaces.shape[0])
@@ -337,9 +337,9 @@ def instant_rates(
     surfaces, ranges, shared, strips, hinges, hinge_accelerations, operator, wind, constants, state, zero,
     scratch, inputs, outputs, rates,
 ):  # fmt: skip
-    """Time derivative of a block's state, a stage of a step of no length; ``zero``: rows of zeros.
+    """Time derivative of a block's state, as a stage of a step of zero length; ``zero``: rows of zeros.
 
-    The lag states' rows are not touched.
+    The rows of the lag states are left unchanged.
     """
     stage(
         lanes,

@@ -26,15 +26,17 @@ def torques(
     """Inverse dynamics of every wing at each of some instants of one flight.
 
     Leaves the accelerations of all links in the scratch block by the forward pass, then sums over each wing,
-    from its tip to its root, what each link takes: I a + v x* I v - air load (recursive Newton-Euler,
-    Featherstone (2008), table 5.1). Gravity is in the accelerations. What lies between hinges has no mass:
-    all of a surface's bear the same wrench, each what its screw takes of it.
+    from its tip to its root, the wrench that each link needs: I a + v x* I v - air load (recursive
+    Newton-Euler, Featherstone (2008), table 5.1). Gravity is in the accelerations. The parts between hinges
+    have no mass: all hinges of a surface carry the same wrench, and the torque of each is its projection on
+    the screw.
 
     Parameters (t instants, s surfaces, h hinges)
     ----------
     columns : (s + 1,) first hinge of each surface, and h. screws : (t, h, 6) `multibody.hinges.hinge_screws`.
     states : (t, rows) of one flight; the others as in ``rates_of_blocks``, with a leading axis t.
-    block : (rows, width) and the rest of the scratch: the caller's own. out : (t, h) N m, along the positive
+    block : (rows, width) and the rest of the scratch: provided by the caller. out : (t, h) N m, along the
+    positive
     angles. velocity_rates : (t, 3) m/s^2, of the components of v_B.
     """
     links = ranges.shape[0]

@@ -116,3 +116,24 @@ def test_json_without_a_drive_is_refused(service: RunningService) -> None:
     (found,) = fault(service.client.post("/trajectories", json=columns))["errors"]
     assert (found["code"], found["pointer"]) == ("missing", "/sweep_left_rad")
     assert "fold_left_rad" in found["hint"]
+
+
+def test_channels_survive_upload_reading_back_and_identification(any_service: RunningService) -> None:
+    """In SI units, with null where a cell is empty, from a file and as JSON alike."""
+    content = flight(sweep=T, q_deg_s=[1, "", 2, 3], tip_right_z_mm=[1, 2, 3, 4], nz=["x"] * 4)
+    name, back = uploaded(any_service, content)
+    assert back["q_rad_s"][1] is None
+    np.testing.assert_allclose([back["q_rad_s"][row] for row in (0, 2, 3)], np.deg2rad([1, 2, 3]))
+    np.testing.assert_allclose(back["tip_right_z_m"], [1e-3, 2e-3, 3e-3, 4e-3])
+    assert "nz" not in back
+    assert "nz is 'x', not a finite number" in back["unreadable"]["nz"]
+    (sample,) = stored(any_service, request(name, "z"))["samples"]
+    assert {field: sample[field] for field in ("q_rad_s", "tip_right_z_m")} == {
+        field: back[field] for field in ("q_rad_s", "tip_right_z_m")
+    }
+    columns = {field: values for field, values in back.items() if isinstance(values, list)}
+    again = any_service.client.post("/trajectories", json=columns | {"p_deg_s": [0, None, 90, 180]})
+    assert again.status_code == 201, again.text
+    read = any_service.client.get(again.headers["location"]).json()
+    assert read["p_rad_s"] == [0.0, None, np.pi / 2, np.pi]
+    assert {field: read[field] for field in columns} == columns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from tests.app.request_documents import EXAMPLES, sample_document
+from tests.app.request_documents import EXAMPLES, channel_columns, sample_document
 from tests.app.running_service import RunningService
 
 NAME = "train_rate_0.8"
@@ -20,6 +20,7 @@ def test_upload_reads_back_as_sent(any_service: RunningService) -> None:
     """A CSV file and the same flight as JSON read back alike, to the last digit."""
     as_file = upload(any_service, (EXAMPLES / f"{NAME}.csv").read_bytes(), f"{NAME}.csv")
     columns = {key: value for key, value in sample_document(NAME).items() if key not in ("name", "role")}
+    columns |= channel_columns(NAME)
     as_json = any_service.client.post("/trajectories", json={"name": NAME, **columns})
     for answer in (as_file, as_json):
         assert answer.status_code == 201

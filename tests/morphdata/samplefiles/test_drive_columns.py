@@ -143,7 +143,7 @@ def test_what_is_said_helps(written: Callable[..., Path]) -> None:
     assert "_deg" in said
     said = message(written(fold_left_deg=FOLD_DEG, other=T), folding)
     assert "fold_left is given, and fold_right is missing" in said
-    assert "call the one column fold" in said
+    assert "name the single column fold" in said
     broken = [*T[:7], None, *T[8:]]
     said = message(written(sweep_left=T, sweep_right=T, fold_left=T, fold_right=broken), drives("z", "x"))
     assert "fold_right" in said

@@ -1,4 +1,4 @@
-"""Where compiled kernels are called from simulate/batch.py: the doors to time them or count behind."""
+"""Entry points of compiled kernels used by simulate/batch.py, where they can be timed or counted."""
 
 from __future__ import annotations
 

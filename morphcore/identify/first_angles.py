@@ -1,0 +1,78 @@
+"""What an error of a drive's first angle does to a flight.
+
+An aircraft is trimmed at the first angles of its drives, so their errors are forces and moments that nothing
+balances. An error of 0.1 mrad on one side rolls the example aircraft by as much as a third of the stiffness
+does. It is a nuisance of the measurement, whose size the noise of the drive limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.identify.cost import SampleCase, fly_readings, sample_schedules
+from morphcore.identify.drive_histories import DriveHistory
+from morphcore.identify.measurement import Measured
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.trim import StartMode, Trim, trim
+
+Array = NDArray[np.float64]
+
+PROBE_RAD = 1e-5  # of an angle: the flights' derivative is good to a thousandth
+STILL_ROWS = 3  # of the flight at rest that is trimmed
+
+
+def with_first_angles(
+    model: ChainModel,
+    batch: ParameterBatch,
+    case: SampleCase,
+    histories: Mapping[str, DriveHistory],
+    start: StartMode,
+) -> Measured:
+    """The readings of a sample, with derivatives by the first angle of each of its noisy drives.
+
+    Parameters
+    ----------
+    model : ChainModel
+    batch : ParameterBatch
+        One parameter set, at which the derivatives are taken.
+    case : SampleCase
+    histories : mapping of str to DriveHistory
+        Of the sample's drives.
+    start : {"trim", "given"}
+        With a given start nothing is trimmed but the joints.
+    """
+    setup = case.setup
+    noisy = {name: each.start_error_rad for name, each in histories.items() if each.start_error_rad}
+    if not noisy or start == "given":
+        return setup
+    base = replace(case, given=replace(setup, openness=replace(setup.openness, delay=False)))
+    flown = []
+    for name in (None, *noisy):
+        found = _trimmed(model, batch, case, name, start)
+        readings = fly_readings(model, batch, base, found)
+        flown.append(readings.at(case.sample.time_s[None, :])[0][0])
+    columns = np.stack([each - flown[0] for each in flown[1:]], axis=-1) / PROBE_RAD
+    columns = np.where(np.isfinite(columns), columns, 0.0)
+    return replace(setup, angle_columns=columns, angle_spread=np.array(list(noisy.values())))
+
+
+def _trimmed(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, moved: str | None, start: StartMode
+) -> Trim:
+    """The trim at a sample's first angles, one of them moved by the probe."""
+    sample, time_s = case.sample, case.sample.time_s[:STILL_ROWS]
+    drives = {
+        name: np.full(STILL_ROWS, angles[0] + (PROBE_RAD if name == moved else 0.0))
+        for name, angles in sample.drives.items()
+    }
+    still: Trajectory = replace(sample, time_s=time_s, drives=drives, unreadable={})
+    schedules = sample_schedules(model.aircraft, still, "")
+    flown = case.plan.flown(model)
+    plan = flight_plan(model, schedules, time_grid(time_s), may_halve=case.plan.halved)
+    return trim(flown, batch, plan, start=start)
