@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.auto_links import AutoIdentification
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import SearchSettings, search_settings
@@ -19,6 +21,7 @@ from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch,
 from morphdata.measurement import Measurement
 
 __all__ = [
+    "AutoIdentification",
     "Identification",
     "IdentifyResult",
     "Interrupted",
@@ -34,7 +37,7 @@ def identify(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: int = EquivalentModel().links_per_wing,
+    links_per_wing: int | Literal["auto"] = EquivalentModel().links_per_wing,
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
@@ -50,8 +53,9 @@ def identify(
         Its flight condition.
     samples : sequence of Trajectory
         Sample flights, angles in rad; those with role "held_out" are reported, not fitted.
-    links_per_wing : int
-        Links per wing; without effect where ``model`` is given.
+    links_per_wing : int or "auto"
+        Links per wing, or "auto" for the number under which the flights are most likely; without effect
+        where ``model`` is given.
     seed : int
         Seed of the search; without effect where ``search`` is given.
     model : EquivalentModel, optional
@@ -88,7 +92,7 @@ def identify(
     >>> result.parameters["ac_offset_m"].shape
     (1,)
     """
-    run = Identification(
+    run = _identification(
         Aircraft.of(aircraft),
         Flight.of(flight),
         samples,
@@ -102,7 +106,23 @@ def identify(
     return run.result(checkpoint)
 
 
-def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
+def _identification(
+    aircraft: Aircraft,
+    flight: Flight,
+    samples: Sequence[Trajectory],
+    model: EquivalentModel,
+    search: SearchSettings,
+    *,
+    measurement: Measurement | None,
+) -> Identification | AutoIdentification:
+    """An identification with one number of links, or one that chooses it."""
+    kind = AutoIdentification if model.links_per_wing == "auto" else Identification
+    return kind(aircraft, flight, samples, model, search, measurement=measurement)
+
+
+def identification_from_request(
+    request: IdentifyRequest, threads: int | None = None
+) -> Identification | AutoIdentification:
     """The identification that a request (the body of ``POST /identify``) asks for.
 
     Parameters
@@ -114,8 +134,8 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
 
     Returns
     -------
-    Identification
-        The problem, of which nothing is flown yet.
+    Identification or AutoIdentification
+        The problem, of which nothing is flown yet; the latter where the number of links is to be chosen.
 
     Raises
     ------
@@ -132,7 +152,7 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
     """
     if threads is not None:
         use_threads(threads)
-    return Identification(
+    return _identification(
         *flown_inputs(request),
         request.model,
         search_settings(request.search),

@@ -88,7 +88,7 @@ def diagnoses(
             found += _drive_warnings(run, fit, f"/samples/{number}")
     trained = [(number, fit) for number, fit in enumerate(fits) if fit.case.sample.role == "train"]
     flies = all(np.all(np.isfinite(fit.identified)) for _, fit in trained)
-    chain = run.space.dimension > 0 and run.settings.links_per_wing > 1
+    chain = run.space.dimension > 0 and run.model.links_per_wing > 1
     if fly and flies and chain and not _explained(found):
         share = max(error_share(fit) for _, fit in trained)
         if share > LATE_SHARE:
@@ -192,7 +192,7 @@ def _drive_warnings(run: Identification, fit: SampleFit, pointer: str) -> Iterat
     """Units, signs and sides of drives: each reading is flown by the physical guess."""
     sample = fit.case.sample
     # a rigid model leaves what bending does; a chain does not
-    if not error_share(fit) > (POOR_SHARE if run.settings.links_per_wing > 1 else HALF):
+    if not error_share(fit) > (POOR_SHARE if run.model.links_per_wing > 1 else HALF):
         return
     given = min(attitude_cost(sample, flown) for flown in (fit.initial, fit.identified))
     motion = float(np.sum(wrap_angle(sample.euler - sample.euler[0]) ** 2))
@@ -321,7 +321,7 @@ def _wrong_aircraft(
         "check that aircraft, flight condition and samples belong together: mass, span, chord, hinge "
         "positions, airspeed, air density"
     )
-    if run.settings.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
+    if run.model.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
         start = abs(float(worst.case.sample.theta[0] - worst.initial[0, 1]))
         off = (
             f", and it would begin the flight pitched by {start:.3f} rad otherwise"

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.search.checkpoint import stored
+
 Array = NDArray[np.float64]
 
 Shapes = Sequence[tuple[int, int]]  # rows and channels of the residuals of each sample
@@ -62,9 +64,9 @@ class ChosenPrior:
             The weights so far.
         """
         weight = float(present.max())
-        count = independent_rows(left_after(error, jacobian, offset, weight), self.shapes())
+        linear = linear_model(error, jacobian, offset, weight, self.shapes())
         tried = np.append(WEIGHTS, weight)
-        likelihood = log_likelihood(error - jacobian @ offset, jacobian, count, tried)
+        likelihood = log_likelihood(linear, tried)
         best = int(np.argmax(likelihood))
         changes = likelihood[best] > likelihood[-1] + WORTH_A_CHANGE
         return np.full(present.shape, tried[best] if changes else weight)
@@ -95,28 +97,75 @@ def independent_rows(error: Array, shapes: Shapes) -> float:
     return max(total, 1.0)
 
 
-def log_likelihood(error: Array, jacobian: Array, count: float, weights: Array) -> Array:
+@stored
+@dataclass(frozen=True)
+class Linear:
+    """A model linearised at a point, as far as the likelihood of a prior's weight depends on it.
+
+    Attributes
+    ----------
+    stiffness : ndarray, shape (d,)
+        Eigenvalues of D'D, with the Jacobian D.
+    pull : ndarray, shape (d,)
+        Squares of D'r along its eigenvectors, r the residuals at the guess.
+    square : float
+        r'r, rad^2.
+    rows : int
+        Residuals m.
+    count : float
+        Independent ones among them.
+    """
+
+    stiffness: Array
+    pull: Array
+    square: float
+    rows: int
+    count: float
+
+
+def linear_model(error: Array, jacobian: Array, offset: Array, weight: float, shapes: Shapes) -> Linear:
+    """Linearise a model.
+
+    Parameters
+    ----------
+    error, jacobian : ndarray, shape (m,) and (m, d)
+        Residuals at a point, rad, and their derivatives.
+    offset : ndarray, shape (d,)
+        The point less the guess.
+    weight : float
+        Of the prior, with which what remains of the residuals is looked at.
+    shapes : sequence of (int, int)
+        Rows and channels of the residuals of each sample.
+    """
+    count = independent_rows(left_after(error, jacobian, offset, weight), shapes)
+    at_guess = error - jacobian @ offset
+    stiffness, axes = np.linalg.eigh(jacobian.T @ jacobian)
+    pull = (axes.T @ (jacobian.T @ at_guess)) ** 2
+    return Linear(np.maximum(stiffness, 0.0), pull, float(at_guess @ at_guess), error.size, count)
+
+
+def log_likelihood(linear: Linear, weights: Array, count: float | None = None) -> Array:
     """Logarithm (w,) of the marginal likelihood of a linear model by weights (w,) of the prior.
 
     Of each weight with the variance of the residuals, and so the spread of the guess, that fits it best.
 
     Parameters
     ----------
-    error : ndarray, shape (m,)
-        Residuals of the linear model at the guess, rad.
-    jacobian : ndarray, shape (m, d)
-    count : float
-        Independent rows among m.
+    linear : Linear
     weights : ndarray, shape (w,)
         rad^2 a squared unit.
+    count : float, optional
+        Independent rows; None for the model's own.
     """
-    stiffness, axes = np.linalg.eigh(jacobian.T @ jacobian)
-    stiffness = np.maximum(stiffness, 0.0)
-    pull = (axes.T @ (jacobian.T @ error)) ** 2
-    share = stiffness + weights[:, None]
+    count = linear.count if count is None else count
+    share = linear.stiffness + weights[:, None]
     # J and the prior's cost together, at their minimum; never less than rounding
-    fitted = np.maximum(error @ error - (pull / share).sum(axis=1), error.size * SMALLEST_RAD**2)
+    fitted = np.maximum(linear.square - (linear.pull / share).sum(axis=1), linear.rows * SMALLEST_RAD**2)
     variance = np.clip(fitted / count, weights * MIN_SPREAD**2, weights * MAX_SPREAD**2)
-    return np.asarray(
-        -0.5 * (fitted / variance + count * np.log(variance) + np.log(share / weights[:, None]).sum(axis=1))
-    )
+    occam = np.log(share / weights[:, None]).sum(axis=1)
+    return np.asarray(-0.5 * (fitted / variance + count * np.log(variance) + occam))
+
+
+def log_evidence(linear: Linear, count: float | None = None) -> float:
+    """Logarithm of the marginal likelihood with the likeliest weight of the prior."""
+    return float(log_likelihood(linear, WEIGHTS, count).max())

@@ -14,8 +14,8 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.drive_histories import smoothed_drives
-from morphcore.identify.first_angles import with_first_angles
 from morphcore.identify.evidence import ChosenPrior
+from morphcore.identify.first_angles import with_first_angles
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
@@ -121,6 +121,12 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
+        if self.settings.links_per_wing == "auto":
+            raise InvalidInput(
+                "one identification has one number of links per wing",
+                pointer="/model/links_per_wing",
+                hint='use AutoIdentification, or identify(..., links_per_wing="auto")',
+            )
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         free: Sequence[str] | None = self.settings.aero_coefficients
         if free is None:
@@ -198,6 +204,15 @@ class Identification:
     def training(self) -> tuple[SampleCase, ...]:
         """The samples to fit."""
         return tuple(case for case in self.cases if case.sample.role == "train")
+
+    def widened(self) -> tuple[str, ...]:
+        """Names of the parameters whose bounds the search has widened by now."""
+        first, now = self._first_space.box, self.space.box
+        return self.space.named((now.lower < first.lower) | (now.upper > first.upper))
+
+    def shapes(self) -> list[tuple[int, int]]:
+        """Rows and channels of the residuals of each sample to fit."""
+        return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in self.training]
 
     @cached_property
     def floors(self) -> dict[str, float]:
@@ -415,13 +430,9 @@ class Identification:
 
 
 def _descent(run: Identification, settings: SearchSettings) -> LeastSquares:
-    def shapes() -> list[tuple[int, int]]:
-        """Rows and channels of the residuals of each sample to fit."""
-        return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in run.training]
-
     first = np.full(run.space.dimension, run.prior_weight)
     return LeastSquares(
-        run, settings.iterations, ChosenPrior(run.space.guess, first, shapes), run.space.limits
+        run, settings.iterations, ChosenPrior(run.space.guess, first, run.shapes), run.space.limits
     )
 
 

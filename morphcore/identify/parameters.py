@@ -282,6 +282,15 @@ class SearchSpace:
         near = BOUND_TOLERANCE * (self.upper - self.lower)
         return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
 
+    def named(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
+        """Named parameters of some search coordinates (d,); a share of the span stands for its ratio."""
+        return tuple(
+            name
+            for unknown, at, _ in self._parts()
+            for name, is_chosen in zip(unknown.names, chosen[at], strict=False)  # the last share has none
+            if is_chosen
+        )
+
     def parameter(self, name: str) -> Parameter:
         """The kind of a named parameter; its former name is accepted, too."""
         name = current_name(name)

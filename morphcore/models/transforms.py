@@ -153,7 +153,7 @@ class Shares:
         return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
-        """Log-ratios of at most ``ratio_range`` off the nominal ones for which all shares are inside the bounds.
+        """Log-ratios within ``ratio_range`` of the nominal ones for which all shares stay within the bounds.
 
         If the nominal shares violate the bounds, the box is centred on equal shares.
         """
