@@ -145,8 +145,8 @@ class SampleMeasurement(Result):
     )
     first_angle_rad: dict[str, Estimate] = Field(
         default={},
-        description="Of each noisy drive, what the angle for which the flight is trimmed is off the first of its "
-        "smoothed angles.",
+        description="Of each noisy drive, what the angle for which a flight is trimmed is off its first "
+        "smoothed angle.",
     )
     sigma: dict[str, float] = Field(
         default={}, description="Noise of each channel by which its residuals were divided."

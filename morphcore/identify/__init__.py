@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.auto_links import AutoIdentification
 from morphcore.identify.bands import Band, predict_bands
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
@@ -21,6 +23,7 @@ from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
 __all__ = [
+    "AutoIdentification",
     "Band",
     "Identification",
     "IdentifyResult",
@@ -38,7 +41,7 @@ def identify(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: int = EquivalentModel().links_per_wing,
+    links_per_wing: int | Literal["auto"] = EquivalentModel().links_per_wing,
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
@@ -55,8 +58,9 @@ def identify(
         Its flight condition.
     samples : sequence of Trajectory
         Sample flights, angles in rad; those with role "held_out" are reported, not fitted.
-    links_per_wing : int
-        Links per wing; without effect where ``model`` is given.
+    links_per_wing : int or "auto"
+        Links per wing, or "auto" for the number under which the flights are most likely; without effect
+        where ``model`` is given.
     seed : int
         Seed of the search; without effect where ``search`` is given.
     model : EquivalentModel, optional
@@ -95,7 +99,7 @@ def identify(
     >>> result.parameters["ac_offset_m"].shape
     (1,)
     """
-    run = Identification(
+    run = _identification(
         Aircraft.of(aircraft),
         Flight.of(flight),
         samples,
@@ -110,7 +114,24 @@ def identify(
     return run.result(checkpoint)
 
 
-def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
+def _identification(
+    aircraft: Aircraft,
+    flight: Flight,
+    samples: Sequence[Trajectory],
+    model: EquivalentModel,
+    search: SearchSettings,
+    *,
+    measurement: Measurement | None,
+    uncertainty: UncertaintySettings | None,
+) -> Identification | AutoIdentification:
+    """An identification with one number of links, or one that chooses it."""
+    kind = AutoIdentification if model.links_per_wing == "auto" else Identification
+    return kind(aircraft, flight, samples, model, search, measurement=measurement, uncertainty=uncertainty)
+
+
+def identification_from_request(
+    request: IdentifyRequest, threads: int | None = None
+) -> Identification | AutoIdentification:
     """The identification that a request (the body of ``POST /identify``) asks for.
 
     Parameters
@@ -122,8 +143,8 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
 
     Returns
     -------
-    Identification
-        The problem, of which nothing is flown yet.
+    Identification or AutoIdentification
+        The problem, of which nothing is flown yet; the latter where the number of links is to be chosen.
 
     Raises
     ------
@@ -140,7 +161,7 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
     """
     if threads is not None:
         use_threads(threads)
-    return Identification(
+    return _identification(
         *flown_inputs(request),
         request.model,
         search_settings(request.search),

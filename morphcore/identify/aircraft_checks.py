@@ -36,7 +36,7 @@ def wrong_aircraft(
     """Flights that no model of this aircraft flies, or only with a lift that it does not have."""
     number, worst = max(trained, key=lambda each: each[1].error_share())
     share = worst.error_share()
-    if run.settings.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
+    if run.model.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
         start = abs(float(worst.case.sample.theta[0] - worst.initial[0, 1]))
         off = (
             f", and it would begin the flight pitched by {start:.3f} rad otherwise"

@@ -221,6 +221,8 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             "aero_coefficients": both_spellings(space.free_aero),
             "method": settings.method,
             "seed": settings.seed,
+            "prior_rad": float(np.sqrt(run.prior_weight)),
+            "widened": both_spellings(run.widened()),
             "flights": state.flights,
             "generations": state.generation,
             "wall_s": state.wall_s,
