@@ -56,7 +56,9 @@ class Likelihood:
     spread: float = PRIOR_SPREAD
 
     @classmethod
-    def of(cls, noise: ColouredNoise, jacobian: Array, guess: Array, lower: Array, upper: Array) -> Likelihood:
+    def of(
+        cls, noise: ColouredNoise, jacobian: Array, guess: Array, lower: Array, upper: Array
+    ) -> Likelihood:
         """Likelihood out of the noise around a fit."""
         return cls(jacobian, noise.middle, guess, lower, upper)
 
