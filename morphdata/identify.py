@@ -12,7 +12,7 @@ from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document, Result
 from morphdata.execution import Request, SpreadExecution
 from morphdata.faults import Fault
-from morphdata.flight import EXAMPLE_FLIGHT, Flight
+from morphdata.flight import EXAMPLE_FLIGHT, Auto, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
 from morphdata.measurement import Measurement, SampleMeasurement, absent_channels
@@ -21,6 +21,7 @@ from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name, under_both_spellings
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
+from morphdata.uncertainty import PosteriorSummary, Profile, UncertaintySettings
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.verdict import ChannelStatistics, Verdict
 from morphdata.warnings import Warnings
@@ -38,6 +39,8 @@ else:
         WithJsonSchema({"type": "string", "enum": both_spellings(corrections())}),
     ]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
+Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
+AUTO_LINKS = (1, 2, 3, 4, 5, 6)  # numbers of links per wing that "auto" tries, in this order
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
     Field(min_length=2, max_length=2, description="[low, high], low below high."),
@@ -178,13 +181,15 @@ def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterato
 class EquivalentModel(SearchedModel):
     """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
-    links_per_wing: Annotated[int, Option("--links", MODEL)] = Field(
-        default=3, ge=1, le=MAX_LINKS, description="Links per wing."
+    links_per_wing: Annotated[Links | Auto, Option("--links", MODEL)] = Field(
+        default=3,
+        description="Links per wing. `auto`: models of one link, two links and so on up to six are "
+        "identified, and the one under which the training samples are most likely is taken.",
     )
 
     def numbers_of_links(self) -> Sequence[int]:
-        """List the one number of links per wing."""
-        return (self.links_per_wing,)
+        """List the number of links per wing, or all that are tried."""
+        return AUTO_LINKS if self.links_per_wing == "auto" else (self.links_per_wing,)
 
 
 class Search(SwarmSearch):
@@ -324,6 +329,7 @@ class IdentifyRequest(SamplesRequest):
 
     model: EquivalentModel = EquivalentModel()
     search: IdentifySearch = IdentifySearch()
+    uncertainty: UncertaintySettings = UncertaintySettings()
     execution: SpreadExecution = SpreadExecution()
 
     def faults(self) -> Iterator[Fault]:
@@ -335,7 +341,14 @@ class IdentifyRequest(SamplesRequest):
             return
         yield from model_surfaces_faults(self.aircraft, known, "/search/warm_start/parameters")
         at, links = "/search/warm_start/parameters", self.model.links_per_wing
-        if known.links_per_wing != links:
+        if links == "auto":
+            yield Fault(
+                "links_differ",
+                "The number of links per wing is to be chosen, and the model to begin from has one already.",
+                at,
+                f"Set model.links_per_wing to {known.links_per_wing}, or begin from no model.",
+            )
+        elif known.links_per_wing != links:
             yield Fault(
                 "links_differ",
                 f"The search is for {links} links per wing and would begin from a model with "
@@ -417,6 +430,18 @@ class IdentifiedParameters(Result):
     aero: AeroCorrections
 
 
+class LinksTried(Result):
+    """A number of links per wing that was tried."""
+
+    links_per_wing: int
+    log_likelihood: float = Field(
+        description="Natural logarithm of how likely the training samples are under this model, over how "
+        "likely they are under the one that was chosen."
+    )
+    J_train: float = Field(description="J over the training samples, rad^2.")
+    flights: int
+
+
 class SearchReport(Result):
     """How the search went."""
 
@@ -427,6 +452,19 @@ class SearchReport(Result):
     wall_s: float
     aero_coefficients: list[Correction] | None = Field(
         default=None, description="Aerodynamic corrections that were searched."
+    )
+    prior_rad: float | None = Field(
+        default=None,
+        description="Being off the physical guess by one search coordinate (a factor e of a stiffness) "
+        "costs as much as one error of this size, rad: chosen by the training samples.",
+    )
+    widened: list[str] = Field(
+        default=[],
+        description="Parameters whose default bounds were widened because the training samples pushed "
+        "against them.",
+    )
+    links_tried: list[LinksTried] = Field(
+        default=[], description="What was tried where `links_per_wing` is `auto`."
     )
     history: list[dict[str, Any]]
 
@@ -470,6 +508,12 @@ class Uncertainty(Result):
     correlation: list[list[float]] = Field(description="Of the search coordinates.")
     unidentifiable: list[Any] = Field(
         description="Combinations of search coordinates that the samples cannot see."
+    )
+    posterior: PosteriorSummary | None = Field(
+        default=None, description="Where `uncertainty.posterior` was requested."
+    )
+    profile: dict[str, Profile] = Field(
+        default={}, description="Profile likelihoods of the parameters in `uncertainty.profile`."
     )
 
 

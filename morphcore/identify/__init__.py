@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.auto_links import AutoIdentification
+from morphcore.identify.bands import Band, predict_bands
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import SearchSettings, search_settings
@@ -17,8 +20,11 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 __all__ = [
+    "AutoIdentification",
+    "Band",
     "Identification",
     "IdentifyResult",
     "Interrupted",
@@ -26,6 +32,7 @@ __all__ = [
     "Step",
     "identification_from_request",
     "identify",
+    "predict_bands",
 ]
 
 
@@ -34,11 +41,12 @@ def identify(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: int = EquivalentModel().links_per_wing,
+    links_per_wing: int | Literal["auto"] = EquivalentModel().links_per_wing,
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
     measurement: Measurement | None = None,
+    uncertainty: UncertaintySettings | None = None,
 ) -> IdentifyResult:
     """Identify an equivalent model from sample flights, from start to end.
 
@@ -50,8 +58,9 @@ def identify(
         Its flight condition.
     samples : sequence of Trajectory
         Sample flights, angles in rad; those with role "held_out" are reported, not fitted.
-    links_per_wing : int
-        Links per wing; without effect where ``model`` is given.
+    links_per_wing : int or "auto"
+        Links per wing, or "auto" for the number under which the flights are most likely; without effect
+        where ``model`` is given.
     seed : int
         Seed of the search; without effect where ``search`` is given.
     model : EquivalentModel, optional
@@ -61,6 +70,8 @@ def identify(
     measurement : Measurement, optional
         How the samples were measured: channels, noise, biases, delays. What is left out is decided from the
         data.
+    uncertainty : UncertaintySettings, optional
+        Posterior draws and profile likelihoods to compute beside standard errors and intervals.
 
     Returns
     -------
@@ -88,13 +99,14 @@ def identify(
     >>> result.parameters["ac_offset_m"].shape
     (1,)
     """
-    run = Identification(
+    run = _identification(
         Aircraft.of(aircraft),
         Flight.of(flight),
         samples,
         model or EquivalentModel(links_per_wing=links_per_wing),
         search_settings(search or IdentifySearch(seed=seed)),
         measurement=measurement,
+        uncertainty=uncertainty,
     )
     checkpoint = b""
     for step in run.steps():
@@ -102,7 +114,24 @@ def identify(
     return run.result(checkpoint)
 
 
-def identification_from_request(request: IdentifyRequest, threads: int | None = None) -> Identification:
+def _identification(
+    aircraft: Aircraft,
+    flight: Flight,
+    samples: Sequence[Trajectory],
+    model: EquivalentModel,
+    search: SearchSettings,
+    *,
+    measurement: Measurement | None,
+    uncertainty: UncertaintySettings | None,
+) -> Identification | AutoIdentification:
+    """An identification with one number of links, or one that chooses it."""
+    kind = AutoIdentification if model.links_per_wing == "auto" else Identification
+    return kind(aircraft, flight, samples, model, search, measurement=measurement, uncertainty=uncertainty)
+
+
+def identification_from_request(
+    request: IdentifyRequest, threads: int | None = None
+) -> Identification | AutoIdentification:
     """The identification that a request (the body of ``POST /identify``) asks for.
 
     Parameters
@@ -114,8 +143,8 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
 
     Returns
     -------
-    Identification
-        The problem, of which nothing is flown yet.
+    Identification or AutoIdentification
+        The problem, of which nothing is flown yet; the latter where the number of links is to be chosen.
 
     Raises
     ------
@@ -132,11 +161,12 @@ def identification_from_request(request: IdentifyRequest, threads: int | None = 
     """
     if threads is not None:
         use_threads(threads)
-    return Identification(
+    return _identification(
         *flown_inputs(request),
         request.model,
         search_settings(request.search),
         measurement=request.measurement,
+        uncertainty=request.uncertainty,
     )
 
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+WRONG_AIRCRAFT_HINT = (
+    "check that aircraft, flight condition and samples belong together: mass, span, chord, hinge positions, "
+    "airspeed, air density"
+)
 UNLIKE_SHARE = 0.03
 OFF_TRIM_RAD = 0.01  # above the bias of attitude sensors
 MOVING_START_RAD_S = 0.02
@@ -32,11 +36,7 @@ def wrong_aircraft(
     """Flights that no model of this aircraft flies, or only with a lift that it does not have."""
     number, worst = max(trained, key=lambda each: each[1].error_share())
     share = worst.error_share()
-    hint = (
-        "check that aircraft, flight condition and samples belong together: mass, span, chord, hinge "
-        "positions, airspeed, air density"
-    )
-    if run.settings.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
+    if run.model.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
         start = abs(float(worst.case.sample.theta[0] - worst.initial[0, 1]))
         off = (
             f", and it would begin the flight pitched by {start:.3f} rad otherwise"
@@ -49,7 +49,7 @@ def wrong_aircraft(
             "wrong_aircraft",
             f"no model of this aircraft flies sample {worst.case.sample.name!r}: {100.0 * share:.0f} per "
             f"cent of its motion is missed{of_rigid}{off}",
-            hint,
+            WRONG_AIRCRAFT_HINT,
             f"/samples/{number}",
         )
     for name, x in zip(run.space.names, best - run.space.guess, strict=True):
@@ -58,7 +58,7 @@ def wrong_aircraft(
             yield ResultWarning(
                 "wrong_aircraft",
                 f"the flights need a lift of {value:.2f} times that of this aircraft",
-                hint,
+                WRONG_AIRCRAFT_HINT,
                 "/aircraft",
             )
 

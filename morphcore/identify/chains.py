@@ -1,4 +1,4 @@
-"""Effective sample size and convergence of Markov chains (Vehtari, Gelman, Simpson, Carpenter & Buerkner 2021)."""
+"""Effective sample size and convergence of Markov chains (Vehtari et al. 2021)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def split(draws: Array) -> Array:
 
 
 def r_hat(draws: Array) -> Array:
-    """(d,) split R-hat of chains (n, c, d): one where all chains tell the same, infinite where they cannot."""
+    """(d,) split R-hat of chains (n, c, d): one where all chains agree, infinite where they do not move."""
     if draws.shape[0] < MIN_STEPS:
         return np.full(draws.shape[2], np.inf)
     halves = split(draws)

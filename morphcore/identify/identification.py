@@ -14,18 +14,20 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.drive_histories import smoothed_drives
+from morphcore.identify.evidence import ChosenPrior
 from morphcore.identify.first_angles import with_first_angles
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.search.checkpoint import pack, unpack
-from morphcore.search.hybrid import Hybrid
-from morphcore.search.least_squares import LeastSquares
+from morphcore.search.hybrid import Hybrid, HybridState
+from morphcore.search.least_squares import LeastSquares, LeastSquaresState
 from morphcore.search.methods import Factory, method
 from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.solver import Batch, Box, Outcome
@@ -39,15 +41,16 @@ from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel, samples_faults
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
-VERSION = "identification 5"  # of the checkpoint; another one is not read
+VERSION = "identification 6"  # of the checkpoint; another one is not read
 CANDIDATE_SPREAD = (
     0.5  # standard deviation of the candidates around the physical guess, in search coordinates
 )
-# A weak prior on the descent: being off the physical guess by one unit costs as much as one error of this
-# size. It settles the directions that the samples cannot see and is far below what they can.
+# A weak prior, until the flights have chosen its weight: being off the physical guess by one unit costs as
+# much as one error of this size. It settles the directions that the samples do not determine.
 PRIOR_RAD = 3e-5
 # "hybrid" looks elsewhere where the descent from the physical guess leaves errors above 1 % of the motion
 # (rms, so squared here): it may have ended in a wrong valley. Where it does not, a screening and three times
@@ -77,6 +80,8 @@ class Identification:
         Method and effort of the search.
     measurement : Measurement, optional
         How the samples were measured; what is left out is decided from the data.
+    uncertainty : UncertaintySettings, optional
+        What is computed beside standard errors and intervals.
     clock : callable
         Wall time, s.
 
@@ -95,6 +100,7 @@ class Identification:
         search: SearchSettings | None = None,
         *,
         measurement: Measurement | None = None,
+        uncertainty: UncertaintySettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.settings = model or EquivalentModel()
@@ -113,6 +119,7 @@ class Identification:
         smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
         self.samples = tuple(sample for sample, _ in smoothed)
         self.histories = tuple(histories for _, histories in smoothed)
+        self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
         self.openness: tuple[Openness, ...] = self._first_openness
@@ -120,17 +127,26 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
+        if self.settings.links_per_wing == "auto":
+            raise InvalidInput(
+                "one identification has one number of links per wing",
+                pointer="/model/links_per_wing",
+                hint='use AutoIdentification, or identify(..., links_per_wing="auto")',
+            )
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         free: Sequence[str] | None = self.settings.aero_coefficients
         if free is None:
             training = [sample for sample in samples if sample.role == "train"]
             free = determined_corrections(self.model.parameters, training)
-        self.space: SearchSpace = search_space(
+        self._first_space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
             aero_coefficients=free,
             bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
         )
+        # the same with the bounds that the search has widened by now, and the weight that it gives the prior
+        self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
+        require_names(self.space, self.uncertainty.profile)
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack(
@@ -196,6 +212,15 @@ class Identification:
     def training(self) -> tuple[SampleCase, ...]:
         """The samples to fit."""
         return tuple(case for case in self.cases if case.sample.role == "train")
+
+    def widened(self) -> tuple[str, ...]:
+        """Names of the parameters whose bounds the search has widened by now."""
+        first, now = self._first_space.box, self.space.box
+        return self.space.named((now.lower < first.lower) | (now.upper > first.upper))
+
+    def shapes(self) -> list[tuple[int, int]]:
+        """Rows and channels of the residuals of each sample to fit."""
+        return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in self.training]
 
     @cached_property
     def floors(self) -> dict[str, float]:
@@ -263,6 +288,11 @@ class Identification:
             self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
             if self._round != state.prepared.round:
                 self.openness, self._round = state.prepared.openness, state.prepared.round
+        self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
+        if isinstance(state.solver, LeastSquaresState | HybridState):
+            descent = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
+            self.space = self._first_space.widened(descent.box)
+            self.prior_weight = float(descent.best_weight.max())
         return state
 
     def _reviewed(self, state: SearchState, stop: Stop | None) -> SearchState:
@@ -295,7 +325,7 @@ class Identification:
         return replace(
             state,
             prepared=prepared,
-            solver=self._search.solver.init(known),
+            solver=_descent(self, self.search).init(known, self.space.box),
             best=points[leader],
             best_cost=float(known.cost[leader]),
             generation=state.generation + 1,
@@ -342,12 +372,7 @@ class Identification:
     @property
     def box(self) -> Box:
         """The bounds of the search coordinates."""
-        return Box(self.space.lower, self.space.upper)
-
-    @property
-    def prior_weight(self) -> float:
-        """What one unit off the physical guess costs in a descent, rad^2."""
-        return PRIOR_RAD**2
+        return self._first_space.box
 
     @property
     def flights_each(self) -> int:
@@ -413,12 +438,14 @@ class Identification:
 
 
 def _descent(run: Identification, settings: SearchSettings) -> LeastSquares:
-    return LeastSquares(run, settings.iterations, PRIOR_RAD, run.space.guess)
+    first = np.full(run.space.dimension, run.prior_weight)
+    return LeastSquares(
+        run, settings.iterations, ChosenPrior(run.space.guess, first, run.shapes), run.space.limits
+    )
 
 
 def _hybrid(run: Identification, settings: SearchSettings) -> Hybrid:
     return Hybrid(
-        run,
         _descent(run, settings),
         candidates=settings.screen,
         starts=settings.starts,

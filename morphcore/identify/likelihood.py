@@ -5,11 +5,11 @@ are those of the noise alone: their covariance M = sum_ij D_i' R(i - j) D_j is k
 
     -2 log L(x) = (D'r(x))' M^-1 D'r(x) + |(1 - D D^+) r(x)|^2 / v
 
-which is the generalised method of moments with its optimal weight (Hansen 1982; Chernozhukov & Hong 2003 on reading
-it as a posterior). For white noise M = v D'D, and both terms together are r'r / v exactly. For coloured noise
-the spread of a linear model is that of the sandwich formula, where whitening the residuals would promise more
-than least squares can keep. The second term, of what no linear change explains, only matters far from the
-estimate; v is the mean variance that the scores see.
+which is the generalised method of moments with its optimal weight (Hansen 1982), read as a posterior
+(Chernozhukov & Hong 2003). For white noise M = v D'D, and both terms together are r'r / v exactly. For
+coloured noise the spread of a linear model is that of the sandwich formula, where whitening the residuals
+would promise more than least squares can keep. The second term, of what no linear change explains, only
+matters far from the estimate; v is the mean variance that the scores see.
 
 The physical guess adds a normal prior of PRIOR_SPREAD in search coordinates, and the box ends it.
 """

@@ -182,6 +182,6 @@ def _solved(
         right[:, count] -= held[count] * delay
     diagonal = np.einsum("pii->pi", gram)
     diagonal += held + TINY * error.shape[1] * np.max(setup.weight) ** 2
-    found = np.asarray(np.linalg.solve(gram, right[..., None])[..., 0], dtype=np.float64)
-    change = found[:, count] if size > count else np.zeros(particles)
-    return found[:, :count], change
+    found = np.linalg.solve(gram, right[..., None])[..., 0]
+    change = np.asarray(found[:, count] if size > count else np.zeros(particles))
+    return np.asarray(found[:, :count]), change

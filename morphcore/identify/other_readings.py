@@ -25,7 +25,7 @@ from morphcore.identify.cost import (
     sample_cases,
     shared_trims,
 )
-from morphcore.search.least_squares import LeastSquares
+from morphcore.search.least_squares import FixedPrior, LeastSquares
 from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory
@@ -241,9 +241,11 @@ def refitted(run: Identification, best: Array, cases: Sequence[SampleCase]) -> t
     """
     problem = _Refit(run, tuple(cases))
     starts = np.stack([run.space.guess, best])
-    prior = float(np.sqrt(run.prior_weight))
-    # of a problem a descent asks for its box alone
-    descent = LeastSquares(problem, DESCENT_STEPS, prior, run.space.guess)  # type: ignore[arg-type]
+    descent = LeastSquares(
+        problem,  # type: ignore[arg-type]  # of a problem a descent asks for its box alone
+        DESCENT_STEPS,
+        FixedPrior(run.space.guess, np.full(best.size, run.prior_weight)),
+    )
     state = descent.init(problem.evaluate(Batch(starts)))
     while not descent.done(state):
         state = descent.tell(state, problem.evaluate(descent.ask(state)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, physical_guess
 from morphcore.models.parameters import CutSurface, Parameter
 from morphcore.models.transforms import Transform
+from morphcore.search.solver import Box
 from morphdata.identify import Bounds
 from morphdata.renamed import current_name, current_names
 
@@ -43,6 +44,8 @@ class Unknown:
         How it is searched.
     lower, upper, guess : ndarray, shape (d,)
         Box and physical guess in search coordinates; d = 0 where it is fixed.
+    limits : tuple of two ndarrays, shape (d,)
+        How far a search may widen the box: bounds that were asked for stay as they are.
     """
 
     parameter: Parameter
@@ -54,6 +57,7 @@ class Unknown:
     lower: Array
     upper: Array
     guess: Array
+    limits: tuple[Array, Array]
 
     @property
     def searched(self) -> bool:
@@ -111,6 +115,26 @@ class SearchSpace:
     def upper(self) -> Array:
         """(d,) upper bounds."""
         return np.concatenate([unknown.upper for unknown in self.unknowns])
+
+    @property
+    def box(self) -> Box:
+        """The bounds."""
+        return Box(self.lower, self.upper)
+
+    @cached_property
+    def limits(self) -> Box:
+        """How far the box may be widened, (d,) each."""
+        return Box(
+            np.concatenate([unknown.limits[0] for unknown in self.unknowns]),
+            np.concatenate([unknown.limits[1] for unknown in self.unknowns]),
+        )
+
+    def widened(self, box: Box) -> SearchSpace:
+        """The same unknowns in another box (d,)."""
+        unknowns = tuple(
+            replace(unknown, lower=box.lower[at], upper=box.upper[at]) for unknown, at, _ in self._parts()
+        )
+        return replace(self, unknowns=unknowns)
 
     @cached_property
     def guess(self) -> Array:
@@ -258,6 +282,15 @@ class SearchSpace:
         near = BOUND_TOLERANCE * (self.upper - self.lower)
         return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
 
+    def named(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
+        """Named parameters of some search coordinates (d,); a share of the span stands for its ratio."""
+        return tuple(
+            name
+            for unknown, at, _ in self._parts()
+            for name, is_chosen in zip(unknown.names, chosen[at], strict=False)  # the last share has none
+            if is_chosen
+        )
+
     def parameter(self, name: str) -> Parameter:
         """The kind of a named parameter; its former name is accepted, too."""
         name = current_name(name)
@@ -342,16 +375,27 @@ def _unknown(
     values = fixed[parameter.name]
     values = (values[0, sets[0]] if sets else values[0]).reshape(-1)
     transform = parameter.transform(surface)
+    lower = upper = np.zeros(0)
+    limits = (lower, upper)
     if searched and bounds is not None:
         low, high = bounds
-        lower, upper = transform.box(low, high, values.size)
+        lower, upper = limits = transform.box(low, high, values.size)
     elif searched:
         cut = CutSurface(surface, model.flight, fixed["division"][:, sets[0] if sets else 0])
         lower, upper = parameter.bounds(cut)
-    else:
-        lower = upper = np.zeros(0)
+        limits = _limits(parameter, cut, lower, upper)
     guess = transform.forward(values) if lower.size else lower
     # no damping at all has no logarithm: its search begins in the middle
     guess = np.where(np.isfinite(guess), guess, 0.5 * (lower + upper))
     guess = np.clip(guess, lower, upper)
-    return Unknown(parameter, model.links_per_wing, prefix, sets, surfaces, transform, lower, upper, guess)
+    return Unknown(
+        parameter, model.links_per_wing, prefix, sets, surfaces, transform, lower, upper, guess, limits
+    )
+
+
+def _limits(parameter: Parameter, cut: CutSurface, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """How far the box of a parameter may be widened: nowhere less than it is."""
+    if parameter.limits is None:
+        return lower, upper
+    lowest, highest = parameter.limits(cut)
+    return np.minimum(lower, lowest), np.maximum(upper, highest)

@@ -165,7 +165,7 @@ class _Flights:
 
     def model(self, centre: Array, root: Array) -> Surrogate:
         """Fit the quadratic model to all flights that were kept."""
-        z = np.linalg.solve(root, (np.concatenate(self.points) - centre).T).T
+        z = np.asarray(np.linalg.solve(root, (np.concatenate(self.points) - centre).T).T, dtype=np.float64)
         scores, density = np.concatenate(self.scores), np.concatenate(self.log_density)
         return surrogate(self.likelihood, centre, root, z, scores, density)
 
@@ -200,7 +200,7 @@ def posterior(
     flights = _Flights(likelihood, residuals)
     say("posterior: looking for the most likely parameters")
     centre = _most_likely(flights, estimate)
-    root = np.linalg.cholesky(likelihood.covariance)
+    root = np.asarray(np.linalg.cholesky(likelihood.covariance), dtype=np.float64)
     model, z, step = _trained(flights, centre, root, rng)
     points, density, acceptance = _chains(flights, model, z, step, settings, rng)
     searched = space.searched
@@ -245,21 +245,39 @@ def _trained(
     say("posterior: flights around the most likely parameters")
     flights.fly(centre + radius * rng.normal(size=(radius.size, d)) @ root.T, keep=True)
     points, step = _likeliest(flights, rng), FIRST_STEP
-    for refit in range(REFITS + 1):
-        say(f"posterior: model {refit + 1} of {REFITS + 1}")
-        model = flights.model(centre, root)
-        z = np.linalg.solve(root, (points - centre).T).T
-        for _ in range(WARMING):
-            check_stop()
-            z, taken = wander(model, z, rng, transitions=1, leaps=LEAPS, step=step)
-            step *= float(np.exp(taken - WANTED_ACCEPTANCE))
-        points = model.points(z)
-        if refit == REFITS:
-            break
-        flights.fly(points, keep=True)
+    for refit in range(REFITS):
+        say(f"posterior: model {refit + 1} of {REFITS}")
+        model, z, step, kept = _refitted(flights, centre, root, points, step, rng)
+        points = model.points(z[kept])
         # leaps are long where the coordinates have the spread of the posterior, bends and all
-        centre, root = points.mean(axis=0), np.linalg.cholesky(np.cov(points.T) + ROUND * np.eye(d))
-    return model, z[rng.permutation(z.shape[0])[:CHAINS]], step
+        spread = np.cov(points.T).reshape(d, d) + ROUND * np.eye(d)
+        centre, root = points.mean(axis=0), np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
+    model, z, step, kept = _refitted(flights, centre, root, points, step, rng)
+    return model, z[kept][:CHAINS], step
+
+
+def _refitted(
+    flights: _Flights, centre: Array, root: Array, points: Array, step: float, rng: np.random.Generator
+) -> tuple[Surrogate, Array, float, NDArray[np.int64]]:
+    """The model of all flights so far, flown draws z (n, d) of it, their step, and which draws to keep."""
+    model = flights.model(centre, root)
+    z = np.asarray(np.linalg.solve(root, (points - centre).T).T, dtype=np.float64)
+    for _ in range(WARMING):
+        check_stop()
+        z, taken = wander(model, z, rng, transitions=1, leaps=LEAPS, step=step)
+        step *= float(np.exp(taken - WANTED_ACCEPTANCE))
+    gain = flights.fly(model.points(z), keep=True) - model.log_density(z)
+    return model, z, step, _resampled(gain, rng)
+
+
+def _resampled(gain: Array, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draws of the model, again as often as the flights take them for more likely, none above the median.
+
+    A quadratic model may have a second valley where there is none; the flights see that. Above the median
+    they would only pick the few draws at which the model is off most.
+    """
+    weight = np.exp(np.minimum(gain - np.median(gain), 0.0))
+    return np.asarray(rng.choice(gain.size, size=gain.size, p=weight / weight.sum()), dtype=np.int64)
 
 
 def _likeliest(flights: _Flights, rng: np.random.Generator) -> Array:

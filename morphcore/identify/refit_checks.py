@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
+from morphcore.identify.aircraft_checks import WRONG_AIRCRAFT_HINT
 from morphcore.identify.column_checks import constant_runs
 from morphcore.identify.cost import SampleCase, costs, sample_cases
 from morphcore.identify.other_readings import TENFOLD, delayed, fitted_delays, refitted
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 LONG_DELAY_S = 0.025  # beyond what recorders of one aircraft should be apart
 LARGE_BIAS_RAD = 0.02  # beyond what an attitude sensor should be off
+IMPOSSIBLE_BIAS_RAD = 0.06  # 3.4 degrees
 MIN_DELAY_S = 0.005  # half a row of most records
 CONTINUED = (1.1, 1.2, 1.35, 1.5, 1.75, 2.0)  # times the recorded travel of a drive that was cut off
 FOURFOLD = 4.0  # the cost by which a continued drive must be better: its true end is only guessed
@@ -42,7 +44,15 @@ def measurement_warnings(
             yield late_warning(sample.name, pointer, delay_s, allowed_for=True)
         for name in ANGLES[:2]:  # the bias of yaw is the heading
             bias = ((found.get("bias") or {}).get(name) or {}).get("value") or 0.0
-            if abs(bias) > LARGE_BIAS_RAD:
+            if abs(bias) > IMPOSSIBLE_BIAS_RAD:
+                yield ResultWarning(
+                    "wrong_aircraft",
+                    f"sample {sample.name!r} fits only with a sensor that shows {name} wrong by "
+                    f"{1e3 * bias:.0f} mrad, which none does",
+                    WRONG_AIRCRAFT_HINT,
+                    pointer,
+                )
+            elif abs(bias) > LARGE_BIAS_RAD:
                 yield ResultWarning(
                     "large_bias",
                     f"the angle {name} of sample {sample.name!r} reads {1e3 * bias:.0f} mrad more than "

@@ -241,8 +241,10 @@ def _columns(run: Identification, point: Array, trial: tuple[Openness, ...]) -> 
     for case, found in shared_trims(run.model, batch, cases, run.settings.start):
         setup = case.setup
         linear, _ = linear_columns(setup)
-        offsets = int(setup.offset.sum())
-        parts = [("start" if n >= offsets else "bias", linear[..., n]) for n in range(linear.shape[2])]
+        # offsets come first; those of other channels than the angles, starts and first angles are not judged
+        kinds = ["bias" if angle else "other" for angle in setup.angle[setup.offset]]
+        kinds += ["other"] * (linear.shape[2] - len(kinds))
+        parts = [(kind, linear[..., n]) for n, kind in enumerate(kinds)]
         if setup.openness.delay:
             parts.append(("delay", reduced_errors(run.model, batch, case, found).slope[0]))
         for kind, part in parts:
@@ -283,7 +285,8 @@ def _plausible(values: Sequence[tuple[float, str]]) -> bool:
     """Whether biases and delays are such as sensors have, and some of them more than nothing."""
     low = {"bias": MIN_BIAS_RAD, "delay": MIN_DELAY_S}
     high = {"bias": MAX_BIAS_RAD, "delay": MAX_DELAY_S}
-    return any(size > low[kind] for size, kind in values) and all(size < high[kind] for size, kind in values)
+    judged = [(size, kind) for size, kind in values if kind in low]
+    return any(size > low[kind] for size, kind in judged) and all(size < high[kind] for size, kind in judged)
 
 
 def linearised(run: Identification, point: Array) -> tuple[Array, Array]:

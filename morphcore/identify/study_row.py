@@ -111,7 +111,7 @@ def study_row(run: Identification, found: IdentifyResult) -> StudyRow:
     )
     rms = np.sqrt(np.mean(errors**2, axis=0))
     return StudyRow(
-        links_per_wing=run.settings.links_per_wing,
+        links_per_wing=run.model.links_per_wing,
         bodies=1 + found.model.links,
         parameters=run.space.dimension,
         J_train=J_train,

@@ -56,6 +56,15 @@ CENTRE_UNIT_CHORDS = 0.05
 DRAG_RANGE = (0.0, 0.08)
 DRAG_UNIT = 0.01
 NEUTRAL_LIFT_FACTOR = 1.0
+# how far a search may widen its bounds where the flights push against them: a joint a hundred times stiffer
+# than the beam is rigid, a softer one no wing; beyond, an aerodynamic correction would be another wing's
+STIFFNESS_LIMIT_FACTOR = 100.0
+DAMPING_LIMIT_FACTOR = 1000.0
+LAG_LIMIT_FACTOR = 100.0
+LIFT_LIMITS = (0.3, 2.5)
+CENTRE_LIMIT_CHORDS = 0.5
+DRAG_LIMITS = (0.0, 0.5)
+DIVISION_LIMIT_RATIO = 3.0  # of the log-ratios: a share over the last one 20 times smaller or larger
 SHORTEST_LAG_S = 1e-9  # shorter lags are quasi-steady; avoids a division by zero
 
 
@@ -127,6 +136,9 @@ class Parameter:
         Default bounds (d,) of its search coordinates on a surface.
     guess : callable, CutSurface -> ndarray, shape (p, ...)
         Its physical values on a surface.
+    limits : callable, CutSurface -> (lower, upper), optional
+        How far physics lets a search widen those bounds (d,) where the flights push against them; None: not
+        at all.
     apply : callable, (SurfaceRows, ndarray) -> None
         Writes values (p, ...) into the constants of a surface's links.
     scope : {"surface", "pair", "aircraft"}
@@ -163,6 +175,7 @@ class Parameter:
     correction: bool = True
     asymmetric: bool = False
     factor: bool = False
+    limits: Callable[[CutSurface], tuple[Array, Array]] | None = None
     default: float | None = None
     at_bound: Mapping[str, str] = field(default_factory=dict)
 
@@ -237,6 +250,9 @@ DIVISION = Parameter(
     bounds=lambda cut: Shares(partial(beam_division, cut.surface)).box(0.0, 1.0, cut.division.shape[1]),
     guess=lambda cut: cut.division,
     apply=_cut,
+    limits=lambda cut: Shares(partial(beam_division, cut.surface), DIVISION_LIMIT_RATIO).box(
+        0.0, 1.0, cut.division.shape[1]
+    ),
     scope="surface",
     labels=lambda links: tuple(str(k + 1) for k in range(links)),
     coordinates=lambda links: tuple(f"log_ratio.{k + 1}" for k in range(links - 1)),
@@ -256,6 +272,11 @@ def _beam_damping(cut: CutSurface) -> Array:
     return _beam_stiffness(cut) * cut.surface.material.stiffness_damping_s
 
 
+def _some_damping(cut: CutSurface) -> Array:
+    """The same, and next to none where the beam has none."""
+    return np.maximum(_beam_damping(cut), MIN_DAMPING_S * _beam_stiffness(cut))
+
+
 def _stiffen(rows: SurfaceRows, stiffness: Array) -> None:
     rows.stiffness[:] = stiffness.reshape(rows.stiffness.shape)
 
@@ -271,6 +292,7 @@ STIFFNESS = Parameter(
     bounds=lambda cut: _factor(_beam_stiffness(cut), STIFFNESS_FACTOR),
     guess=_beam_stiffness,
     apply=_stiffen,
+    limits=lambda cut: _factor(_beam_stiffness(cut), STIFFNESS_LIMIT_FACTOR),
     scope="surface",
     labels=_joint_labels,
     correction=False,
@@ -281,11 +303,10 @@ DAMPING = Parameter(
     name="damping_nms_rad",
     unit="N m s/rad",
     transform=lambda _: Log(),
-    bounds=lambda cut: _factor(
-        np.maximum(_beam_damping(cut), MIN_DAMPING_S * _beam_stiffness(cut)), DAMPING_FACTOR
-    ),
+    bounds=lambda cut: _factor(_some_damping(cut), DAMPING_FACTOR),
     guess=_beam_damping,
     apply=_damp,
+    limits=lambda cut: _factor(_some_damping(cut), DAMPING_LIMIT_FACTOR),
     scope="surface",
     labels=_joint_labels,
     correction=False,
@@ -326,9 +347,9 @@ def _jones_lag_s(cut: CutSurface) -> float:
     return JONES_MEAN_LAG * _chord(cut.surface) / (2 * cut.flight.airspeed_m_s)
 
 
-def _lag_bounds(cut: CutSurface) -> tuple[Array, Array]:
-    natural = np.full(1, _jones_lag_s(cut))
-    return np.log(natural / LAG_FACTOR), np.log(natural * LAG_FACTOR)
+def _centre_box(cut: CutSurface, range_chords: float) -> tuple[Array, Array]:
+    chord = _chord(cut.surface)
+    return Linear(CENTRE_UNIT_CHORDS * chord).box(-range_chords * chord, range_chords * chord, 1)
 
 
 LIFT_FACTOR = Parameter(
@@ -338,6 +359,7 @@ LIFT_FACTOR = Parameter(
     bounds=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR).box(*LIFT_RANGE, 1),
     guess=_neutral(NEUTRAL_LIFT_FACTOR),
     apply=_scale_lift,
+    limits=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR).box(*LIFT_LIMITS, 1),
     default=NEUTRAL_LIFT_FACTOR,
 )
 
@@ -345,11 +367,10 @@ AC_OFFSET = Parameter(
     name="ac_offset_m",
     unit="m",
     transform=lambda surface: Linear(CENTRE_UNIT_CHORDS * _chord(surface)),
-    bounds=lambda cut: Linear(CENTRE_UNIT_CHORDS * _chord(cut.surface)).box(
-        -CENTRE_RANGE_CHORDS * _chord(cut.surface), CENTRE_RANGE_CHORDS * _chord(cut.surface), 1
-    ),
+    bounds=lambda cut: _centre_box(cut, CENTRE_RANGE_CHORDS),
     guess=_neutral(0.0),
     apply=_move_centre,
+    limits=lambda cut: _centre_box(cut, CENTRE_LIMIT_CHORDS),
     size=_chord,
     default=0.0,
 )
@@ -361,6 +382,7 @@ PROFILE_DRAG = Parameter(
     bounds=lambda _: Linear(DRAG_UNIT).box(*DRAG_RANGE, 1),
     guess=lambda cut: np.full(cut.division.shape[0], cut.surface.profile_drag),
     apply=_drag,
+    limits=lambda _: Linear(DRAG_UNIT).box(*DRAG_LIMITS, 1),
     scope="pair",
     # the drag of wings that move alike has no moment about the vertical and hardly affects pitch, so a fit
     # would use it to compensate other errors of pitch
@@ -372,9 +394,10 @@ LAG = Parameter(
     name="lag_s",
     unit="s",
     transform=lambda _: Log(),
-    bounds=_lag_bounds,
+    bounds=lambda cut: _factor(np.full(1, _jones_lag_s(cut)), LAG_FACTOR),
     guess=lambda cut: np.full(cut.division.shape[0], _jones_lag_s(cut)),
     apply=_lag,
+    limits=lambda cut: _factor(np.full(1, _jones_lag_s(cut)), LAG_LIMIT_FACTOR),
     size=_chord,
 )
 

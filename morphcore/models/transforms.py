@@ -17,10 +17,8 @@ from morphcore.errors import InvalidInput
 
 Array = NDArray[np.float64]
 
-RATIO_RANGE = (
-    1.5  # range of the log-ratios: the ratio of a share to the last one may be 4.5 times smaller or larger
-)
-HALVINGS = 50  # bisections of an interval of RATIO_RANGE, down to rounding
+RATIO_RANGE = 1.5  # of the log-ratios: a share over the last one may be 4.5 times smaller or larger
+HALVINGS = 50  # of the range of the log-ratios, down to rounding
 
 
 class Transform(Protocol):
@@ -136,10 +134,13 @@ class Shares:
     Attributes
     ----------
     nominal : callable, int -> ndarray, shape (m,)
-        The shares at the centre of a box, as a function of their number.
+        The shares in the middle of a box, by their number.
+    ratio_range : float
+        Of the log-ratios around them, in a box.
     """
 
     nominal: Callable[[int], Array] = equal_shares
+    ratio_range: float = RATIO_RANGE
 
     def forward(self, values: Array) -> Array:
         """Log-ratios to the last share."""
@@ -152,7 +153,7 @@ class Shares:
         return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
     def box(self, low: float, high: float, count: int) -> tuple[Array, Array]:
-        """Log-ratios within RATIO_RANGE of the nominal ones for which all shares stay within the bounds.
+        """Log-ratios within ``ratio_range`` of the nominal ones for which all shares stay within the bounds.
 
         If the nominal shares violate the bounds, the box is centred on equal shares.
         """
@@ -173,7 +174,8 @@ class Shares:
             smallest, largest = self.limits(centre - half, centre + half)
             return bool(smallest.min() >= low and largest.max() <= high)
 
-        half, beyond = (RATIO_RANGE, RATIO_RANGE) if fits(RATIO_RANGE) else (0.0, RATIO_RANGE)
+        widest = self.ratio_range
+        half, beyond = (widest, widest) if fits(widest) else (0.0, widest)
         for _ in range(HALVINGS):
             middle = 0.5 * (half + beyond)
             half, beyond = (middle, beyond) if fits(middle) else (half, middle)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
 from morphcore.search.least_squares import LeastSquares, LeastSquaresState
-from morphcore.search.solver import Batch, Outcome, Problem, Solver
+from morphcore.search.solver import Batch, Outcome, Solver
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,6 @@ class Hybrid(Solver[HybridState, Outcome]):
 
     Parameters
     ----------
-    problem : provides the box.
     descent : LeastSquares
     candidates : int
         Number flown around the best guess, from which ``starts`` of the second descent are chosen.
@@ -54,7 +53,6 @@ class Hybrid(Solver[HybridState, Outcome]):
 
     def __init__(
         self,
-        problem: Problem[Any],
         descent: LeastSquares,
         *,
         candidates: int,
@@ -63,7 +61,7 @@ class Hybrid(Solver[HybridState, Outcome]):
         good_cost: float,
         seed: int,
     ) -> None:
-        self._box, self._descent = problem.box, descent
+        self._descent = descent
         self._candidates, self._starts, self._spread = candidates, starts, spread
         self._good_cost, self._seed = good_cost, seed
 
@@ -76,14 +74,14 @@ class Hybrid(Solver[HybridState, Outcome]):
         if state.stage != "screening":
             return self._descent.ask(state.descent)
         drawn = self._spread * even_normals(self._candidates, state.centre.size, self._seed)
-        return Batch(np.clip(state.centre + drawn, self._box.lower, self._box.upper))
+        return Batch(np.clip(state.centre + drawn, state.descent.lower, state.descent.upper))
 
     def tell(self, state: HybridState, outcome: Outcome) -> HybridState:
         """Continue the descent, or start the second one from the best candidates."""
         if state.stage == "screening":
             chosen = np.argsort(outcome.cost, kind="stable")[: self._starts]
             starts = Outcome(outcome.points[chosen], outcome.cost[chosen])
-            return replace(state, stage="second", descent=self._descent.init(starts))
+            return replace(state, stage="second", descent=self._descent.init(starts, state.descent.box))
         descent = self._descent.tell(state.descent, outcome)
         best = min(state.best_cost, self._descent.best(descent, outcome)[1])
         poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost
@@ -96,6 +94,10 @@ class Hybrid(Solver[HybridState, Outcome]):
     def best(self, state: HybridState, outcome: Outcome) -> tuple[Array, float]:
         """Return the descent's best start, or the best candidate."""
         return self._descent.best(state.descent, outcome)
+
+    def replaces(self, state: HybridState) -> bool:
+        """Return what the first descent says; the second has to find something better."""
+        return state.stage == "first" and self._descent.replaces(state.descent)
 
     def between_steps(self, state: HybridState) -> bool:
         """Return whether an iteration of the descent, or the screening, has ended."""

@@ -9,22 +9,26 @@ Transtrum & Sethna (2012), the curvature taken from the flight itself; more of t
 multi-step method of Fan (2012) does. A correction costs one flight, a Jacobian d.
 
 The damping is Levenberg's (equal in all coordinates, which are of order one), not Marquardt's: scaled by the
-Jacobian's columns it would let a coordinate that the samples hardly determine run far off. Several damping
-values are tried at once, since a wider batch costs hardly more than a narrow one. Bounds are handled by an
-active set (a coordinate at its bound whose descent leads outward is held).
+Jacobian's columns it would let a coordinate that the samples hardly see run far off. Several damping values
+are tried at once, since a wider batch costs hardly more than a narrow one. Bounds by the active set (a
+coordinate at its bound whose descent leads outward is held). A bound is widened, within the limits of the
+problem, where a start has been pushed against it for a whole iteration.
+
+What is known beforehand enters as a prior: residuals of its own, whose weights may be chosen anew from the
+residuals and the Jacobian of each iteration. That costs no flights.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
-from morphcore.search.solver import Batch, Outcome, Problem, Solver
+from morphcore.search.solver import Batch, Box, Outcome, Problem, Solver
 
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
@@ -41,6 +45,57 @@ PATIENCE = 3  # iterations without decrease before a start has converged
 EXACT_RMS = 1e-8  # smaller residuals are round-off: nothing is left to fit
 # hopeless starts are dropped during the descent: iteration -> starts kept (as a share of the first field)
 NARROWING = ((3, 1.0), (6, 0.5))
+# of the box's width, by which a bound moves outward when a start is pushed against it
+WIDENING = 0.5
+
+
+class Prior(Protocol):
+    """What is known of a point before any residual is seen."""
+
+    @property
+    def point(self) -> Array:
+        """The most likely point (d,)."""
+        ...
+
+    @property
+    def first(self) -> Array:
+        """Weights (d,) with which a descent begins: the cost of one unit off the point, squared."""
+        ...
+
+    def weights(self, error: Array, jacobian: Array, offset: Array, present: Array) -> Array:
+        """Return the weights (d,) of the next iteration.
+
+        Parameters
+        ----------
+        error, jacobian : ndarray, shape (m,) and (m, d)
+            Residuals at a point, and their derivatives.
+        offset : ndarray, shape (d,)
+            The point less the most likely one.
+        present : ndarray, shape (d,)
+            The weights of the iteration before.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class FixedPrior:
+    """A prior whose weights do not depend on the residuals.
+
+    Attributes
+    ----------
+    point : ndarray, shape (d,)
+        The most likely point.
+    first : ndarray, shape (d,)
+        The weights.
+    """
+
+    point: Array
+    first: Array
+
+    def weights(self, error: Array, jacobian: Array, offset: Array, present: Array) -> Array:
+        """Return the weights as they are."""
+        del error, jacobian, offset
+        return present
 
 
 @stored
@@ -72,14 +127,37 @@ class TrialSteps:
 @stored
 @dataclass(frozen=True)
 class LeastSquaresState:
-    """Starts s of a descent: points (s, d); costs, dampings, stalls (s,); the iteration and its trials."""
+    """Starts s of a descent.
+
+    Attributes
+    ----------
+    point, weight : (s, d) where the starts are, and the weights of the prior there.
+    cost : (s,) the prior's part included.
+    damping, stalled : (s,)
+    lower, upper : (d,) the box, which may have been widened.
+    iteration : how many there have been.
+    trials : of an iteration under way.
+    """
 
     point: Array
     cost: Array
     damping: Array
     stalled: NDArray[np.int64]
+    weight: Array
+    lower: Array
+    upper: Array
     iteration: int = 0
     trials: TrialSteps | None = field(default=None, repr=False)
+
+    @property
+    def box(self) -> Box:
+        """The box with its bounds as they were widened."""
+        return Box(self.lower, self.upper)
+
+    @property
+    def best_weight(self) -> Array:
+        """(d,) weights of the prior at the best start."""
+        return np.asarray(self.weight[int(np.argmin(self.cost))])
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -95,43 +173,58 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
     problem : provides the box.
     iterations : int
         at most.
-    prior : a deviation of one unit from ``prior_point`` costs as much as one residual of this size. A weak
-    prior settles the directions that the residuals do not determine.
-    prior_point : (d,)
+    prior : Prior, optional
+        What is known beforehand. A weak one settles the directions that the residuals cannot see.
+    limits : Box, optional
+        How far the box may be widened; None: not at all.
     """
 
     name = "polish"  # its name in the history of a result
 
     def __init__(
-        self, problem: Problem[Any], iterations: int, prior: float = 0.0, prior_point: Array | None = None
+        self, problem: Problem[Any], iterations: int, prior: Prior | None = None, limits: Box | None = None
     ) -> None:
-        self._lower, self._upper = problem.box.lower, problem.box.upper
+        self._box = problem.box
+        self._limits = self._box if limits is None else limits
         self._iterations = iterations
-        self._prior = prior
-        self._prior_point = np.zeros_like(self._lower) if prior_point is None else prior_point
+        nothing = np.zeros_like(self._box.lower)
+        self._prior = FixedPrior(nothing, nothing) if prior is None else prior
 
-    def init(self, known: Outcome) -> LeastSquaresState:
-        """Start at every point."""
+    def init(self, known: Outcome, box: Box | None = None) -> LeastSquaresState:
+        """Start at every point.
+
+        ``box`` : whose bounds were widened before; None for the problem's.
+        """
+        box = self._box if box is None else box
         count = known.points.shape[0]
-        damping, stalled = np.full(count, FIRST_DAMPING), np.zeros(count, dtype=np.int64)
-        return LeastSquaresState(known.points, known.cost, damping, stalled)
+        weight = np.tile(self._prior.first, (count, 1))
+        return LeastSquaresState(
+            known.points,
+            known.cost + self._prior_cost(known.points, weight),
+            np.full(count, FIRST_DAMPING),
+            np.zeros(count, dtype=np.int64),
+            weight,
+            np.minimum(box.lower, known.points.min(axis=0)),
+            np.maximum(box.upper, known.points.max(axis=0)),
+        )
 
     def ask(self, state: LeastSquaresState) -> Batch:
         """Return the starts and their probes, then three rounds of trial steps."""
         if state.trials is None:
-            probed, _ = probes(state.point[_moving(state)], self._upper)
+            probed, _ = probes(state.point[_moving(state)], state.upper)
             return Batch(probed, residuals=True)
-        return Batch(state.trials.tried.reshape(-1, self._lower.size), residuals=True)
+        return Batch(state.trials.tried.reshape(-1, state.lower.size), residuals=True)
 
     def tell(self, state: LeastSquaresState, outcome: Outcome) -> LeastSquaresState:
-        """Compute the first trial steps, correct them, or accept the best of them."""
-        residuals = self._with_prior(outcome)
+        """Take the first trial steps, correct them, or accept the best of them."""
+        if outcome.residuals is None:
+            raise TypeError("the batch requested residuals")
         if state.trials is None:
-            return replace(state, trials=self._first_trials(state, residuals))
-        trials = self._judged(state, state.trials, residuals)
+            return self._begun(state, outcome.residuals)
+        trials = self._judged(state, state.trials, outcome)
         if trials.correction <= CORRECTIONS:
             return replace(state, trials=trials)
-        return _accepted(state, trials)
+        return self._widened(state, _accepted(state, trials))
 
     def done(self, state: LeastSquaresState) -> bool:
         """Return True when no remaining start moves any more or the iterations are used up."""
@@ -147,7 +240,11 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         point = state.point[leader]
         if state.trials is not None:
             return point, np.inf
-        return point, float(state.cost[leader] - self._prior**2 * np.sum((point - self._prior_point) ** 2))
+        return point, float(state.cost[leader] - self._prior_cost(point, state.weight[leader]))
+
+    def replaces(self, state: LeastSquaresState) -> bool:
+        """Return whether an iteration has ended: where the weights rise, so may the cost without them."""
+        return state.trials is None and state.iteration > 0
 
     def between_steps(self, state: LeastSquaresState) -> bool:
         """Return whether an iteration has ended."""
@@ -157,47 +254,60 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         """Return the completed share of the iterations."""
         return state.iteration / self._iterations
 
-    def _with_prior(self, outcome: Outcome) -> Array:
-        if outcome.residuals is None:
-            raise TypeError("the batch requested residuals")
-        if self._prior == 0.0:
-            return outcome.residuals
-        off = self._prior * (outcome.points - self._prior_point)
-        return np.concatenate([outcome.residuals, off], axis=1)
+    def _prior_cost(self, points: Array, weight: Array) -> Array:
+        """What points (..., d) cost for being off the prior's, (...)."""
+        return np.asarray(np.sum(weight * (points - self._prior.point) ** 2, axis=-1))
 
-    def _first_trials(self, state: LeastSquaresState, residuals: Array) -> TrialSteps:
-        """Return damped steps from the residuals of the starts and their probes."""
+    def _prior_errors(self, points: Array, weight: Array) -> Array:
+        """The same as residuals (..., d)."""
+        return np.asarray(np.sqrt(weight) * (points - self._prior.point))
+
+    def _begun(self, state: LeastSquaresState, residuals: Array) -> LeastSquaresState:
+        """Choose the prior's weights at the starts, and damped steps from there and their probes."""
         starts = _moving(state)
         points = state.point[starts]
-        error, jacobian = _differences(residuals, probes(points, self._upper)[1])
+        error, jacobian = _differences(residuals, probes(points, state.upper)[1])
+        weight = state.weight.copy()
+        for k, start in enumerate(starts):
+            if state.stalled[start]:
+                continue  # weights that went on changing would keep it from coming to rest
+            offset = points[k] - self._prior.point
+            weight[start] = self._prior.weights(error[k], jacobian[k], offset, state.weight[start])
+        own = weight[starts]
+        error = np.concatenate([error, self._prior_errors(points, own)], axis=1)
+        slope = np.sqrt(own)[:, :, None] * np.eye(points.shape[1])
+        jacobian = np.concatenate([jacobian, slope], axis=1)
         dampings = np.clip(state.damping[starts, None] * DAMPING_TRIALS, MIN_DAMPING, MAX_DAMPING)
         # as if there were no curvature
         assumed = np.repeat(error[:, None, :], dampings.shape[1], axis=1)
-        return TrialSteps(
+        trials = TrialSteps(
             starts,
             error,
             jacobian,
             dampings,
-            self._steps(points, jacobian, dampings, assumed),
+            self._steps(state, points, jacobian, dampings, assumed),
             correction=0,
             best=points.copy(),
             cost=np.full(starts.size, np.inf),
             winner=np.zeros(starts.size, dtype=np.int64),
         )
+        return replace(state, weight=weight, trials=trials)
 
-    def _judged(self, state: LeastSquaresState, trials: TrialSteps, residuals: Array) -> TrialSteps:
-        """Return the trials updated with the best flown ones, and with corrected steps to be flown next."""
+    def _judged(self, state: LeastSquaresState, trials: TrialSteps, outcome: Outcome) -> TrialSteps:
+        """Return the trials with the best of the flown ones, and with corrected steps to be flown next."""
         points, tried = state.point[trials.starts], trials.tried
         count, tests = trials.dampings.shape
         rows = np.arange(count)
-        flown = residuals.reshape(count, tests, -1)
+        prior = self._prior_errors(tried, state.weight[trials.starts, None])
+        measured = np.asarray(outcome.residuals).reshape(count, tests, -1)
+        flown = np.concatenate([measured, prior], axis=2)
         costs = np.einsum("stm,stm->st", flown, flown)
         leader = np.argmin(costs, axis=1)
         better = costs[rows, leader] < trials.cost
         correction = trials.correction + 1
         if correction <= CORRECTIONS:
             assumed = flown - (tried - points[:, None, :]) @ trials.jacobian.transpose(0, 2, 1)
-            tried = self._steps(points, trials.jacobian, trials.dampings, assumed)
+            tried = self._steps(state, points, trials.jacobian, trials.dampings, assumed)
         return replace(
             trials,
             tried=tried,
@@ -207,7 +317,9 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
             winner=np.where(better, leader, trials.winner),
         )
 
-    def _steps(self, points: Array, jacobian: Array, dampings: Array, assumed: Array) -> Array:
+    def _steps(
+        self, state: LeastSquaresState, points: Array, jacobian: Array, dampings: Array, assumed: Array
+    ) -> Array:
         """Return where steps of all dampings (s, t) lead from points (s, d), (s, t, d).
 
         ``assumed`` : (s, t, m) residuals of the linear model at zero step.
@@ -219,13 +331,35 @@ class LeastSquares(Solver[LeastSquaresState, Outcome]):
         return np.array(
             [
                 [
-                    _step(x, gradient, square, unit * damping, self._lower, self._upper)
+                    _step(x, gradient, square, unit * damping, state.lower, state.upper)
                     for gradient, damping in zip(of_start, row, strict=True)
                 ]
                 for x, of_start, square, unit, row in zip(
                     points, gradients, squares, scale, dampings, strict=True
                 )
             ]
+        )
+
+    def _widened(self, before: LeastSquaresState, after: LeastSquaresState) -> LeastSquaresState:
+        """Return the state with wider bounds where a start was at one before and after an iteration."""
+        held = {
+            side: np.any((before.point == bound) & (after.point == bound), axis=0) & (bound != limit)
+            for side, bound, limit in (
+                ("lower", before.lower, self._limits.lower),
+                ("upper", before.upper, self._limits.upper),
+            )
+        }
+        if not (held["lower"].any() or held["upper"].any()):
+            return after
+        reach = WIDENING * (self._box.upper - self._box.lower)
+        at_one = ((before.point == before.lower) & held["lower"]) | (
+            (before.point == before.upper) & held["upper"]
+        )
+        return replace(
+            after,
+            lower=np.where(held["lower"], np.maximum(before.lower - reach, self._limits.lower), before.lower),
+            upper=np.where(held["upper"], np.minimum(before.upper + reach, self._limits.upper), before.upper),
+            stalled=np.where(np.any(at_one, axis=1), 0, after.stalled),
         )
 
 
@@ -251,7 +385,15 @@ def _accepted(state: LeastSquaresState, trials: TrialSteps) -> LeastSquaresState
     damping[chosen] = np.clip(np.where(improved, lowered, raised), MIN_DAMPING, MAX_DAMPING)
     stalled[chosen] = np.where(before - trials.cost < STALLED * before, stalled[chosen] + 1, 0)
     stalled[chosen[cost[chosen] < trials.error.shape[1] * EXACT_RMS**2]] = PATIENCE
-    return LeastSquaresState(point, cost, damping, stalled, state.iteration + 1)
+    return replace(
+        state,
+        point=point,
+        cost=cost,
+        damping=damping,
+        stalled=stalled,
+        iteration=state.iteration + 1,
+        trials=None,
+    )
 
 
 def differences(points: Array, upper: Array, residuals: Residuals) -> tuple[Array, Array]:

@@ -121,7 +121,7 @@ class Search(Generic[Result]):
             inner = solver.init(outcome) if inner is None else solver.tell(inner, outcome)
             evaluations += outcome.evaluations
             point, cost = solver.best(inner, outcome)
-            if cost < best_cost:
+            if cost < best_cost or (np.isfinite(cost) and solver.replaces(inner)):
                 best, best_cost = point, cost
             if solver.between_steps(inner):
                 break

@@ -124,6 +124,14 @@ class Solver(ABC, Generic[State, Result]):
         minimum = int(np.argmin(outcome.cost))
         return outcome.points[minimum], float(outcome.cost[minimum])
 
+    def replaces(self, state: State) -> bool:
+        """Return whether its best takes the place of what was found before even where that costs less.
+
+        So it is where a solver weighs more than the cost: what is known beforehand.
+        """
+        del state
+        return False
+
     def between_steps(self, state: State) -> bool:
         """Return whether a step ends here; a step may take several batches."""
         del state

@@ -32,17 +32,27 @@ ASYMMETRIC_RAD = 0.01  # rad; a sample is asymmetric if its sweeps differ, or it
 REPORT_TIME_S = 120.0  # uncertainty, plots, writing
 
 
-def cost(request: SamplesRequest, links: int | None = None) -> CostEstimate:
-    """Estimate flights and computing time of one identification.
+def cost(request: SamplesRequest) -> CostEstimate:
+    """Estimate flights and computing time for all numbers of links per wing that are searched.
 
     Parameters
     ----------
     request : SamplesRequest
         With the rows of its samples.
-    links : int, optional
-        Links per wing; default: those of the request.
     """
-    links = max(request.model.numbers_of_links()) if links is None else links
+    parts = [_cost_of_links(request, links) for links in request.model.numbers_of_links()]
+    return CostEstimate(
+        samples=parts[0].samples,
+        rows=parts[0].rows,
+        parameters=max(part.parameters for part in parts),
+        flights=sum(part.flights for part in parts),
+        flight_s=sum(part.flight_s for part in parts),
+        core_s=sum(part.core_s for part in parts),
+    )
+
+
+def _cost_of_links(request: SamplesRequest, links: int) -> CostEstimate:
+    """Estimate flights and computing time of one identification with a number of links per wing."""
     samples = list(request.inline_samples().values())
     training = [sample for sample in samples if sample.role == "train"]
     parameters = _parameter_count(request, links, training)
@@ -155,7 +165,8 @@ def samples_summary(request: SamplesRequest) -> dict[str, Any]:
 
 
 def _summary(request: IdentifyRequest) -> dict[str, Any]:
-    return {**samples_summary(request), "links_per_wing": request.model.links_per_wing}
+    links = request.model.links_per_wing
+    return {**samples_summary(request), "links_per_wing": None if links == "auto" else links}
 
 
 IDENTIFY = Operation(
@@ -181,6 +192,7 @@ IDENTIFY = Operation(
         "autocorrelation_*",
         "intervals.*",
         "curves_*.csv",
+        "posterior.npz",
     ),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,

@@ -12,18 +12,6 @@ from morphdata.study import StudyRequest, StudyResult
 REPORT_TIME_S = 300.0  # uncertainty and timing of up to eight models
 
 
-def _cost(request: StudyRequest) -> CostEstimate:
-    parts = [identify.cost(request, links) for links in request.model.links_per_wing]
-    return CostEstimate(
-        samples=parts[0].samples,
-        rows=parts[0].rows,
-        parameters=max(part.parameters for part in parts),
-        flights=sum(part.flights for part in parts),
-        flight_s=sum(part.flight_s for part in parts),
-        core_s=sum(part.core_s for part in parts),
-    )
-
-
 def _summary(request: StudyRequest) -> dict[str, Any]:
     return {**identify.samples_summary(request), "compared_links": request.model.links_per_wing}
 
@@ -46,7 +34,7 @@ STUDY = Operation(
     request=StudyRequest,
     result=StudyResult,
     cost_model=CostEstimate,
-    cost=_cost,
+    cost=identify.cost,
     summary=_summary,
     begin="worker.operations.study:begin",
     files=("result.json", "study.*"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -27,6 +27,9 @@ MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 HEADER_BYTES = 16
 MESSAGE_HEAD = struct.Struct("<HB")  # size and kind
 LONGEST_MESSAGE = 10_000
+DATA, SUBSCRIPTION, FLAGS, FORMAT = map(ord, "DABF")
+NUMBER = struct.Struct("<H")  # of a subscription
+OFFSETS = struct.Struct("<3Q")  # of appended data, last in the flags
 SYNC = MESSAGE_HEAD.pack(8, ord("S")) + b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 ATTITUDE = "vehicle_attitude"
 CHANNELS = {  # ours -> where PX4 logs it; the first that there is counts
@@ -77,10 +80,11 @@ def read_ulog(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     content = stream.read()
     if not content.startswith(MAGIC):
         raise FileFault("not_ulog", "this is not a ULog file", "give the .ulg file as PX4 wrote it")
+    topics = _topics(wanted)
     try:
         # pyulog closes what it reads, and prints
         with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(io.BytesIO(_sound(content)), _topics(wanted))
+            log = ULog(io.BytesIO(_excerpt(content, topics)), topics)
         return _read(log, wanted)
     except (FileFault, MemoryError):
         raise
@@ -92,22 +96,49 @@ def read_ulog(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         ) from None
 
 
-def _sound(content: bytes) -> bytes:
-    """The messages of a log without what is damaged, from there to the next mark for going on.
+def _excerpt(content: bytes, topics: Collection[str]) -> bytes:
+    """The messages of a log that count: definitions, and the data of some topics.
 
-    pyulog would look for it byte by byte, and for ever at the end of a file.
+    pyulog takes microseconds for each of the others, and looks for the end of a damage byte by byte, at the
+    end of a file for ever; here reading goes on at the next mark for that.
     """
-    pieces, begin, at = [], 0, HEADER_BYTES
+    numbers: set[int] = set()
+    pieces, at = [content[:HEADER_BYTES]], HEADER_BYTES
+    seams = _seams(content)
     while at + MESSAGE_HEAD.size <= len(content):
         size, kind = MESSAGE_HEAD.unpack_from(content, at)
-        if 0 < size <= LONGEST_MESSAGE and kind:
-            at += MESSAGE_HEAD.size + size
+        end = at + MESSAGE_HEAD.size + size
+        seam = next((seam for seam in seams if at < seam < end), None) if seams else None
+        if seam is not None:  # what was cut off there is no message
+            at = seam
             continue
-        pieces.append(content[begin:at])
-        begin = at = content.find(SYNC, at)
-        if at < 0:
-            return b"".join(pieces)
-    return b"".join([*pieces, content[begin:]])
+        if not (0 < size <= LONGEST_MESSAGE and kind):
+            at = content.find(SYNC, at)
+            if at < 0:
+                break
+            continue
+        body = at + MESSAGE_HEAD.size
+        if kind == DATA:
+            if size > 2 and NUMBER.unpack_from(content, body)[0] in numbers:
+                pieces.append(content[at:end])
+        elif kind == SUBSCRIPTION:
+            if size > 3 and content[body + 3 : end].decode("utf-8", "replace") in topics:
+                numbers.update(NUMBER.unpack_from(content, body + 1))
+                pieces.append(content[at:end])
+        elif kind == FLAGS:
+            pieces.append(content[at : end - OFFSETS.size] + bytes(OFFSETS.size))
+        elif kind == FORMAT:
+            pieces.append(content[at:end])
+        at = end
+    return b"".join(pieces)
+
+
+def _seams(content: bytes) -> list[int]:
+    """Where data were appended to a log, by its first message."""
+    flags = MESSAGE_HEAD.pack(40, FLAGS)
+    if content[HEADER_BYTES : HEADER_BYTES + len(flags)] != flags or len(content) < HEADER_BYTES + 43:
+        return []
+    return [seam for seam in OFFSETS.unpack_from(content, HEADER_BYTES + 19) if seam > 0]
 
 
 def _topics(wanted: Wanted) -> list[str]:

@@ -121,13 +121,14 @@ def _shown_default(default: Any) -> str | bool:
 
 
 def _form(flag: str, field: FieldInfo) -> Form:
-    kind = _kinds(field.annotation)[0]
+    kind, *others = _kinds(field.annotation)
     if get_origin(kind) is Literal:
         choices = get_args(kind)
         remark = f"One of {', '.join(choices)}." if len(choices) > 1 else ""
         return Form(str, choices[0] if len(choices) == 1 else "NAME", str, remark)
     if kind in (bool, int, float, str):
-        return Form(kind, _limits(field) if kind is int else None, kind)
+        words = [word for other in others if get_origin(other) is Literal for word in get_args(other)]
+        return _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
     if get_origin(kind) is list:
         return _list_form(flag, get_args(kind)[0])
     if get_origin(kind) is dict:
@@ -144,6 +145,11 @@ def _form(flag: str, field: FieldInfo) -> Form:
     if members and all(get_origin(member) is list for member in members):
         return Form(list[str], "NAME=LOW:HIGH", lambda texts: _ranges(flag, texts))
     return Form(Path, "FILE", read_json)
+
+
+def _number_or_word(words: Sequence[str]) -> Form:
+    """Read ``3`` as a whole number, and anything else as it is written."""
+    return Form(str, "|".join(["N", *words]), lambda text: int(text) if text.isdecimal() else text)
 
 
 def _list_form(flag: str, item: Any) -> Form:

@@ -13,7 +13,7 @@ import pytest
 from morphcore.errors import InvalidInput
 from morphcore.search.evolution import EvolutionSettings, EvolutionStrategy
 from morphcore.search.hybrid import SCREENING, Hybrid
-from morphcore.search.least_squares import LeastSquares
+from morphcore.search.least_squares import FixedPrior, LeastSquares
 from morphcore.search.methods import METHODS, method
 from morphcore.search.run import UNFINISHED, Search, SearchState
 from morphcore.search.solver import Outcome, Solver
@@ -26,9 +26,7 @@ Make = Callable[[Formula], Solver[Any, Any]]
 
 def hybrid(problem: Formula, good_cost: float = 1e-9) -> Hybrid:
     """A small hybrid."""
-    return Hybrid(
-        problem, LeastSquares(problem, 6), candidates=8, starts=3, spread=0.2, good_cost=good_cost, seed=2
-    )
+    return Hybrid(LeastSquares(problem, 6), candidates=8, starts=3, spread=0.2, good_cost=good_cost, seed=2)
 
 
 MAKERS: dict[str, Make] = {
@@ -123,7 +121,7 @@ def test_the_second_descent_comes_only_where_the_first_leaves_much() -> None:
 def test_a_prior_settles_what_the_residuals_do_not_see() -> None:
     """A coordinate without influence goes to the prior's point; the cost that is reported is without it."""
     problem = Formula(lambda x: x[:, :1] - 0.3, np.full(2, -5.0), np.full(2, 5.0), np.array([2.0, 3.0]))
-    end = searched(problem, LeastSquares(problem, 20, 0.1, np.array([0.3, 1.0])))[-1]
+    end = searched(problem, LeastSquares(problem, 20, FixedPrior(np.array([0.3, 1.0]), np.full(2, 0.01))))[-1]
     np.testing.assert_allclose(end.best, [0.3, 1.0], atol=1e-3)
     assert end.best_cost == pytest.approx((end.best[0] - 0.3) ** 2, abs=1e-12)
 

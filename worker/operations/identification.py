@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 
 from morphcore.export.curves import curve_tables
 from morphcore.export.plots import identification_plots
-from morphcore.identify import Identification, IdentifyResult, identification_from_request
+from morphcore.identify import (
+    Identification,
+    IdentifyResult,
+    identification_from_request,
+)
 from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphdata.identify import IdentifyRequest
 from worker.operations import Document, Step, Stop
 from worker.operations.library_work import SearchWork, shown
 
 Array = NDArray[np.float64]
+
+POSTERIOR_FILE = "posterior.npz"
 
 
 class IdentificationWork(SearchWork):
@@ -47,14 +53,16 @@ class IdentificationWork(SearchWork):
             return next(self.steps(checkpoint, self._stop))
 
 
-def begin(request: Document, threads: int) -> IdentificationWork:
-    """Check the request and prepare the search."""
-    return IdentificationWork(identification_from_request(IdentifyRequest.parse(request), threads))
+def begin(request: Document, threads: int) -> SearchWork:
+    """Check the request and prepare the search; one that chooses the number of links is not divided."""
+    run = identification_from_request(IdentifyRequest.parse(request), threads)
+    return IdentificationWork(run) if isinstance(run, Identification) else SearchWork(run, _files)
 
 
 def _files(result: IdentifyResult, document: Document) -> dict[str, bytes]:
     curves = result.curves()
-    return {**identification_plots(document, curves), **curve_tables(curves)}
+    drawn = {} if result.posterior is None else {POSTERIOR_FILE: result.posterior.to_file()}
+    return {**identification_plots(document, curves), **curve_tables(curves), **drawn}
 
 
 def _packed(values: Array) -> bytes:

@@ -142,6 +142,14 @@ def test_channels_survive_upload_reading_back_and_identification(any_service: Ru
     assert {field: read[field] for field in columns} == columns
 
 
+def test_odd_names_of_channels_harm_nothing(service: RunningService) -> None:
+    """A surface's name as long as one may be, and what is no name of a column."""
+    long = f"tip_z_{'x' * 150}"
+    _, back = uploaded(service, flight(**{"sweep": T, long: ["?"] * 4, "tip_z_<b>": T, "tip_z_ü": ["?"] * 4}))
+    assert "not a finite number" in back["unreadable"][long]
+    assert not [name for name in back if "<" in name or "ü" in name]
+
+
 def test_what_is_declared_about_a_file_counts(any_service: RunningService) -> None:
     """Axes, a numbered quaternion, columns with a scale, a window of time: as the library reads them."""
     half = 0.5**0.5

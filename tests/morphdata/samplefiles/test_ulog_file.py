@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,10 @@ TIMES_US = START_US + 10_000 * np.arange(200)  # 100 Hz, two seconds
 T = 0.01 * np.arange(200)
 EULER = np.stack([0.2 * np.sin(3 * T), 0.06 + 0.1 * T, 0.4 * T], axis=1)
 DRIVE = {"sweep_left_deg": "actuator_outputs.output[0]*0.09-135"}
+
+
+ATTITUDE = "vehicle_attitude"
+ENDLESS = HEADER + definition(ATTITUDE, [f"{ATTITUDE} a"]) + subscription(0, ATTITUDE, 0)
 
 
 def log(**changes: Any) -> bytes:
@@ -107,7 +112,7 @@ def test_a_window_is_cut_out(tmp_path: Path) -> None:
         (HEADER[:12], {}, "not a readable ULog", "again"),
         (HEADER, {}, "no vehicle_attitude", "Hz"),
         (HEADER + message("B", b"\0" * 8 + b"\xff" * 8 + bytes(24)), {}, "not a readable ULog", "again"),
-        (HEADER + definition("a", ["a a"]) + subscription(0, "a", 0), {}, "not a readable ULog", "again"),
+        (ENDLESS, {}, "not a readable ULog", "again"),
         (HEADER + b"\xff" * 4000, {}, "no vehicle_attitude", "Hz"),
     ],
 )  # fmt: skip
@@ -126,6 +131,16 @@ def test_reading_goes_on_behind_a_damage(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.euler, EULER, atol=1e-6)
     found = read(tmp_path, whole[:middle] + b"\xff" * 500 + whole[middle:])
     assert 50 < len(found.time_s) < 150
+
+
+def test_appended_data_follow_a_cut_message(tmp_path: Path) -> None:
+    """The flags say where; the flight is the same."""
+    whole = log()
+    middle = whole.index(b"\x22\x00D", len(whole) // 2)
+    flags = bytes(8) + bytes([1]) + bytes(7) + struct.pack("<3Q", middle + 20, 0, 0)
+    cut = whole[middle : middle + 20]
+    content = HEADER + message("B", flags) + whole[len(HEADER) + 43 : middle] + cut + whole[middle:]
+    np.testing.assert_allclose(read(tmp_path, content).euler, EULER, atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(5))
