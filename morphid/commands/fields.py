@@ -131,10 +131,9 @@ def _form(flag: str, field: FieldInfo) -> Form:
         return _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
     if get_origin(kind) is list:
         return _list_form(flag, get_args(kind)[0])
-    if get_origin(kind) is dict:
-        return Form(Path, "FILE", read_json)
-    names = list(kind.model_fields)
-    members = {member for inner in kind.model_fields.values() for member in _kinds(inner.annotation)}
+    fields = {} if get_origin(kind) is dict else kind.model_fields
+    names = list(fields)
+    members = {member for inner in fields.values() for member in _kinds(inner.annotation)}
     if members == {float}:
         example = ",".join("1" for _ in names)
 

@@ -123,7 +123,7 @@ def started(name: str, change: tuple[float, ...]) -> Trajectory:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("declared", [True, None])
-def test_a_flight_need_not_begin_in_trim(declared: bool | None) -> None:
+def test_a_flight_need_not_begin_in_trim(*, declared: bool | None) -> None:
     """Attitude, rates and speed off the trim are found with the model, declared or not."""
     change = (0.01, -0.008, 0.03, 0.02, -0.01, 0.5, 0.3, -0.2)
     samples = [started(name, change) for name in TRAINING]
