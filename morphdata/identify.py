@@ -270,10 +270,7 @@ class SamplesRequest(Request):
             yield from (fault.under(f"/samples/{number}") for fault in sample.drive_faults(drives))
         yield from absent_channels(
             self.measurement,
-            [
-                (f"/samples/{n}", sample.role, tuple(getattr(sample, "channels", ())))
-                for n, sample in samples.items()
-            ],
+            [(f"/samples/{n}", sample.role, tuple(sample.channels)) for n, sample in samples.items()],
         )
 
 

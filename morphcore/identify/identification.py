@@ -180,10 +180,11 @@ class Identification:
     def cases(self) -> tuple[SampleCase, ...]:
         """All samples with their plans, and with what is unknown about their measurement."""
         if self._cases is None or self._cases[0] is not self.openness:
-            self._cases = (self.openness, self._opened(self.openness))
+            self._cases = (self.openness, self.opened(self.openness))
         return self._cases[1]
 
-    def _opened(self, openness: tuple[Openness, ...]) -> tuple[SampleCase, ...]:
+    def opened(self, openness: tuple[Openness, ...]) -> tuple[SampleCase, ...]:
+        """All samples with what might be unknown about their measurement."""
         whole = tuple(each.start for each in openness)
         if whole not in self._plans:
             self._plans[whole] = sample_cases(

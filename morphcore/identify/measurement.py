@@ -42,7 +42,7 @@ DELAY_SPREAD_S = 0.1
 
 
 @stored
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Openness:
     """What is unknown about the measurement of one sample, and how its residuals are weighted.
 
@@ -72,6 +72,11 @@ class Openness:
     start_value: tuple[float, ...] = (0.0,) * len(START)
     reference: Array = field(default_factory=lambda: np.zeros(0))
     reason: str = ""
+
+    @property
+    def free(self) -> tuple[tuple[str, ...], bool, bool]:
+        """What is free: biases, delay and start."""
+        return self.bias, self.delay, self.start
 
 
 @dataclass(frozen=True)

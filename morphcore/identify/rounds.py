@@ -44,7 +44,7 @@ MIN_BIAS_RAD, MIN_DELAY_S = 3e-4, 2.5e-3
 MAX_BIAS_RAD, MAX_DELAY_S = 0.03, 0.1  # and none larger: then it is the model that is wrong
 SHOWN_RMS_RAD = 3e-6  # residuals below it hide no bias and no delay
 # a start is nearly the same as a bias and a slow motion: it must explain much, and much must be unexplained
-START_GAIN, START_RMS_RAD = 100.0, 3e-4
+START_GAIN, START_RMS_RAD = 30.0, 2e-3
 SETTLED = 0.1  # relative change of a sigma that calls for no further round
 START_PROBE = 1e-4  # of the spread of each part of the start
 # parts of the start that keep a symmetric flight symmetric: theta, q, u, w
@@ -180,43 +180,36 @@ def _changed(before: tuple[Openness, ...], after: tuple[Openness, ...]) -> bool:
 
 
 def _freed(run: Identification, best: Array, found: tuple[Openness, ...]) -> tuple[Openness, ...]:
-    """The same object, or one in which undeclared biases, delays or starts are free that lower J tenfold."""
-    undecided = [_undecided(run, case, each) for case, each in zip(run.cases, found, strict=True)]
+    """The same object, or one in which undeclared biases, delays or starts are free that lower J much."""
+    opened = tuple(_opened(run, case, each) for case, each in zip(run.cases, found, strict=True))
+    started = tuple(
+        replace(each, start=each.start or run.measurement.initial_state is None, reference=best)
+        for each in opened
+    )
     # a rigid wing misses so much that anything would explain it
-    settled = not any(any(each) for each in undecided) or run.model.links_per_wing == 1
-    if settled or run.measurement.loss != "linear":
+    if run.model.links_per_wing == 1 or run.measurement.loss != "linear":
         return found
-    residual, jacobian = run.linearised(best)
-    rms = float(np.sqrt(np.mean(residual**2)))
-    if rms < SHOWN_RMS_RAD:
+    if not _differ(started, found):
         return found
-    inside = np.ones(best.size, dtype=np.bool_)
-    inside[list(run.space.bound_coordinates(best))] = False
-    jacobian = jacobian[:, inside]
-    own = _columns(run, best, undecided, start=False)
-    gain, values = _gain(residual, jacobian, own, run.prior_weight)
-    if gain > FREED_GAIN and _plausible(values, own):
-        return _open(found, undecided, gain, start=False)
-    if rms > START_RMS_RAD:
-        own = _columns(run, best, undecided, start=True)
-        gain, _ = _gain(residual, jacobian, own, run.prior_weight)
+    rms = float(np.sqrt(np.mean(run.linearised(best)[0] ** 2)))
+    if rms > SHOWN_RMS_RAD and _differ(opened, found):
+        gain, values = _gain(run, best, opened)
+        if gain > FREED_GAIN and _plausible(values):
+            return _explained(opened, "biases and delays", gain)
+    if rms > START_RMS_RAD and _differ(started, opened):
+        # from a start far off its trim the descent may have ended anywhere
+        gain = max(_gain(run, point, started)[0] for point in (best, run.space.guess))
         if gain > START_GAIN:
-            return _open(found, undecided, gain, start=True)
+            return _explained(started, "biases, delays and starts off the trim", gain)
     return found
 
 
-@dataclass(frozen=True)
-class _Undecided:
-    bias: tuple[str, ...]
-    delay: bool
-    start: bool
-
-    def __iter__(self):  # type: ignore[no-untyped-def]
-        return iter((bool(self.bias), self.delay, self.start))
+def _differ(some: tuple[Openness, ...], others: tuple[Openness, ...]) -> bool:
+    return any(a.free != b.free for a, b in zip(some, others, strict=True))
 
 
-def _undecided(run: Identification, case: SampleCase, openness: Openness) -> _Undecided:
-    """What of a sample's measurement is neither declared nor free."""
+def _opened(run: Identification, case: SampleCase, openness: Openness) -> Openness:
+    """The same with biases and delay free that are neither declared nor free."""
     measurement = run.measurement
     channels = measurement.channels or {}
     bias = tuple(
@@ -226,92 +219,74 @@ def _undecided(run: Identification, case: SampleCase, openness: Openness) -> _Un
         and measurement.bias is None
         and (name not in channels or channels[name].bias is None)
     )
-    return _Undecided(
-        bias,
-        measurement.delay is None and not openness.delay,
-        measurement.initial_state is None and not openness.start,
-    )
+    delay = openness.delay or measurement.delay is None
+    return replace(openness, bias=(*openness.bias, *bias), delay=delay)
 
 
-def _columns(
-    run: Identification, best: Array, undecided: Sequence[_Undecided], *, start: bool
-) -> list[tuple[str, Array]]:
-    """What each undecided unknown, and each one that is free, adds to the residuals: its kind, (m,)."""
-    batch = run.space.decode(best)
-    sizes = [case.setup.residual_count for case in run.training]
-    total, columns, first = sum(sizes), [], 0
-    chosen = [each for each, case in zip(undecided, run.cases, strict=True) if case.sample.role == "train"]
-    for case, each, size in zip(run.training, chosen, sizes, strict=True):
+def _explained(openness: tuple[Openness, ...], what: str, gain: float) -> tuple[Openness, ...]:
+    reason = f"{what} were predicted to lower the squared errors {gain:.0f} times"
+    return tuple(replace(each, reason=reason) for each in openness)
+
+
+def _columns(run: Identification, point: Array, trial: tuple[Openness, ...]) -> list[tuple[str, Array]]:
+    """What each unknown of a trial adds to the residuals: its kind, and its column (m,)."""
+    batch = run.space.decode(point)
+    cases = [
+        case
+        for case in run.opened(tuple(replace(each, reference=point) for each in trial))
+        if case.sample.role == "train"
+    ]
+    total, first = sum(case.setup.residual_count for case in cases), 0
+    columns = []
+    for case, found in shared_trims(run.model, batch, cases, run.settings.start):
         setup = case.setup
-        openness = replace(
-            setup.openness,
-            bias=(*setup.openness.bias, *each.bias),
-            delay=setup.openness.delay or each.delay,
-        )
-        setup = replace(setup, openness=openness)
-        if start and each.start:
-            setup = with_start(run, case, setup, batch)
         linear, _ = linear_columns(setup)
-        kinds = ["bias"] * int(setup.offset.sum())
-        kinds += ["start"] * (linear.shape[2] - len(kinds))
-        parts = [linear[..., number] for number in range(linear.shape[2])]
-        if openness.delay:
-            opened = replace(case, given=setup)
-            ((_, found),) = shared_trims(run.model, batch, (opened,), run.settings.start)
-            parts.append(reduced_errors(run.model, batch, opened, found).slope[0])
-            kinds.append("delay")
-        for kind, part in zip(kinds, parts, strict=True):
+        # offsets come first; those of other channels than the angles, starts and first angles are not judged
+        kinds = ["bias" if angle else "other" for angle in setup.angle[setup.offset]]
+        kinds += ["other"] * (linear.shape[2] - len(kinds))
+        parts = [(kind, linear[..., n]) for n, kind in enumerate(kinds)]
+        if setup.openness.delay:
+            parts.append(("delay", reduced_errors(run.model, batch, case, found).slope[0]))
+        for kind, part in parts:
             column = np.zeros(total)
             rows = np.where(np.isfinite(part) & np.isfinite(setup.values), part, 0.0) * setup.weight
-            column[first : first + size] = rows[:, setup.fitted].reshape(-1)
+            column[first : first + setup.residual_count] = rows[:, setup.fitted].reshape(-1)
             columns.append((kind, column))
-        first += size
+        first += setup.residual_count
     return columns
 
 
 def _gain(
-    residual: Array, jacobian: Array, columns: Sequence[tuple[str, Array]], prior: float
-) -> tuple[float, Array]:
-    """By what factor J falls with some columns more, to first order; and their values."""
-    d = jacobian.shape[1]
+    run: Identification, point: Array, trial: tuple[Openness, ...]
+) -> tuple[float, list[tuple[float, str]]]:
+    """By what factor J falls with the unknowns of a trial, to first order; their values and kinds."""
+    residual, jacobian = run.linearised(point)
+    inside = np.ones(point.size, dtype=np.bool_)
+    inside[run.space.bound_coordinates(point)] = False
+    jacobian, columns = jacobian[:, inside], _columns(run, point, trial)
     both = np.concatenate([jacobian, np.stack([column for _, column in columns], axis=1)], axis=1)
+    d = jacobian.shape[1]
 
     def left(design: Array) -> tuple[float, Array]:
-        held = np.zeros(design.shape[1])
-        held[:d] = np.sqrt(prior)
-        rows = np.concatenate([design, np.diag(held)[:d]])
-        change = np.linalg.lstsq(rows, -np.concatenate([residual, np.zeros(d)]), rcond=1e-12)[0]
+        held = np.sqrt(run.prior_weight) * np.eye(d, design.shape[1])
+        rows, right = np.concatenate([design, held]), np.concatenate([residual, np.zeros(d)])
+        change = np.linalg.lstsq(rows, -right, rcond=1e-12)[0]
         after = residual + design @ change
         return float(after @ after), change[d:]
 
     before, _ = left(jacobian)
     after, values = left(both)
-    return before / max(after, 1e-300), values
+    return before / max(after, 1e-300), [
+        (abs(float(value)), kind) for value, (kind, _) in zip(values, columns, strict=True)
+    ]
 
 
-def _plausible(values: Array, columns: Sequence[tuple[str, Array]]) -> bool:
+def _plausible(values: Sequence[tuple[float, str]]) -> bool:
     """Whether biases and delays are such as sensors have, and some of them more than nothing."""
     low = {"bias": MIN_BIAS_RAD, "delay": MIN_DELAY_S}
     high = {"bias": MAX_BIAS_RAD, "delay": MAX_DELAY_S}
-    pairs = [(abs(value), kind) for value, (kind, _) in zip(values, columns, strict=True)]
-    return any(size > low[kind] for size, kind in pairs) and all(size < high[kind] for size, kind in pairs)
-
-
-def _open(
-    found: tuple[Openness, ...], undecided: Sequence[_Undecided], gain: float, *, start: bool
-) -> tuple[Openness, ...]:
-    what = "biases, delays and starts off the trim" if start else "biases and delays"
-    reason = f"{what} were predicted to lower the squared errors {gain:.0f} times"
-    return tuple(
-        replace(
-            each,
-            bias=(*each.bias, *open_.bias),
-            delay=each.delay or open_.delay,
-            start=each.start or (start and open_.start),
-            reason=reason,
-        )
-        for each, open_ in zip(found, undecided, strict=True)
-    )
+    judged = [(size, kind) for size, kind in values if kind in low]
+    return any(size > low[kind] for size, kind in judged) and all(size < high[kind] for size, kind in judged)
 
 
 def linearised(run: Identification, point: Array) -> tuple[Array, Array]:

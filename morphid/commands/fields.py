@@ -84,7 +84,7 @@ def _kinds(annotation: Any) -> list[Any]:
     origin = get_origin(annotation)
     if origin is Annotated:
         return _kinds(get_args(annotation)[0])
-    if origin in (None, list, Literal):
+    if origin in (None, list, dict, Literal):
         return [] if annotation is type(None) else [annotation]
     return [kind for part in get_args(annotation) for kind in _kinds(part)]
 
@@ -92,7 +92,9 @@ def _kinds(annotation: Any) -> list[Any]:
 def _field_option(mark: Option, pointer: str, field: FieldInfo) -> FieldOption:
     form = _form(mark.flag, field)
     word = mark.flag.removeprefix("--")
-    declared = f"{mark.flag}/--no-{word}" if field.default is True else mark.flag
+    # a flag that is on, or that is decided from the data, can be switched off
+    both = field.default is True or (form.kind is bool and field.default is None)
+    declared = f"{mark.flag}/--no-{word}" if both else mark.flag
     option = typer.Option(
         declared,
         help=f"{field.description or ''} {form.remark}".replace("`", "").strip(),
@@ -129,8 +131,9 @@ def _form(flag: str, field: FieldInfo) -> Form:
         return _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
     if get_origin(kind) is list:
         return _list_form(flag, get_args(kind)[0])
-    names = list(kind.model_fields)
-    members = {member for inner in kind.model_fields.values() for member in _kinds(inner.annotation)}
+    fields = {} if get_origin(kind) is dict else kind.model_fields
+    names = list(fields)
+    members = {member for inner in fields.values() for member in _kinds(inner.annotation)}
     if members == {float}:
         example = ",".join("1" for _ in names)
 

@@ -122,11 +122,13 @@ def started(name: str, change: tuple[float, ...]) -> Trajectory:
 
 
 @pytest.mark.slow
-def test_a_flight_need_not_begin_in_trim() -> None:
-    """Attitude, rates and speed off the trim are found with the model."""
+@pytest.mark.parametrize("declared", [True, None])
+def test_a_flight_need_not_begin_in_trim(*, declared: bool | None) -> None:
+    """Attitude, rates and speed off the trim are found with the model, declared or not."""
     change = (0.01, -0.008, 0.03, 0.02, -0.01, 0.5, 0.3, -0.2)
     samples = [started(name, change) for name in TRAINING]
-    found = fitted(samples, Measurement(initial_state=True, bias=False, delay=False))
+    bias = None if declared is None else False
+    found = fitted(samples, Measurement(initial_state=declared, bias=bias, delay=bias))
     np.testing.assert_allclose(found.relative, 0.0, atol=0.03)
     start = found.measurement("asymmetric")["initial_state"]
     np.testing.assert_allclose([start[name]["value"] for name in START], change, rtol=0.02)
