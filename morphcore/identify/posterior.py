@@ -284,7 +284,7 @@ def _likeliest(flights: _Flights, rng: np.random.Generator) -> Array:
     """Search points (n, d) to begin from, drawn from the likeliest quarter of what has been flown."""
     density, points = np.concatenate(flights.log_density), np.concatenate(flights.points)
     order = np.argsort(-density)[: max(density.size // 4, 1)]
-    return points[rng.choice(order, size=REFIT_DRAWS)]
+    return np.asarray(points[rng.choice(order, size=REFIT_DRAWS)])
 
 
 def _chains(
