@@ -12,6 +12,7 @@ LIMITS = "Limits"
 MODEL = "Model"
 MEASUREMENT = "Measurement"
 SEARCH = "Search"
+UNCERTAINTY = "Uncertainty"
 OUTPUT = "Execution and output"
 
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from morphdata.base import Document, Result
 from morphdata.faults import Fault
+from morphdata.options import UNCERTAINTY, Option
 
 MAX_SAMPLES = 100_000
 MAX_PROFILES = 40
@@ -17,15 +18,18 @@ DEFAULT_FLIGHTS = 100_000
 DEFAULT_POINTS = 9
 MAX_NAME = 200
 
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+
 
 class PosteriorSettings(Document):
     """Draws of the parameters from their posterior."""
 
-    samples: int = Field(
+    samples: Annotated[int, Option("--posterior", UNCERTAINTY)] = Field(
         default=DEFAULT_SAMPLES,
         ge=100,
         le=MAX_SAMPLES,
-        description="Effective samples of every parameter that are drawn, if the flights allow.",
+        description="Draw from the posterior of the parameters until each of them has so many effective "
+        "samples, if the flights allow.",
     )
     max_flights: int = Field(
         default=DEFAULT_FLIGHTS,
@@ -40,7 +44,7 @@ class PosteriorSettings(Document):
 class UncertaintySettings(Document):
     """What is computed about the uncertainty beside standard errors and intervals."""
 
-    profile: list[Annotated[str, Field(min_length=1, max_length=MAX_NAME)]] = Field(
+    profile: Annotated[list[Name], Option("--profile", UNCERTAINTY)] = Field(
         default=[],
         max_length=MAX_PROFILES,
         description="Parameters, by the names in `uncertainty.interval_95` of a result, whose profile "

@@ -60,7 +60,7 @@ class Likelihood:
         cls, noise: ColouredNoise, jacobian: Array, guess: Array, lower: Array, upper: Array
     ) -> Likelihood:
         """Likelihood out of the noise around a fit."""
-        return cls(jacobian, noise.middle, guess, lower, upper)
+        return cls(jacobian, noise.middle, guess, lower, upper, noise.spread)
 
     @cached_property
     def whitening(self) -> Array:

@@ -36,7 +36,7 @@ REFIT_DRAWS = 256
 DESCENT = 12  # steps towards the most likely point
 STEP_SHARES = np.geomspace(1.0, 1e-3, 16)  # of each, flown as one block of lanes
 WARMING = 30  # transitions of the model's chains before its draws are flown
-TRANSITIONS = 4  # of the model's chains between two flights
+TRANSITIONS = 8  # of the model's chains between two flights
 LEAPS = 64  # of each transition
 ROUND = 1e-8  # variance in search coordinates that is none
 FIRST_STEP = 0.05  # of a leap, in standard deviations of the linear model
@@ -284,7 +284,7 @@ def _likeliest(flights: _Flights, rng: np.random.Generator) -> Array:
     """Search points (n, d) to begin from, drawn from the likeliest quarter of what has been flown."""
     density, points = np.concatenate(flights.log_density), np.concatenate(flights.points)
     order = np.argsort(-density)[: max(density.size // 4, 1)]
-    return points[rng.choice(order, size=REFIT_DRAWS)]
+    return np.asarray(points[rng.choice(order, size=REFIT_DRAWS)])
 
 
 def _chains(

@@ -155,6 +155,8 @@ def _list_form(flag: str, item: Any) -> Form:
     if get_origin(item) is Literal:
         remark = f"Any of {', '.join(get_args(item))}."
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")], remark)
+    if _kinds(item) == [str]:
+        return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")])
     return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
 
 

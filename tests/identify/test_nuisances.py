@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from morphcore.identify.coloured import ColouredNoise, Record
+from morphcore.threads import one_blas_thread
 from tests.identify.test_coloured import NOISE_RAD, TIMES_S, first_order, slopes
 
 Array = NDArray[np.float64]
@@ -64,7 +65,8 @@ def test_intervals_of_parameters_and_nuisances_hold_the_truth(correlation: float
             ),
             PRIOR,
         )
-        half = stdtrit(found.freedom, 0.975) * np.sqrt(np.diag(found.joint_covariance))
+        with one_blas_thread():
+            half = stdtrit(found.freedom, 0.975) * np.sqrt(np.diag(found.joint_covariance))
         hits.append(np.abs(change[:PARAMETERS]) <= half[:PARAMETERS])
         nuisance_hits.append(np.abs(change[PARAMETERS:]) <= half[PARAMETERS:])
     print(correlation, np.mean(hits), np.mean(nuisance_hits))
