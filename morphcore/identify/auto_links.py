@@ -1,9 +1,9 @@
 """Identification that chooses the number of links per wing by the flights to fit.
 
 Models of one, two, three ... links are identified one after the other, and the smallest is taken under which
-the flights are about as likely as under any: by the marginal likelihood that weighs the prior of each of them (`evidence`), which
-charges a model for every parameter that it needs. A link that only fits what no chain can fly does not raise
-it. The search ends with the largest number, or after two numbers in a row without a gain.
+the flights are about as likely as under any: by the marginal likelihood that weighs the prior of each of them
+(`evidence`), which charges a model for every parameter that it needs. A link that only fits what no chain can
+fly hardly raises it. The search ends with the largest number, or after two in a row without a gain.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def test_is_the_likelihood_of_the_residuals() -> None:
 @pytest.mark.parametrize("spread", [0.1, 0.5])
 @pytest.mark.parametrize("noise_rad", [1e-5, 1e-3])
 def test_the_weight_is_the_noise_over_the_spread_of_the_guess(spread: float, noise_rad: float) -> None:
-    """Of white noise and guesses off by a known spread the weights found are (noise / spread)^2 in the median.
+    """Of white noise and guesses off by a known spread the weights are (noise / spread)^2 in the median.
 
     Tolerance: sixteen parameters tell their spread to a factor 1.2, so the weight to 1.4; twice that here.
     """
@@ -130,7 +130,7 @@ def test_denser_rows_change_nothing() -> None:
 
 
 def test_a_parameter_that_explains_nothing_makes_flights_less_likely() -> None:
-    """A model with a column more fits noise better, and its likelihood falls; one that is needed raises it."""
+    """A column more fits noise better, and the likelihood falls; one that is needed raises it."""
     rng = np.random.default_rng(9)
     jacobian = design(4, 10) * 10.0
     needed = jacobian[:, :3] @ np.array([0.5, -0.4, 0.6])

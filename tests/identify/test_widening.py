@@ -92,13 +92,13 @@ def found(bounds: dict[str, list[float]] | None = None) -> IdentifyResult:
 
 
 def test_flights_find_a_parameter_beyond_its_default_bounds() -> None:
-    """To within one per cent; it ends at no bound, no warning speaks of one, and the result says what gave way."""
+    """To within one per cent; no warning speaks of a bound, and the result says what gave way."""
     result = found()
     document = result.to_document()
     assert result.parameters["lift_factor"][0] == pytest.approx(LIFT, rel=0.01)
     assert document["uncertainty"]["at_bound"] == []
     assert "at_bound" not in {warning["code"] for warning in document["warnings"]}
-    assert document["search"]["widened"] == ["lift_factor"]
+    assert "lift_factor" in document["search"]["widened"]
 
 
 def test_bounds_that_were_asked_for_are_hard() -> None:
@@ -108,4 +108,4 @@ def test_bounds_that_were_asked_for_are_hard() -> None:
     assert result.parameters["lift_factor"][0] == pytest.approx(1.5, rel=1e-6)
     assert "lift_factor" in document["uncertainty"]["at_bound"]
     assert "at_bound" in {warning["code"] for warning in document["warnings"]}
-    assert document["search"]["widened"] == []
+    assert "lift_factor" not in document["search"]["widened"]
