@@ -119,7 +119,7 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
 
 
-class WithoutDoor(CPUDispatcher):
+class KernelOnly(CPUDispatcher):
     """A compiled function callable only from compiled functions; a call from Python raises an error."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
@@ -158,7 +158,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     It is cached as part of the entries that call it and has no Python wrapper: wrappers would take a seventh
     of the total compilation time. Tests make their own (tests/kernels.py).
     """
-    return _part(function, WithoutDoor)
+    return _part(function, KernelOnly)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,8 +6,10 @@ from array import array
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import Field
 from pydantic_core import PydanticCustomError
 
+from morphdata.base import AngleSeries, Document
 from morphdata.channels import channel_field, document_name
 from morphdata.faults import Fault, InvalidInput
 from morphdata.refusals import FAULTS
@@ -18,6 +20,8 @@ from morphdata.samplefiles.flight import angle_fault
 from morphdata.samplefiles.frames import (
     HERE,
     QUATERNION,
+    Body,
+    Earth,
     Frames,
     channels_in_here,
     euler_in_ned,
@@ -26,6 +30,14 @@ from morphdata.samplefiles.frames import (
 )
 
 ATTITUDE_FIELDS = ("phi_rad", "theta_rad", "psi_rad")
+QuaternionSeries = AngleSeries | None
+
+
+class Axes(Document):
+    """Axes in which a sample's attitude and channels are given."""
+
+    earth: Earth = Field(default="NED", description="North, east, down; or east, north, up.")
+    body: Body = Field(default="FRD", description="Forward, right, down; or forward, left, up.")
 
 
 def in_axes_of_here(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -108,10 +120,10 @@ def _euler(rows: list[Any], frames: Frames, *, quaternion: bool) -> tuple[Any, A
             raise _refusal(Fault(fault.code, detail, f"/theta_rad/{fault.row}", hint))
         return euler_in_ned(rows, frames)
     for row, components in enumerate(rows):
-        detail = quaternion_fault(components)
-        if detail is not None:
+        said = quaternion_fault(components)
+        if said is not None:
             hint = "The squares of qw, qx, qy and qz add up to 1."
-            raise _refusal(Fault("no_rotation", as_sentence(detail), f"/qw/{row}", hint))
+            raise _refusal(Fault("no_rotation", as_sentence(said), f"/qw/{row}", hint))
     return euler_of_quaternions(rows, frames)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 MODEL_KINDS = ("rigid", "equivalent", "flexible")
+PART = re.compile(r"[a-z0-9_]{1,200}")  # of a surface's or drive's name in a column
 CHAINS = ("rigid", "equivalent")  # models of rigid links
 
 
@@ -188,7 +189,9 @@ def channel_field(field: str) -> tuple[str, float] | None:
 
 
 def _is_of(channel: ChannelFacts, column: str) -> bool:
-    return column == channel.name or bool(channel.per and column.startswith(f"{channel.name}_"))
+    stem = f"{channel.name}_"
+    of_part = column.startswith(stem) and PART.fullmatch(column.removeprefix(stem)) is not None
+    return column == channel.name or bool(channel.per and of_part)
 
 
 def unit_words(unit: str) -> list[str]:

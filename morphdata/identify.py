@@ -21,6 +21,7 @@ from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.renamed import FORMER_NOTE, RENAMED, both_spellings, current_name, under_both_spellings
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
+from morphdata.uncertainty import PosteriorSummary, Profile, UncertaintySettings
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
 from morphdata.verdict import ChannelStatistics, Verdict
 from morphdata.warnings import Warnings
@@ -331,6 +332,7 @@ class IdentifyRequest(SamplesRequest):
 
     model: EquivalentModel = EquivalentModel()
     search: IdentifySearch = IdentifySearch()
+    uncertainty: UncertaintySettings = UncertaintySettings()
     execution: SpreadExecution = SpreadExecution()
 
     def faults(self) -> Iterator[Fault]:
@@ -509,6 +511,12 @@ class Uncertainty(Result):
     correlation: list[list[float]] = Field(description="Of the search coordinates.")
     unidentifiable: list[Any] = Field(
         description="Combinations of search coordinates that the samples cannot see."
+    )
+    posterior: PosteriorSummary | None = Field(
+        default=None, description="Where `uncertainty.posterior` was requested."
+    )
+    profile: dict[str, Profile] = Field(
+        default={}, description="Profile likelihoods of the parameters in `uncertainty.profile`."
     )
 
 

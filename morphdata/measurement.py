@@ -143,6 +143,11 @@ class SampleMeasurement(Result):
     initial_state: dict[str, Estimate] = Field(
         default={}, description="What the start is off its trim, where that was free; SI units and rad."
     )
+    first_angle_rad: dict[str, Estimate] = Field(
+        default={},
+        description="Of each noisy drive, what the angle for which a flight is trimmed is off its first "
+        "smoothed angle.",
+    )
     sigma: dict[str, float] = Field(
         default={}, description="Noise of each channel by which its residuals were divided."
     )

@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError
 
-from morphdata.axes import ATTITUDE_FIELDS, in_axes_of_here
+from morphdata.axes import ATTITUDE_FIELDS, Axes, QuaternionSeries, in_axes_of_here
 from morphdata.base import AngleSeries, ChannelSeries, Document, Identifier, SampleName, TimeSeries
 from morphdata.channels import channel_field, document_name, is_channel
 from morphdata.drives import (
@@ -36,13 +36,11 @@ from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.declared import NOTHING, Declared
 from morphdata.samplefiles.fault import as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
-from morphdata.samplefiles.frames import Body, Earth
 from morphdata.samplefiles.reading import read_flight
 from morphdata.samplefiles.titles import DRIVE
 from morphdata.samplefiles.units import DEGREE
 
 Role = Literal["train", "held_out"]
-QuaternionSeries = AngleSeries | None
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
 
 EXAMPLE_SAMPLE: dict[str, Any] = {
@@ -78,13 +76,6 @@ def drive_key(field: str) -> str | None:
     """Return the drive, or the word of both sides, of a column inline; None of all other columns."""
     key, unit = field[:-4], field[-4:]
     return key if unit in UNITS and channel_field(field) is None else None
-
-
-class Axes(Document):
-    """Axes in which a sample's attitude and channels are given."""
-
-    earth: Earth = Field(default="NED", description="North, east, down; or east, north, up.")
-    body: Body = Field(default="FRD", description="Forward, right, down; or forward, left, up.")
 
 
 class TrajectoryColumns(Document):

@@ -58,21 +58,21 @@ def model_table(result: Document) -> Table:
     bounds = {
         current_name(name): each for name, each in (uncertainty.get("cramer_rao_percent") or {}).items()
     }
-    captions = ["CR: Cramer-Rao bound in % of the value, for white residuals"] * bool(bounds)
+    captions = ["CR: Cramer-Rao bound, for white residuals"] * bool(bounds)
     captions += ["grey: the samples do not determine it"] * bool(unseen)
     table = new_table(
         *("parameter", "value", "CR %", "95 % interval"), title=title, caption="; ".join(captions) or None
     )
-    table.add_column("")
     for name, value in named_parameters(model):
         known = name in intervals
         notes = ["unseen"] * (name in unseen) + ["bound"] * (name in bound)
+        # notes in a column of their own would not fit into 80 characters
+        words = [shown_interval(intervals[name]), *notes] if known else ["fixed"] * bool(intervals)
         table.add_row(
             name,
             short(value),
             percent(bounds.get(name)),
-            shown_interval(intervals[name]) if known else "",
-            " ".join(notes if known or not intervals else ["fixed"]),
+            " ".join(words or notes),
             style="dim" if name in unseen else None,
         )
     return table
@@ -82,7 +82,7 @@ def percent(bound: float | None) -> str:
     """Give a Cramer-Rao bound; one beyond the value itself says no more than that."""
     if bound is None:
         return ""
-    return "> 1000" if bound > 1e3 else f"{bound:.2g}" if bound < 1e2 else f"{bound:.0f}"
+    return ">1e3" if bound > 1e3 else f"{bound:.2g}" if bound < 1e2 else f"{bound:.0f}"
 
 
 def shown_interval(interval: Sequence[float | None]) -> str:

@@ -24,6 +24,7 @@ class Request:
     def __init__(self, operation: str) -> None:
         self.operation = operation
         self.document: Document = {}
+        self.said: dict[str, Any] = {}  # about sample files, see `morphid.commands.sample_files`
         self._samples: list[tuple[Path, Role]] = []
         self._given_by: dict[str, str] = {}
 

@@ -17,6 +17,7 @@ import typer
 from morphdata.drives import Drive
 from morphdata.faults import InvalidInput, MorphError
 from morphdata.operations import operation_named
+from morphdata.samplefiles.declared import NOTHING, Declared, declared
 from morphdata.samples import Role, load_sample
 from morphid.connections import at_service_of_environment
 from morphid.exits import CommandError, Exit
@@ -72,7 +73,8 @@ def run_here(request: Request, bar: Meter) -> Answer:
     from worker import numerics
 
     drives = aircraft_drives(request)
-    body = request.body(lambda path, role: sample_document(path, role, drives))
+    said = declared(**request.said)
+    body = request.body(lambda path, role: sample_document(path, role, drives, said))
     require_valid(request.operation, body)  # before the library is loaded, which takes seconds
     bar.note("loading the library")
     threads = numerics.usable_cores()
@@ -124,7 +126,7 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
     def uploaded(path: Path, role: Role) -> Document:
         require_file(path)
         try:
-            flight = service.upload(path)
+            flight = service.upload(path, request.said)
         except CommandError as error:
             error.given_by = str(path)
             raise
@@ -181,15 +183,18 @@ def wrote(path: Path) -> None:
     stderr().print(f"wrote {path}", markup=False, soft_wrap=True)
 
 
-def sample_document(path: Path, role: Role, drives: Mapping[str, Drive] | None = None) -> Document:
-    """Read a sample file and return its inline form in a request.
+def sample_document(
+    path: Path, role: Role, drives: Mapping[str, Drive] | None = None, said: Declared = NOTHING
+) -> Document:
+    """Read a sample file and give it as it stands inline in a request.
 
     Parameters
     ----------
-    drives : of the aircraft, if it is valid.
+    drives : of the aircraft, where it is one.
+    said : what the user declares about sample files.
     """
     require_file(path)
     try:
-        return load_sample(path, role, drives).model_dump(exclude_defaults=True) | {"role": role}
+        return load_sample(path, role, drives, said).model_dump(exclude_defaults=True) | {"role": role}
     except InvalidInput as error:
         raise CommandError(error.message, code=Exit.INVALID_INPUT, hint=error.hint) from None

@@ -232,8 +232,8 @@ def statistics_table(result: Document) -> Table | None:
     if not rows:
         return None
     table = new_table(
-        *("sample", "angle", "Theil U", "bias", "variance", "covariance", "lag 1", "white", "drives"),
-        title="Residuals: Theil's U and its parts in %, autocorrelation, correlation with the drives",
+        *("sample", "angle", "U", "bias", "var", "cov", "lag 1", "white", "drives"),
+        title="Residuals: Theil's U, its parts in %, correlations with the row before and the drives",
         left=2,
     )
     last = None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -49,10 +50,19 @@ class Service:
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
         return self._document("POST", f"/{operation}", json=body, headers=headers)
 
-    def upload(self, path: Path) -> Document:
-        """Upload a sample file and return its representation, with an ``id``."""
+    def upload(self, path: Path, said: Mapping[str, Any] | None = None) -> Document:
+        """Upload a sample file and give its representation, with an ``id``.
+
+        Parameters
+        ----------
+        said : what is declared about the file: texts, or what goes into the form as JSON.
+        """
+        parts = {
+            name: value if isinstance(value, str) else json.dumps(value)
+            for name, value in (said or {}).items()
+        }
         with path.open("rb") as stream:
-            return self._document("POST", "/trajectories", files={"file": (path.name, stream)})
+            return self._document("POST", "/trajectories", files={"file": (path.name, stream)}, data=parts)
 
     def jobs(self, *, status: str | None = None, limit: int = 20) -> Sequence[Document]:
         """List jobs, the newest first."""

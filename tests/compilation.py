@@ -35,7 +35,7 @@ def needs_kernels(paths: Iterable[Path]) -> bool:
 
 
 def fingerprint() -> str:
-    """Name the compiled code: the compiler, its cache, and the sources as the compiler tells them apart."""
+    """Identify the compiled code: the compiler, its cache, and the sources as distinguished by it."""
     sources = sorted(path for path in (ROOT / "morphcore").rglob("*.py") if "kernels" in path.parts)
     parts = [version("numba"), platform.python_version(), os.environ.get("NUMBA_CACHE_DIR", "")]
     for path in sources:
@@ -61,7 +61,7 @@ def compile_before(
     session : pytest.Session
         After collection.
     say : callable
-        Shown to whoever waits.
+        Shown to waiting processes.
     compiling : callable
         What compiles.
     """

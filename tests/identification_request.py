@@ -33,7 +33,7 @@ def sample(name: str, role: str = "train") -> dict[str, Any]:
 def identification(
     *names: str, links: int = 3, search: dict[str, Any] | None = None, held_out: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """Ask for an identification from the named example flights."""
+    """Make a request for an identification from the named example flights."""
     return {
         "aircraft": json.loads((EXAMPLES / "aircraft.json").read_text()),
         "flight": json.loads((EXAMPLES / "flight.json").read_text()),

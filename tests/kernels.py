@@ -1,4 +1,4 @@
-"""Doors for Python to kernels that only kernels call."""
+"""Python wrappers of kernels that only kernels call."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numba
 from numba.core.dispatcher import Dispatcher
 
 
-def door(kernel: Callable[..., Any]) -> Callable[..., Any]:
+def from_python(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """A kernel as Python can call it."""
 
     def enter(*arguments: Any) -> Any:
@@ -19,11 +19,11 @@ def door(kernel: Callable[..., Any]) -> Callable[..., Any]:
     return numba.njit(enter)
 
 
-def doors(module: ModuleType) -> SimpleNamespace:
-    """A module of kernels with a door to each of them."""
+def module_from_python(module: ModuleType) -> SimpleNamespace:
+    """A module of kernels with a Python wrapper of each."""
     return SimpleNamespace(
         **{
-            name: door(value) if isinstance(value, Dispatcher) else value
+            name: from_python(value) if isinstance(value, Dispatcher) else value
             for name, value in vars(module).items()
             if not name.startswith("__")
         }

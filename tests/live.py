@@ -71,7 +71,7 @@ class LiveService:
         return self.process.returncode
 
     def database(self) -> Database:
-        """Open its job store beside it."""
+        """Open its job store."""
         return Database(sqlite_url(self.data_dir / "morphid.sqlite3"))
 
     def logs(self) -> str:

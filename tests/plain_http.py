@@ -1,4 +1,4 @@
-"""What clients of unencrypted services share: httpx reads all certificates anew for each client, in 30 ms."""
+"""Shared by clients of unencrypted services: httpx reads all certificates for each client, in 30 ms."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from tests.identify.flights import example, reference_aircraft, reference_flight
 
 
 def test_counts_the_flights_of_every_search() -> None:
-    """Each method's runs are counted in sets through all samples, cut off where told, and none is flattered.
+    """Each method's runs are counted in sets through all samples, cut off at the limit, and none is favoured.
 
     The target lies above the best of all; a search that is cut off at its first generation has not arrived.
     """

@@ -34,7 +34,7 @@ def test_importing_loads_no_package_that_one_call_needs() -> None:
 
 
 def test_importing_the_searches_loads_none_of_their_packages() -> None:
-    """Whoever registers a method of his own, or reads a state, needs neither swarms nor strategies."""
+    """Registering a custom method, or reading a state, needs neither swarms nor strategies."""
     modules = modules_after("import morphcore.search.methods, morphcore.search.run, morphcore.search.hybrid")
     assert modules.isdisjoint(LATE)
 

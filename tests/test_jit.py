@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from morphcore.jit import WithoutDoor, entry_kernel, inlined, is_kept, kernel
-from tests.kernels import door
+from morphcore.jit import KernelOnly, entry_kernel, inlined, is_kept, kernel
+from tests.kernels import from_python
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -31,15 +31,15 @@ def _four_times(values):
 def test_kernels_without_doors_refuse_python_and_serve_kernels() -> None:
     """Called from Python they say so, before and after they were compiled, instead of ending the process."""
     values = np.ones(3)
-    if isinstance(_doubled, WithoutDoor):  # not with compilation switched off
+    if isinstance(_doubled, KernelOnly):  # not with compilation switched off
         with pytest.raises(TypeError, match="_doubled is called by kernels only"):
             _doubled(values)
     _four_times(values)
     np.testing.assert_array_equal(values, 4.0)
-    if isinstance(_doubled, WithoutDoor):
+    if isinstance(_doubled, KernelOnly):
         with pytest.raises(TypeError, match="kernels only"):
             _doubled(values)
-    door(_doubled)(values)
+    from_python(_doubled)(values)
     np.testing.assert_array_equal(values, 8.0)
 
 
@@ -104,7 +104,7 @@ def test_processes_that_compile_at_once_keep_all_their_code(tmp_path: Path) -> N
 
 
 def test_code_is_kept_only_while_all_kernels_are_what_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With another kernel in its code an entry is compiled anew, though its own file is what it was."""
+    """If a kernel in its code changes, an entry is compiled again although its own file is unchanged."""
     if is_kept(_four_times) is None:
         pytest.skip("nothing is compiled here")
     _four_times(np.ones(3))
@@ -115,7 +115,7 @@ def test_code_is_kept_only_while_all_kernels_are_what_they_were(monkeypatch: pyt
 
 
 def test_kernels_that_cannot_be_kept_are_compiled_anew(tmp_path: Path) -> None:
-    """A library that nobody can write, used without a home folder, works and says once what would help."""
+    """A read-only library used without a home folder works and says once what would help."""
     (tmp_path / "__pycache__").touch()  # a file: not even root makes a folder of it
     (tmp_path / "twice.py").write_text(
         "from morphcore.jit import entry_kernel\n"

@@ -38,7 +38,7 @@ def test_work_inside_of_work_is_done_by_its_own_thread() -> None:
 
 @pytest.mark.usefixtures("two_threads")
 def test_threads_ask_what_surrounds_their_caller() -> None:
-    """A stop that surrounds the caller reaches the pool's threads as one question, and is asked in turn."""
+    """A stop that surrounds the caller is shared by the pool's threads, which call it one at a time."""
     asking, requested = threading.Lock(), []
 
     def surrounding() -> bool:

@@ -14,13 +14,11 @@ from morphcore.validity import (
     AirMotion,
     air_motion,
     air_warnings,
-    degrees_warning,
     error_warning,
     steep_warning,
 )
 from morphdata.lattice import Lattice
 from tests.geometry.rehinged import rehinged
-from tests.identify.flights import example
 from tests.models.chains import example_aircraft, example_flight
 from tests.simulate.flights import fly
 
@@ -84,20 +82,10 @@ def test_a_hinge_of_incidence_counts() -> None:
 
 
 def test_steep_pitch() -> None:
-    """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be told apart."""
+    """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be distinguished."""
     assert steep_warning("x", "", np.array([0.0, 1.4])) == []
     assert "nearly" in steep_warning("x", "", np.array([0.0, -1.55]))[0].message
     assert "degrees" in steep_warning("x", "", np.array([0.0, 4.0]))[0].hint
-
-
-def test_degrees_are_recognised_by_the_rigid_flight() -> None:
-    """An example flight in degrees is; in radians, or any other large flight, it is not."""
-    sample = example("rate_0.8")
-    rigid = 0.85 * sample.euler + 0.01 * np.sin(sample.time_s)[:, None]
-    assert degrees_warning("x", "", sample.euler, rigid) == []
-    assert codes(degrees_warning("x", "", np.degrees(sample.euler), rigid)) == ["looks_like_degrees"]
-    assert degrees_warning("x", "", 5.0 * sample.euler, rigid) == []
-    assert degrees_warning("x", "", np.degrees(sample.euler), np.full_like(rigid, np.nan)) == []
 
 
 @pytest.mark.parametrize(("share", "warned"), [(0.049, False), (0.051, True)])

@@ -16,7 +16,7 @@ def until(
     *,
     seen: Callable[[], object] = str,
 ) -> T:
-    """Ask again and again until the answer is true, and give it; fails with what is ``seen`` instead."""
+    """Poll until the result is true and return it; fail with what is ``seen`` instead."""
     deadline = time.monotonic() + within_s
     while not (answer := wanted()):
         assert time.monotonic() < deadline, f"not within {within_s:g} s: {seen()}"

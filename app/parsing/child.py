@@ -1,4 +1,4 @@
-"""The parser process: ``python -m app.parsing.child KIND MEMORY CPU WALL ROWS``, a file on its stdin.
+"""The parser process: ``python -m app.parsing.child KIND MEMORY CPU WALL ROWS SAID``, a file on its stdin.
 
 It reads one file, writes one frame (`app.parsing.frame`) and exits. Its parent is `app.parsing.pool`.
 """
@@ -6,6 +6,7 @@ It reads one file, writes one frame (`app.parsing.frame`) and exits. Its parent 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import sys
 from typing import Any, BinaryIO
@@ -15,13 +16,16 @@ from app.parsing.confinement import Limits, confine, confine_time
 from app.parsing.frame import BadFrame, pack
 from app.parsing.json_text import parse_json
 from morphdata.samplefiles.columns import MAX_DRIVES, Wanted
+from morphdata.samplefiles.declared import declared
 from morphdata.samplefiles.fault import FileFault
 from morphdata.samplefiles.reading import read_columns
 
-BODY = (
-    "body"  # the JSON body of a request; other kinds are those of files, from `morphdata.samplefiles.reading`
-)
-LOADED_BEFORE = {"parquet": ("pyarrow.parquet", "pyarrow.compute"), "matlab": ("scipy.io", "scipy.io.matlab")}
+BODY = "body"  # the JSON body of a request; any other kind is a file's, from `morphdata.samplefiles.reading`
+LOADED_BEFORE = {
+    "parquet": ("pyarrow.parquet", "pyarrow.compute"),
+    "matlab": ("scipy.io", "scipy.io.matlab", "h5py"),
+    "ulog": ("numpy", "pyulog"),
+}
 
 
 def answer(kind: str, stream: BinaryIO, wanted: Wanted) -> dict[str, Any]:
@@ -51,7 +55,7 @@ def _words(fault: FileFault) -> list[Any]:
 
 def main(arguments: list[str]) -> None:
     """Read standard input under limits and write a frame."""
-    kind, *words, rows = arguments
+    kind, *words, rows, said = arguments
     limits = Limits(*map(int, words))
     confine_time(limits)
     for module in LOADED_BEFORE.get(kind, ()):
@@ -61,7 +65,8 @@ def main(arguments: list[str]) -> None:
             break  # the reader's message says what to install
     confine(limits)
     try:
-        frame = pack(answer(kind, sys.stdin.buffer, Wanted(max_rows=int(rows))))
+        wanted = Wanted(max_rows=int(rows), declared=declared(**json.loads(said)))
+        frame = pack(answer(kind, sys.stdin.buffer, wanted))
     except BadFrame:
         frame = pack({"failed": "TooMuchText"})
     except (MemoryError, RecursionError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import os
 import select
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import astuple
 from pathlib import Path
@@ -31,8 +33,8 @@ from morphdata.samplefiles.flight import MAX_ROWS
 ROOT = Path(__file__).resolve().parent.parent.parent
 MAX_ANSWER_BYTES = 48 * 2**20  # three million numbers and the text around them
 PIECE = 2**18
-QUEUE_S = 30.0  # s; a client that has to wait longer should retry later
-FORMAT_FAULTS = frozenset({"unknown_format", "needs_pyarrow", "matlab_v73", "matlab_object"})
+QUEUE_S = 30.0  # a client that waits longer should come again later
+FORMAT_FAULTS = frozenset({"unknown_format", "needs_pyarrow", "needs_h5py", "needs_pyulog", "matlab_object"})
 
 logger = logging.getLogger(__name__)
 
@@ -55,14 +57,16 @@ class ParserPool:
     async def json_document(self, owner: str, file: BinaryIO) -> Any:
         """Parse the JSON text in a file of this owner, as `parse_json` would."""
         try:
-            answer = await self._read(owner, BODY, file)
+            answer = await self._read(owner, BODY, file, {})
         except _Unanswered as why:
             raise MalformedBody(f"The body cannot be read: {why}.", hint="Send less text.") from None
         if "malformed" in answer:
             raise MalformedBody(*answer["malformed"])
         return answer["document"]
 
-    async def flight(self, owner: str, kind: str, file: BinaryIO, pointer: str) -> FlightColumns:
+    async def flight(
+        self, owner: str, kind: str, file: BinaryIO, pointer: str, said: Mapping[str, Any] | None = None
+    ) -> FlightColumns:
         """Read the columns of a flight, its channels and what could be drives, SI units, by standard names.
 
         Parameters
@@ -72,10 +76,12 @@ class ParserPool:
         file : binary file
             With a descriptor.
         pointer : str
-            Prefix of the pointers of faults: ``{pointer}/{row}/{column}``.
+            Where faults point to: ``{pointer}/{row}/{column}``.
+        said : mapping of str to object
+            What is declared about the file: arguments of `morphdata.samplefiles.declared.declared`, checked.
         """
         try:
-            answer = await self._read(owner, kind, file)
+            answer = await self._read(owner, kind, file, said or {})
         except _Unanswered as why:
             hint = "Send a plain file of time, drives and attitude only."
             raise InvalidRequest.of(
@@ -91,14 +97,14 @@ class ParserPool:
             channels=answer["channels"],
         )
 
-    async def _read(self, owner: str, kind: str, file: BinaryIO) -> dict[str, Any]:
+    async def _read(self, owner: str, kind: str, file: BinaryIO, said: Mapping[str, Any]) -> dict[str, Any]:
         try:
             async with asyncio.timeout(self._queue_s):
                 await self._turns.take(owner)
         except TimeoutError:
             raise ServiceBusy("Too many files are being read at the moment.") from None
         try:
-            answer: dict[str, Any] = await run_in_threadpool(_answer_of, kind, file, self._limits)
+            answer: dict[str, Any] = await run_in_threadpool(_answer_of, kind, file, self._limits, said)
         finally:
             self._turns.give_back(owner)
         return answer
@@ -115,13 +121,13 @@ def refusal(fault: FileFault, pointer: str) -> InvalidRequest | UnsupportedMedia
     return InvalidRequest.of([Fault(fault.code, detail, f"{pointer}{place}", hint)])
 
 
-def _answer_of(kind: str, file: BinaryIO, limits: Limits) -> dict[str, Any]:
-    """Run one process on `file`, which is read from its beginning whatever its position."""
+def _answer_of(kind: str, file: BinaryIO, limits: Limits, said: Mapping[str, Any]) -> dict[str, Any]:
+    """Run one process on `file` (any position: it is read from its beginning)."""
     file.flush()
     file.seek(0)
     os.lseek(file.fileno(), 0, os.SEEK_SET)
-    limit_words = map(str, astuple(limits))
-    command = [sys.executable, "-s", "-P", "-m", "app.parsing.child", kind, *limit_words, str(MAX_ROWS)]
+    words = [*map(str, astuple(limits)), str(MAX_ROWS), json.dumps(said)]
+    command = [sys.executable, "-s", "-P", "-m", "app.parsing.child", kind, *words]
     started = time.monotonic()
     with subprocess.Popen(
         command,

@@ -36,7 +36,8 @@ from morphdata.refusals import escaped
 
 router = APIRouter(tags=["trajectories"], generate_unique_id_function=attrgetter("name"))
 
-MAX_NAME_BYTES = 1024
+MAX_PART_BYTES = 8192  # of a form, but for the file
+SAID = ("earth", "body", "quaternion", "columns", "between")  # what a form may declare about its file
 FORM_SCHEMA: dict[str, Any] = {
     "title": "TrajectoryFile",
     "type": "object",
@@ -45,14 +46,43 @@ FORM_SCHEMA: dict[str, Any] = {
         "file": {
             "type": "string",
             "format": "binary",
-            "description": "CSV, JSON, Parquet or MATLAB (`.mat`, saved with -v7), recognised by the ending "
-            "of its name: t, phi, theta, psi, and a column for each drive that moves, by its name: "
-            "sweep_left, sweep_right, fold_left, ...; or with units: `theta_deg`.",
+            "description": "CSV, JSON, Parquet, MATLAB (`.mat`) or ULog (`.ulg`), recognised by the ending "
+            "of its name: t, phi, theta, psi (or a quaternion qw, qx, qy, qz), and a column for each drive "
+            "that moves, by its name: sweep_left, sweep_right, fold_left, ...; or with units: `theta_deg`. "
+            "Columns of channels (p, q_deg_s, nz, tip_right_z_mm, ...) are kept and may have gaps.",
         },
         "name": {
             "type": "string",
             "description": "Name of the sample; that of the file when left out.",
             "examples": ["rate_0.5"],
+        },
+        "earth": {
+            "type": "string",
+            "enum": ["NED", "ENU"],
+            "default": "NED",
+            "description": "Axes of the earth that the file means: north, east, down, or east, north, up.",
+        },
+        "body": {
+            "type": "string",
+            "enum": ["FRD", "FLU"],
+            "default": "FRD",
+            "description": "Axes of the body: forward, right, down, or forward, left, up.",
+        },
+        "quaternion": {
+            "type": "string",
+            "enum": ["wxyz", "xyzw"],
+            "description": "Order of a quaternion in columns that are numbered, q0 to q3.",
+        },
+        "columns": {
+            "type": "string",
+            "description": "JSON object of the file's columns by the names they shall have, with scale and "
+            "offset; fields of a ULog file are `topic.field`.",
+            "examples": ['{"sweep_left_deg": "actuator_outputs.output[0]*0.09-135"}'],
+        },
+        "between": {
+            "type": "string",
+            "description": "JSON array of the first and last time of the rows that are used, s.",
+            "examples": ["[120, 180]"],
         },
     },
 }
@@ -104,9 +134,9 @@ async def upload_trajectory(
 
 async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUpload:
     try:
-        form = await request.form(max_files=1, max_fields=4, max_part_size=MAX_NAME_BYTES)
+        form = await request.form(max_files=1, max_fields=8, max_part_size=MAX_PART_BYTES)
     except HTTPException as error:
-        hint = "One part `file` with the flight and optionally one part `name`."
+        hint = "One part `file` with the flight and optionally parts `name`, " + ", ".join(SAID) + "."
         raise MalformedBody(f"The form cannot be read: {error.detail}", hint=hint) from None
     try:
         file, name = form.get("file"), form.get("name")
@@ -114,15 +144,17 @@ async def _from_form(request: Request, app: Service, owner: str) -> TrajectoryUp
             raise InvalidRequest(
                 "The form has no file.", "/file", "Send it as the part `file`: curl -F file=@flight.csv"
             )
-        unknown = set(form) - {"file", "name"}
+        unknown = set(form) - {"file", "name", *SAID}
         if unknown:
             raise InvalidRequest(
                 "The form has unknown parts.",
                 f"/{escaped(min(unknown)[:60])}",
-                "Only `file` and `name` are read.",
+                f"Only file, name, {', '.join(SAID)} are read.",
             )
         filename = file.filename or ""
-        columns = await app.parsers.flight(owner, service.file_kind(filename), file.file, "/file")
+        said = service.declared_about({part: str(form[part]) for part in SAID if form.get(part)})
+        kind = service.file_kind(filename)
+        columns = await app.parsers.flight(owner, kind, file.file, "/file", said)
         return service.upload_of(columns, filename, name if isinstance(name, str) else None)
     finally:
         await form.close()

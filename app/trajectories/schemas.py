@@ -22,7 +22,7 @@ UNREADABLE: Any = Field(
     description="Columns of the file that could be drives, or are channels, and could not be read, and why: "
     "a request whose aircraft has such a drive is refused.",
 )
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,45}$")]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,219}$")]  # of a drive or a channel
 Reason = Annotated[str, Field(max_length=500)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -9,9 +10,10 @@ from app.audit.records import Action
 from app.audit.repository import note
 from app.database import Session
 from app.documents import packed
-from app.errors import InvalidRequest
+from app.errors import InvalidRequest, MalformedBody
 from app.http.context import Caller
 from app.keys.quota import charge
+from app.parsing.json_text import parse_json, token
 from app.parsing.pool import refusal
 from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
@@ -19,10 +21,16 @@ from morphdata.channels import document_name
 from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.columns import MAX_DRIVES, FlightColumns
+from morphdata.samplefiles.declared import declared
 from morphdata.samplefiles.fault import FileFault, as_sentence, said_of
 from morphdata.samplefiles.flight import INLINE, flight_faults
 from morphdata.samplefiles.reading import kind_of
 from morphdata.samples import sample_name
+
+JSON_PARTS: tuple[tuple[str, type, tuple[str, str]], ...] = (  # of a form, and what they hold
+    ("columns", dict, ("object", 'an object of titles: {"sweep_left_deg": "servo_1*0.09-45"}')),
+    ("between", list, ("array", "two times in s: [120, 180]")),
+)
 
 
 def file_kind(filename: str) -> str:
@@ -31,6 +39,31 @@ def file_kind(filename: str) -> str:
         return kind_of(PurePosixPath(filename).suffix)
     except FileFault as fault:
         raise refusal(fault, "/file") from None
+
+
+def declared_about(parts: Mapping[str, str]) -> dict[str, Any]:
+    """Check what a form declares about its file: arguments of `declared`, or raise `InvalidRequest`."""
+    said: dict[str, Any] = dict(parts)
+    for part, kind, hint in JSON_PARTS:
+        if part in said:
+            try:
+                said[part] = parse_json(said[part].encode())
+            except (MalformedBody, UnicodeEncodeError):
+                said[part] = None
+            if not isinstance(said[part], kind):
+                raise InvalidRequest(f"{part} is no JSON {hint[0]}.", f"/{part}", f"Give {hint[1]}.")
+    for name, title in said.get("columns", {}).items():
+        if not isinstance(title, str):
+            raise InvalidRequest(
+                "A column is declared by its title.", f"/columns/{token(name)}", "Give text."
+            )
+    try:
+        declared(**said)
+    except InvalidInput as error:
+        raise InvalidRequest.of(
+            [Fault(f.code, as_sentence(f.detail), f.pointer, as_sentence(f.hint)) for f in error.faults]
+        ) from None
+    return said
 
 
 def upload_of(flight: FlightColumns, filename: str, name: str | None) -> TrajectoryUpload:

@@ -28,7 +28,7 @@ from morphcore.identify.statistics import autocorrelation, white_bound
 from morphdata.renamed import current_name
 
 ROW_IN = 0.24  # height of a parameter's row
-HEAD_IN, FOOT_IN = 0.75, 0.6
+HEAD_IN, FOOT_IN = 0.42, 0.6
 WIDEST, NARROWEST = 30.0, 1.2  # factors at the ends of the axis, at most and at least
 SHOWN_LAGS = 4.0  # a part of the rows: a fourth
 MAX_LAGS = 100
@@ -75,7 +75,7 @@ def interval_figure(uncertainty: Document) -> Figure:
     figure = Figure(figsize=(8.2, HEAD_IN + FOOT_IN + ROW_IN * max(len(names), 1)))
     inches = float(figure.get_figheight())
     axes = figure.add_axes(
-        (0.36, FOOT_IN / inches, 0.45, (inches - HEAD_IN - FOOT_IN) / inches), label="intervals"
+        (0.34, FOOT_IN / inches, 0.42, (inches - HEAD_IN - FOOT_IN) / inches), label="intervals"
     )
     reach = _reach([end for bar, name in zip(bars, names, strict=True) if name not in unseen for end in bar])
     axes.set_xscale("log")

@@ -8,6 +8,7 @@ from typing import Literal
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.auto_links import AutoIdentification
+from morphcore.identify.bands import Band, predict_bands
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import SearchSettings, search_settings
@@ -19,9 +20,11 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 __all__ = [
     "AutoIdentification",
+    "Band",
     "Identification",
     "IdentifyResult",
     "Interrupted",
@@ -29,6 +32,7 @@ __all__ = [
     "Step",
     "identification_from_request",
     "identify",
+    "predict_bands",
 ]
 
 
@@ -42,6 +46,7 @@ def identify(
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
     measurement: Measurement | None = None,
+    uncertainty: UncertaintySettings | None = None,
 ) -> IdentifyResult:
     """Identify an equivalent model from sample flights, from start to end.
 
@@ -65,6 +70,8 @@ def identify(
     measurement : Measurement, optional
         How the samples were measured: channels, noise, biases, delays. What is left out is decided from the
         data.
+    uncertainty : UncertaintySettings, optional
+        Posterior draws and profile likelihoods to compute beside standard errors and intervals.
 
     Returns
     -------
@@ -99,6 +106,7 @@ def identify(
         model or EquivalentModel(links_per_wing=links_per_wing),
         search_settings(search or IdentifySearch(seed=seed)),
         measurement=measurement,
+        uncertainty=uncertainty,
     )
     checkpoint = b""
     for step in run.steps():
@@ -114,10 +122,11 @@ def _identification(
     search: SearchSettings,
     *,
     measurement: Measurement | None,
+    uncertainty: UncertaintySettings | None,
 ) -> Identification | AutoIdentification:
     """An identification with one number of links, or one that chooses it."""
     kind = AutoIdentification if model.links_per_wing == "auto" else Identification
-    return kind(aircraft, flight, samples, model, search, measurement=measurement)
+    return kind(aircraft, flight, samples, model, search, measurement=measurement, uncertainty=uncertainty)
 
 
 def identification_from_request(
@@ -157,6 +166,7 @@ def identification_from_request(
         request.model,
         search_settings(request.search),
         measurement=request.measurement,
+        uncertainty=request.uncertainty,
     )
 
 

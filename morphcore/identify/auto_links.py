@@ -25,6 +25,7 @@ from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread
 from morphdata.identify import AUTO_LINKS, EquivalentModel
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 VERSION = "automatic links 1"  # of the checkpoint; another one is not read
 WORTH_A_LINK = 1.0  # by which links have to raise the logarithm of the likelihood: e times likelier
@@ -108,7 +109,7 @@ class AutoIdentification:
 
     Parameters
     ----------
-    aircraft, flight, samples, model, search, measurement, clock
+    aircraft, flight, samples, model, search, measurement, uncertainty, clock
         As of `Identification`; the time limit is for all together.
     """
 
@@ -121,6 +122,7 @@ class AutoIdentification:
         search: SearchSettings | None = None,
         *,
         measurement: Measurement | None = None,
+        uncertainty: UncertaintySettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.search = search or SearchSettings()
@@ -135,6 +137,7 @@ class AutoIdentification:
                 settings,
                 self._settings(links),
                 measurement=measurement,
+                uncertainty=uncertainty,
                 clock=clock,
             )
 

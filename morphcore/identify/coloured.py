@@ -139,12 +139,12 @@ class ColouredNoise:
     Attributes
     ----------
     records : tuple of Record
-    prior : float
-        Weight of the prior, rad^2 a squared unit: P = prior * 1.
+    prior : float or ndarray, shape (d,)
+        Weight of the prior of each search coordinate, rad^2 a squared unit: the diagonal of P.
     """
 
     records: tuple[Record, ...]
-    prior: float
+    prior: float | Array
 
     @property
     def dimension(self) -> int:
@@ -165,7 +165,7 @@ class ColouredNoise:
     def held(self) -> Array:
         """(w,) weight of the prior of each unknown."""
         return np.concatenate(
-            [np.full(self.dimension, self.prior), *(record.held for record in self.records)]
+            [np.broadcast_to(self.prior, (self.dimension,)), *(record.held for record in self.records)]
         )
 
     @cached_property

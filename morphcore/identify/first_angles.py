@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from morphcore.identify.cost import SampleCase, fly_readings, sample_schedules
 from morphcore.identify.drive_histories import DriveHistory
-from morphcore.identify.measurement import Measured
+from morphcore.identify.measurement import Measured, angle_noise
+from morphcore.identify.nuisance import PRIOR_RAD
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.simulate.plan import flight_plan, time_grid
 from morphcore.simulate.trajectory import Trajectory
@@ -59,7 +60,10 @@ def with_first_angles(
         flown.append(readings.at(case.sample.time_s[None, :])[0][0])
     columns = np.stack([each - flown[0] for each in flown[1:]], axis=-1) / PROBE_RAD
     columns = np.where(np.isfinite(columns), columns, 0.0)
-    return replace(setup, angle_columns=columns, angle_spread=np.array(list(noisy.values())))
+    # an error of one standard deviation costs as much as the noise of one angle's row
+    unit = max(PRIOR_RAD, *angle_noise(case.sample).values())
+    spread = np.array(list(noisy.values())) * PRIOR_RAD / unit
+    return replace(setup, angle_columns=columns, angle_spread=spread, angle_names=tuple(noisy))
 
 
 def _trimmed(

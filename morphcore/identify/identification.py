@@ -20,6 +20,7 @@ from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
+from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
 from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
 from morphcore.identify.settings import SearchSettings
@@ -40,6 +41,7 @@ from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel, samples_faults
 from morphdata.measurement import Measurement
+from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
@@ -78,6 +80,8 @@ class Identification:
         Method and effort of the search.
     measurement : Measurement, optional
         How the samples were measured; what is left out is decided from the data.
+    uncertainty : UncertaintySettings, optional
+        What is computed beside standard errors and intervals.
     clock : callable
         Wall time, s.
 
@@ -96,6 +100,7 @@ class Identification:
         search: SearchSettings | None = None,
         *,
         measurement: Measurement | None = None,
+        uncertainty: UncertaintySettings | None = None,
         clock: Clock = time.perf_counter,
     ) -> None:
         self.settings = model or EquivalentModel()
@@ -114,6 +119,7 @@ class Identification:
         smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
         self.samples = tuple(sample for sample, _ in smoothed)
         self.histories = tuple(histories for _, histories in smoothed)
+        self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
         self.openness: tuple[Openness, ...] = self._first_openness
@@ -140,6 +146,7 @@ class Identification:
         )
         # the same with the bounds that the search has widened by now, and the weight that it gives the prior
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
+        require_names(self.space, self.uncertainty.profile)
         warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack(

@@ -183,5 +183,5 @@ def _solved(
     diagonal = np.einsum("pii->pi", gram)
     diagonal += held + TINY * error.shape[1] * np.max(setup.weight) ** 2
     found = np.linalg.solve(gram, right[..., None])[..., 0]
-    change = found[:, count] if size > count else np.zeros(particles)
-    return found[:, :count], change
+    change = np.asarray(found[:, count] if size > count else np.zeros(particles))
+    return np.asarray(found[:, :count]), change

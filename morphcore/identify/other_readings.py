@@ -14,11 +14,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import wrap_angle
-from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, fly_attitudes, sample_cases, shared_trims
+from morphcore.identify.cost import (
+    SampleCase,
+    fly_attitudes,
+    reduced_errors,
+    residuals,
+    sample_cases,
+    shared_trims,
+)
 from morphcore.search.least_squares import FixedPrior, LeastSquares
 from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.simulate.plan import STEP_S
@@ -34,8 +40,6 @@ Change = Callable[[Trajectory], Trajectory]
 HALF = 0.5  # of the motion, rms: what another reading may leave at most to be believed
 TENFOLD = 10.0  # the cost by which another reading must be better to be named
 HEADING = 2  # the angle that is measured from any direction
-DELAY_UNIT_S = 0.05  # of the search coordinate of a delay
-LONGEST_DELAY_S = 0.3
 DESCENT_STEPS = 4
 MILLI = 1e-3
 SLOW_STEP_S, FAST_STEP_S = 0.5, 1e-4  # of rows that hardly are of a flight: nobody records morphs so
@@ -219,86 +223,67 @@ def attitude_cost(sample: Trajectory, flown: Array | None) -> float:
     return float(np.sum(wrap_angle(flown - sample.euler) ** 2))
 
 
-@dataclass(frozen=True)
-class DelayedFit:
-    """What a descent found that may shift the drives against the attitudes.
-
-    Attributes
-    ----------
-    cost : float
-        J at its end, rad^2.
-    delay_s : ndarray, shape (s,)
-        How much the attitudes of each sample come after its drives; zeros where that was not searched.
-    """
-
-    cost: float
-    delay_s: Array
-
-
-def refitted(
-    run: Identification, best: Array, cases: Sequence[SampleCase] | None = None, *, delays: bool = False
-) -> DelayedFit:
-    """Descend a few steps from the physical guess and the best point (d,).
+def refitted(run: Identification, best: Array, cases: Sequence[SampleCase]) -> tuple[float, Array]:
+    """Descend a few steps from the physical guess and the best point (d,) in another reading of the samples.
 
     Parameters
     ----------
     run : Identification
     best : ndarray, shape (d,)
-    cases : sequence of SampleCase, optional
-        Another reading of the samples to fit.
-    delays : bool
-        Whether each sample has a delay of its own, which is searched, too.
+    cases : sequence of SampleCase
+        The reading of the samples to fit.
+
+    Returns
+    -------
+    cost : float
+        At the end, rad^2.
+    point : ndarray, shape (d,)
     """
-    problem = _DelayProblem(run, run.training if cases is None else cases, delays=delays)
-    own = np.zeros((2, problem.box.lower.size - best.size))
-    starts = np.concatenate([np.stack([run.space.guess, best]), own], axis=1)
+    problem = _Refit(run, tuple(cases))
+    starts = np.stack([run.space.guess, best])
     descent = LeastSquares(
         problem,  # type: ignore[arg-type]  # of a problem a descent asks for its box alone
         DESCENT_STEPS,
-        FixedPrior(starts[0], np.full(starts.shape[1], run.prior_weight)),
+        FixedPrior(run.space.guess, np.full(best.size, run.prior_weight)),
     )
     state = descent.init(problem.evaluate(Batch(starts)))
     while not descent.done(state):
         state = descent.tell(state, problem.evaluate(descent.ask(state)))
     point = state.point[int(np.argmin(state.cost))]
-    found = problem.evaluate(Batch(point[None, :]))
-    shifts = point[best.size :] if delays else np.zeros(len(problem.cases))
-    return DelayedFit(float(found.cost[0]), DELAY_UNIT_S * shifts)
+    return float(problem.evaluate(Batch(point[None, :])).cost[0]), point
 
 
-class _DelayProblem:
-    """Parameters and delays together: the model's attitudes are read a delay earlier than the rows say."""
+def delayed(cases: Sequence[SampleCase]) -> list[SampleCase]:
+    """The same samples, whose readings may come later than what the drives do."""
+    setups = [case.setup for case in cases]
+    opened = [replace(setup, openness=replace(setup.openness, delay=True)) for setup in setups]
+    return [replace(case, given=setup) for case, setup in zip(cases, opened, strict=True)]
 
-    def __init__(self, run: Identification, cases: Sequence[SampleCase], *, delays: bool) -> None:
-        self._run, self.cases, self._delays = run, tuple(cases), delays
-        longest = np.full(len(self.cases) if delays else 0, LONGEST_DELAY_S / DELAY_UNIT_S)
-        self.box = Box(np.append(run.space.lower, -longest), np.append(run.space.upper, longest))
+
+def fitted_delays(run: Identification, point: Array, cases: Sequence[SampleCase]) -> list[float]:
+    """How late the readings of samples with a free delay come at a search point (d,), s."""
+    batch = run.space.decode(point[None, :])
+    trims = shared_trims(run.model, batch, cases, run.settings.start)
+    return [float(reduced_errors(run.model, batch, case, found).nuisance[0, -1]) for case, found in trims]
+
+
+@dataclass(frozen=True)
+class _Refit:
+    """The problem of an identification with other cases."""
+
+    run: Identification
+    cases: tuple[SampleCase, ...]
+
+    @property
+    def box(self) -> Box:
+        """The bounds of the search coordinates."""
+        return self.run.box
 
     def evaluate(self, batch: Batch) -> Outcome:
-        """Costs and errors of search points (p, d + s)."""
-        run, d = self._run, self._run.space.dimension
-        sets = run.space.decode(batch.points[:, :d])
-        parts = []
-        trims = shared_trims(run.model, sets, self.cases, run.settings.start)
-        for number, (case, found) in enumerate(trims):
-            flown = fly_attitudes(run.model, sets, case, found)
-            shift = DELAY_UNIT_S * batch.points[:, d + number] if self._delays else None
-            parts.append(_errors(case, flown, shift).reshape(batch.points.shape[0], -1))
-        errors = np.concatenate(parts, axis=1)
+        """Costs and errors of search points (p, d)."""
+        sets = self.run.space.decode(batch.points)
+        errors = residuals(self.run.model, sets, self.cases, self.run.settings.start)
         return Outcome(batch.points, np.einsum("pm,pm->p", errors, errors), errors, errors.shape[0])
-
-
-def _errors(case: SampleCase, flown: Array, delays: Array | None) -> Array:
-    """Weighted errors (p, k, 3) of attitudes (p, k, 3) that are seen delays (p,) later."""
-    time_s, measured = case.sample.time_s, case.sample.euler
-    errors = np.full(flown.shape, DIVERGED_ANGLE)
-    for lane in np.flatnonzero(np.all(np.isfinite(flown), axis=(1, 2))):
-        seen = flown[lane]
-        if delays is not None:
-            curve = CubicSpline(time_s, np.unwrap(seen, axis=0), axis=0)
-            seen = curve(np.clip(time_s - delays[lane], time_s[0], time_s[-1]))
-        errors[lane] = wrap_angle(seen - measured)
-    return errors * case.weight
 
 
 def _words(sample: Trajectory) -> dict[str, list[str]]:

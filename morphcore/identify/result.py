@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.identify.bands import Band, bands_of_cases
+from morphcore.identify.belief import Belief, belief_of
 from morphcore.identify.coloured import ColouredNoise
 from morphcore.identify.cost import SampleCase, fly_measured, shared_trims
 from morphcore.identify.cramer_rao import cramer_rao_percent
 from morphcore.identify.diagnoses import diagnoses
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
+from morphcore.identify.posterior import Posterior
 from morphcore.identify.sample_fit import ANGLES, SampleFit
 from morphcore.identify.sample_measurement import fit_records, fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
@@ -64,6 +67,10 @@ class IdentifyResult(Shown):
         Cramer-Rao bound of each searched parameter, per cent of its value.
     measurement : mapping of str to dict
         Biases, delay and heading that were found, by the name of the sample; empty where nobody has looked.
+    belief : Belief
+        Posterior, profile likelihoods and what predictive bands are made of.
+    bands : tuple of Band
+        Predictive bands of the samples that were held out.
     """
 
     model: ChainModel
@@ -78,6 +85,13 @@ class IdentifyResult(Shown):
     values: dict[str, float] = field(default_factory=dict)
     cramer_rao_percent: dict[str, float | None] = field(default_factory=dict)
     measurement: Mapping[str, Any] = field(default_factory=dict)
+    belief: Belief = field(default_factory=Belief)
+    bands: tuple[Band, ...] = ()
+
+    @property
+    def posterior(self) -> Posterior | None:
+        """Draws of the parameters; None where none were requested."""
+        return self.belief.posterior
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -87,6 +101,7 @@ class IdentifyResult(Shown):
             self.warnings,
             undetermined=() if self.uncertainty is None else self.uncertainty.undetermined,
             at_bound=self.at_bound,
+            measurement=self.measurement,
             finished=bool(self.search.get("finished", True)),
         )
 
@@ -108,7 +123,7 @@ class IdentifyResult(Shown):
             "fit": [fit.to_document() for fit in self.fits],
             "uncertainty": no_uncertainty(self.at_bound)
             if self.uncertainty is None
-            else self.uncertainty.to_document() | self._values_document(),
+            else self.uncertainty.to_document() | self._values_document() | self.belief.to_document(),
             "measurement": dict(self.measurement),
             "search": self.search,
             "cost": self.cost,
@@ -155,7 +170,15 @@ class IdentifyResult(Shown):
 
     def curves(self) -> dict[str, Any]:
         """Time histories of all samples for plots and tables."""
-        return {"samples": [fit.to_curves() for fit in self.fits]}
+        bands = {band.sample: band for band in self.bands}
+        return {
+            "samples": [
+                fit.to_curves() | {"band": bands[fit.case.sample.name].to_curves()}
+                if fit.case.sample.name in bands
+                else fit.to_curves()
+                for fit in self.fits
+            ]
+        }
 
 
 def identify_result(run: Identification, state: SearchState, *, judged: bool = True) -> IdentifyResult:
@@ -171,6 +194,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     )
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
     certainty = noise = None
+    belief = Belief()
     nuisances = fitted_nuisances(run, state.best) if judged and flies else ()
     if judged and space.dimension and flies:
         residual, jacobian = run.linearised(state.best)
@@ -178,11 +202,14 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         motions = [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained]
         noise = ColouredNoise(fit_records(run, residual, jacobian, motions, nuisances), run.prior_weight)
         certainty = uncertainty(space, state.best, residual, jacobian, noise)
+        belief = belief_of(run, state.best, jacobian, noise)
+    held_out = [case for case in run.cases if case.sample.role == "held_out"]
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
         return _flight_time(model, batch, run.cases[longest], start) if judged else None
 
+    measurement = measurement_documents(run, nuisances, noise) if nuisances else {}
     settings = run.search
     at_bound = space.at_bound(state.best)
     return IdentifyResult(
@@ -218,12 +245,14 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
             fits,
             at_bound,
             certainty.undetermined if certainty is not None else (),
-            diagnoses(run, fits, state.best, fly=judged),
+            diagnoses(run, fits, state.best, measurement, fly=judged),
         ),
         at_bound=tuple(at_bound),
         values=dict(zip(space.parameter_names, space.flatten(best)[0].tolist(), strict=True)),
         cramer_rao_percent={} if certainty is None else cramer_rao_percent(space, state.best, certainty),
-        measurement=measurement_documents(run, nuisances, noise) if nuisances else {},
+        measurement=measurement,
+        belief=belief,
+        bands=bands_of_cases(run.model, belief, held_out, start),
     )
 
 

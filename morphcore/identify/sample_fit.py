@@ -35,6 +35,18 @@ class SampleFit(Shown):
         """(k, 3) wrapped angle differences, rad."""
         return wrap_angle(getattr(self, model) - self.case.sample.euler)
 
+    def error_share(self, model: str = "identified") -> float:
+        """Error of a model as a part of the motion, both rms, without white noise; inf if it diverged.
+
+        White noise is what neighbouring rows do not share: the mean product of neighbours is free of it.
+        """
+        errors, motion = self.errors(model), wrap_angle(self.case.sample.euler - self.case.sample.euler[0])
+        if not np.all(np.isfinite(errors)):
+            return float("inf")
+        structured = float(np.sum(errors[1:] * errors[:-1])) / (errors.shape[0] - 1)
+        size = float(np.sum(motion**2)) / motion.shape[0]
+        return float(np.sqrt(max(structured, 0.0) / size)) if size > 0.0 else float("inf")
+
     def ending(self, model: str) -> str:
         """How a model's flight failed, as words; "" where it reached its end."""
         known = np.all(np.isfinite(getattr(self, model)), axis=1)

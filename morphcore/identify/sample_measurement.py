@@ -67,6 +67,7 @@ def _nuisances(
     if setup.start_columns.shape[2]:
         parts = LONGITUDINAL if case.plan.halved else range(len(START))
         names += [f"start.{START[part]}" for part in parts]
+    names += [f"first_angle.{drive}" for drive in setup.angle_names]
     if setup.openness.delay:
         names.append("delay")
         columns = np.concatenate([columns, left.slope[0][..., None]], axis=2)
@@ -151,6 +152,9 @@ def _document(case: SampleCase, estimates: Mapping[str, Mapping[str, float | Non
         "delay_s": dict(estimates["delay"]) if openness.delay else None,
         "heading_rad": heading,
         "initial_state": start,
+        "first_angle_rad": {
+            drive: dict(estimates[f"first_angle.{drive}"]) for drive in case.setup.angle_names
+        },
         "sigma": dict(openness.sigma),
         "noise_rad": angle_noise(sample),
         "reason": openness.reason or "the readings show no noise, and no bias or delay explains their errors",

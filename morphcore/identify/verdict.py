@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from morphcore.frames import wrap_angle
-from morphcore.identify.diagnoses import WRONG_DATA, error_share
+from morphcore.identify.diagnoses import LATE_SHARE, WRONG_DATA
 from morphcore.identify.sample_fit import ANGLES, SampleFit
 from morphcore.validity import ResultWarning
 
@@ -60,6 +60,7 @@ def verdict(
     *,
     undetermined: Collection[str] = (),
     at_bound: Collection[str] = (),
+    measurement: Mapping[str, Any] | None = None,
     finished: bool = True,
 ) -> Verdict:
     """Judge an identification.
@@ -72,6 +73,8 @@ def verdict(
         Of the result, diagnoses included.
     undetermined, at_bound : collection of str
         Names of parameters.
+    measurement : mapping of str to dict, optional
+        Biases and delays that the fit has allowed for, by sample, as the result has them.
     finished : bool
         Whether the search came to its end.
 
@@ -89,6 +92,7 @@ def verdict(
         *_judge_fit(fits),
         *([] if any(warning.code in WRONG_DATA for warning in warnings) else _judge_residuals(fits)),
         *_judge_parameters(undetermined, at_bound),
+        *_judge_measurement(measurement or {}),
     ]
     if not finished:
         found.append(Judgement("usable", "The search was stopped before its end.", "Let the search end."))
@@ -113,13 +117,17 @@ def _judge_data(fits: Sequence[SampleFit], warnings: Sequence[ResultWarning]) ->
     held_out = tuple(
         f"/samples/{number}/" for number, fit in enumerate(fits) if fit.case.sample.role != "train"
     )
+    # a fit that is free to shift the drives meets late samples as well as any; its delay is still a mistake
+    trained = [fit.error_share() for fit in fits if fit.case.sample.role == "train"]
+    allowed_for = max(trained, default=0.0) < LATE_SHARE
     alike: dict[tuple[str, str], list[ResultWarning]] = {}
     for warning in warnings:
         if warning.code not in HARMLESS:
             alike.setdefault((warning.code, warning.hint), []).append(warning)
     for (code, hint), group in alike.items():
         fitted = any(not f"{warning.pointer}/".startswith(held_out) for warning in group)
-        grade: Grade = "poor" if code in WRONG_DATA and fitted else "usable"
+        wrong = code in WRONG_DATA and fitted and (code != "late" or not allowed_for)
+        grade: Grade = "poor" if wrong else "usable"
         others = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
         yield Judgement(grade, _sentence(f"{group[0].message}{others}"), _sentence(hint))
 
@@ -128,8 +136,8 @@ def _judge_fit(fits: Sequence[SampleFit]) -> Iterator[Judgement]:
     """Judge by the flights that were held out, else by those that were fitted: by the worst of them."""
     held_out = [fit for fit in fits if fit.case.sample.role == "held_out"]
     fitted = [fit for fit in fits if fit.case.sample.role == "train"]
-    worst = max(held_out or fitted, key=error_share)
-    name, share = worst.case.sample.name, error_share(worst)
+    worst = max(held_out or fitted, key=SampleFit.error_share)
+    name, share = worst.case.sample.name, worst.error_share()
     if not math.isfinite(share):
         yield Judgement("poor", f"The model does not fly {name} to its end, or nothing moves in it.", DOUBT)
         return
@@ -144,7 +152,7 @@ def _judge_fit(fits: Sequence[SampleFit]) -> Iterator[Judgement]:
         grade = "good" if share <= GOOD_SHARE and len(fitted) >= MIN_FITTED else "usable"
         reason = f"{name} is fitted {measure}, but no flight was held out to prove the model."
         yield Judgement(grade, reason, "Hold one flight out and identify again.")
-    before = max((error_share(fit) for fit in fitted), default=0.0)
+    before = max((fit.error_share() for fit in fitted), default=0.0)
     if held_out and share > max(OVERFITTED * before, GOOD_SHARE):
         reason = f"{name} is predicted {share / before:.0f} times worse than the fitted flights are met."
         yield Judgement(
@@ -159,7 +167,7 @@ def _judge_fit(fits: Sequence[SampleFit]) -> Iterator[Judgement]:
 def _judge_residuals(fits: Sequence[SampleFit]) -> Iterator[Judgement]:
     """Residuals that the model should have explained, where they are large enough to matter."""
     for fit in fits:
-        share = error_share(fit)
+        share = fit.error_share()
         if not GOOD_SHARE < share < math.inf:
             continue
         found = fit.statistics()
@@ -188,6 +196,21 @@ def _judge_parameters(undetermined: Collection[str], at_bound: Collection[str]) 
         )
         step = "To determine them, add a flight that moves the wings differently (one-sided, faster)."
         yield Judgement("good", reason, step)
+
+
+def _judge_measurement(measurement: Mapping[str, Any]) -> Iterator[Judgement]:
+    """What the fit has allowed for, so that nobody takes the flights for better than they are."""
+    biases = [
+        abs(estimate["value"] or 0.0)
+        for found in measurement.values()
+        for name, estimate in (found.get("bias") or {}).items()
+        if name in ANGLES[:2]  # that of yaw is the heading
+    ]
+    delays = [abs((found.get("delay_s") or {}).get("value") or 0.0) for found in measurement.values()]
+    parts = [f"biases of roll and pitch up to {1e3 * max(biases):.2g} mrad"] if any(biases) else []
+    parts += [f"delays up to {1e3 * max(delays):.2g} ms"] if any(delays) else []
+    if parts:
+        yield Judgement("good", f"The fit has found and allowed for {' and '.join(parts)}.")
 
 
 def _measure(fit: SampleFit, share: float) -> str:

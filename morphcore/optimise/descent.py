@@ -33,7 +33,7 @@ STALLED = 1e-4  # a smaller relative decrease of the cost counts as none
 PATIENCE = 2  # iterations without decrease before a start has converged
 MIN_COST = 1e-12  # rad^2: below this there is nothing left to gain
 STILL = 1e-9  # shorter steps count as none; the unknowns are shares of duration and change
-# the field of starts narrows as the descent goes on: iteration -> starts kept (as a share of the first field)
+# the field of starts narrows during the descent: iteration -> starts kept (as a share of the first field)
 NARROWING = ((5, 1.0), (10, 0.5))
 USUAL_ITERATIONS = 8  # typical number in a descent, for the displayed progress
 

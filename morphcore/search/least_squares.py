@@ -43,7 +43,7 @@ MIN_DAMPING, MAX_DAMPING = 1e-14, 1e6
 STALLED = 0.01  # a smaller relative decrease counts as none: only undetermined directions still drift
 PATIENCE = 3  # iterations without decrease before a start has converged
 EXACT_RMS = 1e-8  # smaller residuals are round-off: nothing is left to fit
-# hopeless starts are dropped as the descent goes on: iteration -> starts kept (as a share of the first field)
+# hopeless starts are dropped during the descent: iteration -> starts kept (as a share of the first field)
 NARROWING = ((3, 1.0), (6, 0.5))
 # of the box's width, by which a bound moves outward when a start is pushed against it
 WIDENING = 0.5

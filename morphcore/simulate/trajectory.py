@@ -127,15 +127,16 @@ def load_trajectory(
     body: str = "FRD",
     quaternion: str | None = None,
     columns: Mapping[str, str] | None = None,
+    between: Sequence[float] | None = None,
 ) -> Trajectory:
-    """Read a CSV, JSON, Parquet or MATLAB file with the columns t, phi, theta, psi and those of drives.
+    """Read a CSV, JSON, Parquet, MATLAB or ULog file with the columns t, phi, theta, psi and those of drives.
 
-    The file extension selects the format. The column of a drive is named after it (``sweep_left``), or after
-    the word of both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``). Other
-    columns of numbers are stored in ``extra`` as they are, in ``drives``, in rad, if they could be drives,
-    and in ``channels``, in SI units, if they are named like channels; only these may have empty cells. Time
-    that counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one
-    object, in MATLAB vectors or the fields of one struct; Parquet needs pyarrow.
+    The ending of its name tells the kind. A drive's column bears its name (``sweep_left``), or the word of
+    both sides (``sweep``). Units in the names are accepted (``t_ms``, ``theta [deg]``); columns of numbers
+    beside the first ones land in ``extra`` as they are, in ``drives``, in rad, if they could be drives, and
+    in ``channels``, in SI units, if they are named like channels; these alone may have empty cells. Time that
+    counts from an epoch, and dates, count from the first row. In JSON the columns are lists of one object, in
+    MATLAB vectors or the fields of one struct. Parquet needs pyarrow, ULog pyulog, MATLAB 7.3 h5py.
 
     Parameters
     ----------
@@ -152,7 +153,10 @@ def load_trajectory(
         ``qx``, ``qy``, ``qz`` need none. It turns vectors of the body into the earth's axes.
     columns : mapping of str to str, optional
         Titles of the file's columns by the names that they shall have, with scale and offset:
-        ``{"theta_deg": "PITCH", "sweep_left_deg": "servo_1*0.09-45"}``.
+        ``{"theta_deg": "PITCH", "sweep_left_deg": "servo_1*0.09-45"}``. A field of a ULog file is
+        ``topic.field``; what of it is a drive must be declared.
+    between : pair of float, optional
+        First and last time of the rows that are used, s.
 
     Returns
     -------
@@ -173,7 +177,7 @@ def load_trajectory(
     (('sweep_left', 'sweep_right'), 1.74)
     """
     path = Path(path)
-    read = read_flight(path, declared(earth, body, quaternion, columns))
+    read = read_flight(path, declared(earth, body, quaternion, columns, between))
     return Trajectory(
         name=path.stem,
         time_s=_column(read.values["t"]),

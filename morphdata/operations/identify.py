@@ -192,6 +192,7 @@ IDENTIFY = Operation(
         "autocorrelation_*",
         "intervals.*",
         "curves_*.csv",
+        "posterior.npz",
     ),
     deadline_s=after_budget(REPORT_TIME_S),
     model_in=lambda result: result,

@@ -202,6 +202,7 @@ def gathered(
     ------
     FileFault : no column could be a drive.
     """
+    columns = _between(columns, wanted.declared.between)
     meant, unreadable = _meant(titles, units or {})
     rows = len(next(iter(columns.values.values())))
     maximum = min(MAX_DRIVES, MAX_DRIVE_NUMBERS // max(rows, 1))
@@ -241,6 +242,23 @@ def gathered(
         sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))
         raise next(sided, missing_columns(titles, wanted.names, wanted.optional))
     return found
+
+
+def _between(columns: FlightColumns, window: tuple[float, float] | None) -> FlightColumns:
+    """The rows in a window of time."""
+    if window is None:
+        return columns
+    times = columns.values["t"]
+    kept = [row for row, time in enumerate(times) if window[0] <= time <= window[1]]
+    if not kept:
+        detail = f"no row lies between {window[0]:g} s and {window[1]:g} s"
+        raise FileFault("no_rows", detail, f"the file goes from {min(times):g} s to {max(times):g} s")
+
+    def cut(table: Mapping[str, array[float]]) -> dict[str, array[float]]:
+        return {name: array("d", (values[row] for row in kept)) for name, values in table.items()}
+
+    lines = [columns.lines[row] for row in kept] if len(columns.lines) else ()
+    return replace(columns, values=cut(columns.values), others=cut(columns.others), lines=lines)
 
 
 def _as_declared(columns: FlightColumns, declared: Declared) -> FlightColumns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -51,11 +52,15 @@ class Declared:
         Order of quaternions in columns that are numbered, ``q0`` to ``q3``.
     columns : mapping of str to Source
         Columns by the names they shall have, with a unit or without (``theta_deg``, ``sweep_left``).
+    between : tuple of float, optional
+        First and last time of the rows that are used, s; of the file's clock, or since the first row where
+        this counts from an epoch.
     """
 
     frames: Frames = field(default_factory=Frames)
     quaternion: QuaternionOrder | None = None
     columns: Mapping[str, Source] = field(default_factory=dict)
+    between: tuple[float, float] | None = None
 
     def called(self, title: str) -> str:
         """What a column of the file is called here; "" if another one was declared in its place."""
@@ -87,7 +92,7 @@ class Declared:
                 return None if (source.scale, offset) == (1.0, 0.0) else (source.scale, offset)
         return None
 
-    def _declared_columns(self) -> set[str]:
+    def _declared_columns(self) -> set[str | None]:
         return {_column_of(name) for name in self.columns}
 
 
@@ -99,6 +104,7 @@ def declared(
     body: str = "FRD",
     quaternion: str | None = None,
     columns: Mapping[str, str] | None = None,
+    between: Sequence[float] | None = None,
 ) -> Declared:
     """Check what a user declares about a file.
 
@@ -112,18 +118,20 @@ def declared(
         Order of the columns ``q0`` to ``q3``: ``wxyz`` or ``xyzw``.
     columns : mapping of str to str, optional
         Title of the file's column by the name it shall have, with scale and offset: ``servo_1*0.09-45``.
+    between : pair of float, optional
+        First and last time of the rows that are used, s.
 
     Raises
     ------
     InvalidInput
-        At ``/earth``, ``/body``, ``/quaternion`` or ``/columns/NAME``.
+        At ``/earth``, ``/body``, ``/quaternion``, ``/columns/NAME`` or ``/between``.
 
     Examples
     --------
     >>> declared("enu", columns={"sweep_left_deg": "servo_1*0.09-45"}).columns["sweep_left_deg"]
     Source(title='servo_1', scale=0.09, offset=-45.0)
     """
-    frames: Any = Frames(_one_of(earth, Earth, "earth"), _one_of(body, Body, "body"))
+    words: Any = {"earth": _one_of(earth, Earth, "earth"), "body": _one_of(body, Body, "body")}
     order: Any = None if quaternion is None else _one_of(quaternion, QuaternionOrder, "quaternion")
     given = columns or {}
     if len(given) > MAX_COLUMNS:
@@ -135,7 +143,20 @@ def declared(
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InvalidInput(f"{twice} is declared twice", pointer="/columns", hint="keep one of them")
-    return Declared(frames, order, sources)
+    return Declared(Frames(**words), order, sources, _window(between))
+
+
+def _window(between: Sequence[float] | None) -> tuple[float, float] | None:
+    if between is None:
+        return None
+    try:
+        begin, end = map(float, between)
+    except (TypeError, ValueError):
+        begin = end = math.nan
+    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
+        hint = "give two times in s, the earlier first"
+        raise InvalidInput(f"{shown(between)} is no window of time", pointer="/between", hint=hint)
+    return begin, end
 
 
 def _one_of(given: str, choices: Any, name: str) -> str:

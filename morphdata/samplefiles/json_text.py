@@ -76,6 +76,8 @@ def _with_frames(document: dict[str, Any], wanted: Wanted) -> Wanted:
     if axes is None:
         return wanted
     try:
+        if not set(axes) <= {"earth", "body"}:
+            raise TypeError("it has other fields")  # noqa: TRY301
         own = declared(**axes).frames
     except (InvalidInput, TypeError, AttributeError) as error:
         hint = 'give {"earth": "NED" or "ENU", "body": "FRD" or "FLU"}'

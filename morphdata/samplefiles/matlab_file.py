@@ -1,4 +1,4 @@
-"""Flights as MATLAB files of the versions 4, 5 and 7, through scipy."""
+"""Flights as MATLAB files: the versions 4, 5 and 7 through scipy, 7.3 through h5py (`matlab_hdf5`)."""
 
 from __future__ import annotations
 
@@ -40,13 +40,15 @@ def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
     ------
     FileFault : naming the variable and the row.
     """
-    _refuse_others(stream)
+    hdf5 = _is_hdf5(stream)
     try:
+        if hdf5:
+            from morphdata.samplefiles.matlab_hdf5 import read_hdf5
+
+            return read_hdf5(stream, wanted)
         return _read(stream, _contents(stream), wanted)
     except (FileFault, MemoryError):
         raise
-    except NotImplementedError:
-        raise _hdf5() from None
     # the reader has no error of its own for a broken file: anything comes out of it
     except Exception as error:  # noqa: BLE001
         words = shown(error) or type(error).__name__
@@ -57,11 +59,16 @@ def read_matlab(stream: BinaryIO, wanted: Wanted) -> FlightColumns:
         ) from None
 
 
-def _refuse_others(stream: BinaryIO) -> None:
-    """Refuse files that are something else by how they begin; scipy would stumble over them somewhere."""
+def _is_hdf5(stream: BinaryIO) -> bool:
+    """Whether a file is one of version 7.3, by how it begins.
+
+    Raises
+    ------
+    FileFault : it is something else; scipy would stumble over it somewhere.
+    """
     head = stream.read(1024)
     if head.startswith((HDF5, b"MATLAB 7.3")) or head[512:520] == HDF5:
-        raise _hdf5()
+        return True
     if is_octave(head.decode("latin-1")):
         raise octave_text()
     if head.startswith(OCTAVE_BINARY):
@@ -72,14 +79,7 @@ def _refuse_others(stream: BinaryIO) -> None:
             "this is a text, not a MATLAB file",
             f"give a table of text the ending .csv, or save {SAVED}",
         )
-
-
-def _hdf5() -> FileFault:
-    return FileFault(
-        "matlab_v73",
-        "this is a MATLAB 7.3 (HDF5) file",
-        "save it as version 7: save('flight.mat', ..., '-v7')",
-    )
+    return False
 
 
 def _contents(stream: BinaryIO) -> Contents:

@@ -22,9 +22,16 @@ ENDINGS = {
     ".parquet": "parquet",
     ".pq": "parquet",
     ".mat": "matlab",
+    ".ulg": "ulog",
 }
-READERS = {"csv": "csv_text", "json": "json_text", "parquet": "parquet_file", "matlab": "matlab_file"}
-FORMATS = "CSV (.csv), JSON (.json), Parquet (.parquet) or MATLAB (.mat, saved with -v7)"
+READERS = {
+    "csv": "csv_text",
+    "json": "json_text",
+    "parquet": "parquet_file",
+    "matlab": "matlab_file",
+    "ulog": "ulog_file",
+}
+FORMATS = "CSV (.csv), JSON (.json), Parquet (.parquet), MATLAB (.mat) or ULog (.ulg)"
 
 
 def kind_of(ending: str) -> str:

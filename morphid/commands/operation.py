@@ -12,7 +12,7 @@ import typer
 
 from morphdata.operations.descriptor import Operation
 from morphdata.options import VEHICLE
-from morphid.commands import options
+from morphid.commands import options, sample_files
 from morphid.commands.fields import FieldOption, field_options
 from morphid.files import matching_files, require_place
 from morphid.request import Request
@@ -28,7 +28,7 @@ SAMPLES = {
         list[Path],
         typer.Option(
             "--sample",
-            help="Sample flights to fit: CSV, JSON, Parquet, MATLAB; several, or a pattern.",
+            help="Sample flights to fit: CSV, JSON, Parquet, MATLAB, ULog; several, or a pattern.",
             rich_help_panel=VEHICLE,
         ),
     ],
@@ -40,6 +40,7 @@ SAMPLES = {
             rich_help_panel=VEHICLE,
         ),
     ],
+    **sample_files.OPTIONS,
 }
 RUNNING = {
     "url": options.AtUrl,
@@ -93,7 +94,8 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
             request.add_samples(matching_files(values["sample"], "--sample"), "train", "--sample")
             held_out = matching_files(values["held_out"] or [], "--held-out")
             request.add_samples(held_out, "held_out", "--held-out")
-        for option in vehicle:  # first, because the aircraft determines the drives
+            request.said = sample_files.said(values)
+        for option in vehicle:  # first, for the aircraft says which drives there are
             _fill_field(request, option, values[option.parameter.name])
         own.fill(request, values)
         for option in (option for option in others if option.flag not in own.fills):

@@ -30,7 +30,7 @@ from morphcore.simulate.schedule import Hold
 from morphdata.lattice import Lattice
 from tests.aero.link_loads import edge_loads, lane_loads
 from tests.geometry.rehinged import rehinged
-from tests.kernels import door
+from tests.kernels import from_python
 from tests.models.chains import example_aircraft, example_flight, instant, odd_aircraft
 from tests.simulate.flights import example_model, fly_free, steps
 
@@ -192,7 +192,11 @@ def lag_response(motion, lag_s, step_s):
     previous[:] = motion[0]  # a jump just before the start, if there is one
     effective, out, stage = np.empty((3, TOGETHER)), [], np.empty((3, 3, TOGETHER))
     lanes = lane_type(TOGETHER)
-    to_stage, lagged, from_stage = door(lag_to_stage), door(lagged_motion), door(lag_from_stage)
+    to_stage, lagged, from_stage = (
+        from_python(lag_to_stage),
+        from_python(lagged_motion),
+        from_python(lag_from_stage),
+    )
     for value in motion:
         twist = np.full((6, TOGETHER), value)
         to_stage(lanes, link, slow, fast, previous, *stage)

@@ -13,11 +13,11 @@ from morphcore.aero.vlm import influence
 from morphcore.jit import entry_kernel
 from morphcore.models.flexible import flexible_model
 from morphdata.lattice import Lattice, VortexCore
-from tests.kernels import door
+from tests.kernels import from_python
 from tests.models.chains import example_aircraft, example_flight
 from tests.oracles.lattice import edge_midpoints, panel_normals
 
-refine = door(refine_kernel)
+refine = from_python(refine_kernel)
 
 
 @entry_kernel

@@ -76,7 +76,7 @@ POINTS = [(0.3, 0.2, -0.1), (2.5, 0.4, 0.3), (-1.0, 0.2, 0.5), (0.9, -0.3, 0.05)
 
 @pytest.mark.parametrize("point", POINTS)
 def test_segment_follows_biot_savart(point):
-    """A segment induces what quadrature of Biot and Savart gives, beside it, beyond its ends, far away."""
+    """A segment's velocity agrees with Biot-Savart quadrature next to it, beyond its ends and far away."""
     start, end = (0.1, -0.2, 0.3), (1.2, 0.4, -0.1)
     expected = biot_savart(start, end, point)
     # quadrature to 1e-12 of the largest component
@@ -144,7 +144,8 @@ def test_no_cancellation_on_the_extension():
 def test_smoothed_segment_is_the_product_form(core):
     """The law "smoothed" is the printed product form, at random points within some lengths of the segment.
 
-    The printed form loses what it subtracts, |a||b| + a.b beside the segment: nine digits at these points.
+    The printed form suffers from cancellation in |a||b| + a.b next to the segment: nine digits at these
+    points.
     """
     rng = np.random.default_rng(11)
     start, end = np.array((0.1, -0.2, 0.3)), np.array((1.2, 0.4, -0.1))
@@ -159,7 +160,7 @@ def test_smoothed_segment_is_the_product_form(core):
 def test_smoothed_leg_is_a_long_segment(point, core):
     """A smoothed leg is the limit of smoothed segments, which near it as distance over length: 1e-7 or less.
 
-    The last two points lie beside the start and, by a core or so, beside the leg.
+    The last two points lie next to the start and, within about one core, next to the leg.
     """
     start, direction = np.array((0.1, -0.2, 0.3)), np.array((-0.9, 0.1, -0.4))
     far = start + 1e9 * direction / np.linalg.norm(direction)
@@ -187,8 +188,8 @@ def test_laws_agree_far_away():
 def test_velocity_is_bounded_near_the_line(law):
     """Passing a vortex at any distance, down to nothing, the velocity is finite and below 1 / (4 core).
 
-    The peaks are 1 / (2 sqrt(2) pi core) of "line" and, with two cores squared in the denominator,
-    1 / (4 sqrt(2) pi core) of "smoothed" beside a long vortex; beside a leg's start, half of 1 / (2 pi core).
+    The peaks are 1 / (2 sqrt(2) pi core) of "line" and, with two cores squared in the denominator, 1 / (4
+    sqrt(2) pi core) for "smoothed" next to a long vortex; next to a leg's start, half of 1 / (2 pi core).
     """
     core = 0.0075
     for h in np.append(0.0, np.geomspace(1e-200, 10.0, 300)):
@@ -201,7 +202,7 @@ def test_velocity_is_bounded_near_the_line(law):
 
 
 def test_a_smoothed_core_reaches_further():
-    """Beside the middle of a long vortex "smoothed" is the plane vortex times h^2 / (h^2 + 2 core^2)."""
+    """Next to the middle of a long vortex "smoothed" is the plane vortex times h^2 / (h^2 + 2 core^2)."""
     core, ends = 0.015, ((0.0, -500.0, 0.0), (0.0, 500.0, 0.0))
     for h in (0.0375, 0.06, 0.15):
         speed = np.linalg.norm(segment(*ends, (h, 0, 0), core, "smoothed"))

@@ -14,7 +14,7 @@ from tests.app.request_documents import Document
 from tests.app.running_service import RunningService
 
 JSON = {"Content-Type": "application/json"}
-ANSWER_S = 1.0  # a bad request is told so within a second
+ANSWER_S = 1.0  # a bad request is refused within a second
 LARGE_ANSWER_S = 5.0  # a body of megabytes is read by a process of its own, 0.5 s on a quiet machine
 TRIES = 3
 

@@ -1,4 +1,4 @@
-"""A real server with the application in a thread of the test, so that tests can play the worker beside it."""
+"""A real server with the application in a thread of the test, so that tests can play the worker."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KEPT = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S / 5)
 
 @dataclass(frozen=True)
 class RunningService:
-    """One server, a client of it, and its database beside it."""
+    """One server, a client of it, and its database."""
 
     url: str
     client: httpx.Client

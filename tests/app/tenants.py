@@ -33,7 +33,7 @@ from tests.plain_http import CERTIFICATES
 
 ROWS = 12  # of a sample: enough to be checked, few enough to be sent a thousand times
 LEASE_S = 3600.0  # nobody renews it
-FILE = "curves.csv"  # without the marker: a file's name is asked for, and then stands in the answer
+FILE = "curves.csv"  # without the marker: a file's name is requested, and so appears in the response
 RESULTS = {
     "identify": RESULT,
     "study": STUDY_RESULT,

@@ -58,7 +58,7 @@ NOBODY = {"health": False, "API": False, "worker": False}
 
 @pytest.fixture(scope="module")
 def authority() -> trustme.CA:
-    """A certificate authority that nobody trusts who was not told to."""
+    """A certificate authority that is not trusted by default."""
     return trustme.CA()
 
 

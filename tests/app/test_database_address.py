@@ -1,4 +1,4 @@
-"""Addresses of databases: a file lies where it was asked, and what cannot be opened is refused."""
+"""Addresses of databases: a file is created where requested, and unusable addresses are refused."""
 
 from __future__ import annotations
 

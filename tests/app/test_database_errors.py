@@ -1,4 +1,4 @@
-"""What a failed transaction says of the database, and what a client is told of it."""
+"""What a failed transaction says about the database, and what is reported to the client."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def test_room_is_given_back_in_short_transactions(url: str) -> None:
 
 
 def test_a_file_of_an_earlier_version_learns_it_at_the_next_start(url: str, tmp_path: Path) -> None:
-    """It is written anew once; its rows stay, and from then on it shrinks."""
+    """It is rewritten once; its rows stay, and from then on it shrinks."""
     upgrade(url)
     database = Database(url)
     ids = fill(database)

@@ -86,7 +86,7 @@ def test_one_claim_holds_at_a_time(database: Database, table: LeasedTable) -> No
 
 
 def test_a_stale_claim_changes_nothing(database: Database, table: LeasedTable) -> None:
-    """Who sleeps past the lease is reaped once, whoever reaps, and writes in vain from then on."""
+    """A holder that sleeps past its lease is reaped once, by any reaper; its later writes have no effect."""
     with database.write() as session:
         sleeper = claim(session, table, lease_s=-1.0)
         assert sleeper is not None
@@ -112,7 +112,7 @@ def test_renewing_keeps_a_lease(database: Database, table: LeasedTable) -> None:
 
 
 def test_subscribers_are_part_of_the_change(database: Database, table: LeasedTable) -> None:
-    """Changes that mean something are told in order, ends too; a subscriber that fails undoes the change."""
+    """Changes with a note are reported in order, ends too; a failing subscriber undoes the change."""
     seen: list[str] = []
 
     def fails(_session: Session, _row: LeasedRow, _note: Note) -> None:

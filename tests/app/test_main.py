@@ -120,7 +120,7 @@ def test_starts_in_two_seconds(environment: dict[str, str]) -> None:
 
 
 def test_sigterm_ends_open_streams(environment: dict[str, str]) -> None:
-    """A process that is asked to end does so at once, though clients follow jobs."""
+    """A process ends at once on request, even if clients follow jobs."""
     port = _free_port()
     url = f"http://127.0.0.1:{port}"
     process = _serve(environment, port)
@@ -149,7 +149,7 @@ def test_sigterm_ends_open_streams(environment: dict[str, str]) -> None:
 
 
 def test_nothing_is_opened_by_importing(tmp_path: Path, environment: dict[str, str]) -> None:
-    """Importing the application touches no file; asking for `app.main:app` reads the settings."""
+    """Importing the application touches no file; accessing `app.main:app` reads the settings."""
     code = "import app.main, os; assert not os.listdir('.'); app.main.app; assert not os.listdir('.')"
     subprocess.run(
         [sys.executable, "-c", code],

@@ -51,7 +51,7 @@ def operations(document: Document) -> list[Document]:
 
 
 def test_committed_document_is_the_services() -> None:
-    """docs/openapi.json is what the code says; ``python -m app.openapi`` writes it anew."""
+    """docs/openapi.json is what the code says; ``python -m app.openapi`` regenerates it."""
     assert DOCUMENT.read_text(encoding="utf-8") == document_text()
 
 

@@ -11,7 +11,7 @@ from app.owner_turns import OwnerLimit, OwnerTurns
 
 
 class Readers:
-    """Requests that take a turn and keep it until they are told to end."""
+    """Requests that take a turn and keep it until the test ends them."""
 
     def __init__(self, turns: OwnerTurns) -> None:
         self.turns = turns
@@ -20,7 +20,7 @@ class Readers:
         self.tasks: dict[str, asyncio.Task[None]] = {}
 
     async def ask(self, *names: str) -> None:
-        """Let requests ask for a turn; the first letter is the owner."""
+        """Let requests wait for a turn; the first letter is the owner."""
         for name in names:
             self.ends[name] = asyncio.Event()
             self.tasks[name] = asyncio.create_task(self._have(name))

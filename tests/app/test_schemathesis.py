@@ -74,7 +74,7 @@ def guarded(
 
 @pytest.fixture(scope="module")
 def tenants(guarded: RunningService) -> Iterator[tuple[Tenant, Tenant]]:
-    """Who asks, and whose things must not be seen."""
+    """The caller, and the tenants whose data must not be seen."""
     ours, theirs = new_tenant(guarded, "tenant-a"), new_tenant(guarded, "tenant-b")
     yield ours, theirs
     for tenant in (ours, theirs):
@@ -117,7 +117,7 @@ def _can(operation: Operation, mode: GenerationMode) -> bool:
 
 
 def send(case: Case, asking: Tenant) -> httpx.Response:
-    """Send a case with a tenant's key; event streams are asked for as JSON, for they do not end."""
+    """Send a case with a tenant's key; event streams are requested as JSON because they do not end."""
     headers = dict(asking.headers)
     if case.path.endswith("/events"):
         headers["Accept"] = JSON
@@ -156,7 +156,7 @@ def look_at_everything(
         try:
             statuses = seen.setdefault(operation.label, Counter())
             fuzz(examples, cases(operation), look_at(operation, ours, theirs, statuses))
-        except Exception as failure:  # noqa: BLE001 - all operations are looked at before any is told
+        except Exception as failure:  # noqa: BLE001 - all operations are tested before any failure is reported
             failures.append(failure)
         for hook in client_json(ours, "/webhooks")["webhooks"]:
             if hook["id"] not in ours.ids["webhook_id"]:  # there is a limit, which few requests should meet
@@ -164,7 +164,7 @@ def look_at_everything(
     if failures:
         raise ExceptionGroup("operations that do not do what the document says", failures)
     assert everything(theirs) == before
-    if examples >= LONG:  # else a suite that is refused at every door would prove nothing
+    if examples >= LONG:  # otherwise a suite that is refused everywhere would prove nothing
         plain = [operation.label for operation in operations if not operation.body]
         assert [label for label in plain if min(seen[label]) >= 300] == []
 

@@ -60,7 +60,7 @@ def test_unsafe_combinations_are_refused_in_words(overrides: dict[str, object], 
     ],
 )
 def test_keys_are_demanded_beyond_this_machine(given: dict[str, object], demanded: bool) -> None:  # noqa: FBT001
-    """An open service beyond loopback exists only when it is asked for by name."""
+    """An open service beyond loopback exists only if explicitly requested."""
     assert load_settings(**given).demands_keys is demanded
 
 

@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.operations_baseline
 
-writes operations.json anew. Do so when a flight is *meant* to cost more, and say why in the commit; do so too
+rewrites operations.json. Do so when a flight is *meant* to cost more, and say why in the commit; do so too
 when it has become cheaper, so that the gain is kept.
 """
 

@@ -26,7 +26,7 @@ def test_a_stretched_flight_is_the_same_motion_slower() -> None:
 def test_a_swarm_of_2500_stays_under_200_mb_however_long_it_flies() -> None:
     """One generation over the three flights, beyond the warmed-up process; eight times as long adds little.
 
-    Only what is asked for is stored: with twice the rows to compare, twice the rows are. The hinge motion
+    Only the requested rows are stored: twice as many rows to compare take twice the memory. The hinge motion
     that the swarm shares grows with the flight (about 2 % a length), and the peak of a process differs by a
     tenth from run to run. A single number kept for every model and step would add 60 %.
     """

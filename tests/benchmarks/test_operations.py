@@ -38,7 +38,7 @@ def tally(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 def test_no_flight_costs_more_operations_than_it_did() -> None:
     """No kind of operation of any flight has grown by more than 10 per cent over the committed counts."""
     worse = grown(json.loads(BASELINE.read_text()), counted())
-    assert not worse, "\n".join([*worse, f"If that is meant, write the counts anew: {RENEW}"])
+    assert not worse, "\n".join([*worse, f"If that is intended, update the counts: {RENEW}"])
 
 
 def test_structure_grows_linearly_with_the_links() -> None:
@@ -62,7 +62,7 @@ def test_structure_grows_linearly_with_the_links() -> None:
 def test_the_guard_sees_a_kernel_that_does_its_work_twice(
     monkeypatch: pytest.MonkeyPatch, kernel: Any, part: str | None
 ) -> None:
-    """A kernel doubled on purpose is told in its own part, and nothing else is."""
+    """A kernel doubled on purpose is reported in its own part, and nothing else is."""
     bench = bench_of(QUICK)
     before = {"flight": flight_operations(bench, 2)}
     assert not grown(before, before)

@@ -67,7 +67,7 @@ def test_importing_the_library_takes_little_more_than_what_it_computes_with() ->
 @pytest.mark.slow
 @pytest.mark.timed
 def test_a_warm_process_begins_its_first_generation_in_half_a_second() -> None:
-    """From the document of a request, three flights, to the first step told: seconds of computing."""
+    """From the document of a request, three flights, to the first reported step: seconds of computing."""
     first_generation(EXAMPLES)  # compiles, should that be needed
     found = first_generation(EXAMPLES)
     print(found)

@@ -100,5 +100,5 @@ def test_two_workers_fly_almost_twice_as_fast(tmp_path: Path) -> None:
     )
     best = max(run.rate for run in runs["two"]) / max(run.rate for run in runs["single"])
     print(f"best against best: {best:.2f} x mode single")
-    # seconds on the clock are told, not judged: they are also those of whoever else uses this machine
+    # wall times are reported, not judged: they depend on other users of this machine
     assert one_cpu / single_cpu >= MIN_KEPT

@@ -228,7 +228,7 @@ class Simulation:
         return claim_job(session, unit.job_id, name, JOB_LEASE_S)
 
     def next(self, worker: int) -> None:
-        """Ask for more: by a message that waits, or by one of its own if there is work."""
+        """Get more work: by a waiting message, or by its own if there is work."""
         if self.messages:
             self.messages -= 1
             self.wake(worker)

@@ -31,6 +31,10 @@ UNCERTAINTY: Document = {
     "undetermined": ["damping_nms_rad.joint_1.edgewise", "stiffness_nm_rad.joint_1.edgewise"],
     "unidentifiable": [],
 }
+STATISTICS = (
+    *("theil", "theil_bias", "theil_variance", "theil_covariance"),
+    *("lag_1", "ljung_box_p", "white", "drive_correlation"),
+)
 WARNINGS: list[Document] = [
     {
         "code": "mach_missing",
@@ -65,12 +69,12 @@ def test_intervals_stand_next_to_the_parameters(service: RunningService, page: P
     def cells(group: str, title: str) -> list[str]:
         return parameter(page, group, title).locator("td").all_inner_texts()
 
-    assert cells("Share of the span", "link 1") == ["0.500", "± 0.022"]
-    assert cells("Stiffness, N m/rad", "joint 1, flap") == ["1.000", "± 0.042"]
-    assert cells("Stiffness, N m/rad", "joint 1, torsion") == ["2.00", "1.20 to 3.40"]
-    assert cells("Damping, N m s/rad", "joint 1, flap") == ["0.1", "at most 0.31"]
-    assert cells("Damping, N m s/rad", "joint 1, edgewise") == ["0.30", "0.002 to 45"]
-    assert cells("Aerodynamic corrections", "Lift factor") == ["1.0000", "± 0.0050"]
+    assert cells("Share of the span", "link 1") == ["0.500", "± 0.022", ""]
+    assert cells("Stiffness, N m/rad", "joint 1, flap") == ["1.000", "± 0.042", ""]
+    assert cells("Stiffness, N m/rad", "joint 1, torsion") == ["2.00", "1.20 to 3.40", ""]
+    assert cells("Damping, N m s/rad", "joint 1, flap") == ["0.1", "at most 0.31", ""]
+    assert cells("Damping, N m s/rad", "joint 1, edgewise") == ["0.30", "0.002 to 45", ""]
+    assert cells("Aerodynamic corrections", "Lift factor") == ["1.0000", "± 0.0050", ""]
 
 
 def test_what_the_samples_do_not_determine_is_grey(service: RunningService, page: Page) -> None:
@@ -93,6 +97,47 @@ def test_a_search_without_a_flying_model_shows_none(service: RunningService, pag
     lost = {**result(model=None, warnings=WARNINGS), "partial": True}
     text = shown(page, service, ended(service, "identify", identify_document(), lost))
     assert "None was found yet that flies the samples." in text
+
+
+def test_the_verdict_comes_first(service: RunningService, page: Page) -> None:
+    """Grade, reasons and steps stand above warnings and tables; statistics of residuals below."""
+    statistics = {
+        **dict.fromkeys(STATISTICS),
+        "theil": 0.012,
+        "theil_bias": 0.25,
+        "lag_1": 0.91,
+        "white": False,
+    }
+    fits = copy.deepcopy(RESULT["fit"])
+    fits[0]["statistics"] = {"theta": statistics, "phi": dict.fromkeys(STATISTICS)}
+    verdict = {"grade": "poor", "reasons": ["The sign is wrong."], "next_steps": ["Turn it."]}
+    bounds = {"lift_factor": 0.3, "division.1": 2.5e6}
+    judged = result(
+        verdict=verdict,
+        warnings=WARNINGS,
+        fit=fits,
+        uncertainty={**UNCERTAINTY, "cramer_rao_percent": bounds},
+    )
+    text = shown(page, service, ended(service, "identify", identify_document(), judged))
+    order = [
+        "Verdict",
+        "Do not rely on this model.",
+        "The sign is wrong.",
+        "Turn it.",
+        "2 warnings",
+        "J identified",
+    ]
+    places = [text.index(part) for part in order]
+    assert places == sorted(places)
+    assert page.locator(".card.verdict.poor .pill").inner_text() == "poor"
+    row = (
+        page.locator("section").filter(has=page.get_by_role("heading", name="Residuals")).locator("tbody tr")
+    )
+    assert row.count() == 1
+    assert row.locator("td").all_inner_texts()[1:] == ["θ", "0.012", "25 %", "–", "–", "0.91", "no", "–"]
+    cells = parameter(page, "Aerodynamic corrections", "Lift factor").locator("td").all_inner_texts()
+    assert cells[-1] == "0.3"
+    assert parameter(page, "Share of the span", "link 1").locator("td").all_inner_texts()[-1] == "> 1000"
 
 
 def test_warnings_come_first(service: RunningService, page: Page) -> None:
@@ -156,7 +201,7 @@ def test_one_chart_of_the_convergence(service: RunningService, page: Page) -> No
 
 @pytest.mark.parametrize("operation", ["identify", "simulate"])
 def test_a_failed_job_says_where_and_what_to_do(service: RunningService, page: Page, operation: str) -> None:
-    """The error of a job is shown with its code, hint and JSON pointer, and the page asks for no result."""
+    """The error of a job is shown with its code, hint and JSON pointer, and the page requests no result."""
     document = identify_document() if operation == "identify" else simulate_document()
     error = {"code": "trim_not_found", "detail": "no level flight", "pointer": "/flight/airspeed_m_s"}
     job_id = failed(service, operation, document, hint="raise the airspeed", **error)

@@ -72,7 +72,7 @@ def test_the_page_asks_for_a_key_and_works_with_it(service: RunningService, page
 
 @pytest.mark.refused_requests
 def test_a_revoked_key_is_asked_for_anew(service: RunningService, page: Page) -> None:
-    """A list that is open when its key is revoked asks for another."""
+    """A list that is open when its key is revoked prompts for another."""
     made = make_key(service.database, "leaving")
     page.goto(service.url)
     enter(page, made.text)

@@ -50,7 +50,7 @@ def test_schedules_are_compared(service: RunningService, page: Page) -> None:
     assert "25 per cent less than the constant rate, flown in the equivalent model" in text
     assert "Largest rate, rad/s\n0.98 of 1\n" in text
     assert "Largest acceleration, rad/s²\n3\n" in text
-    assert "torque" not in text, "nothing is told that is not known"
+    assert "torque" not in text, "unknown values are not shown"
     assert page.get_by_role("heading", name="Duration against variation").is_visible()
 
 
@@ -65,7 +65,7 @@ def test_a_search_without_a_schedule_shows_none(service: RunningService, page: P
 
 
 def test_the_list_tells_operations_apart(service: RunningService, page: Page) -> None:
-    """The list names operation and what was asked for, for jobs that wait too."""
+    """The list shows operation and request, also for waiting jobs."""
     post(service, "/simulate", {**simulate_document(), "duration_s": 1.25}).raise_for_status()
     page.goto(service.url)
     page.get_by_role("cell", name="rigid model, 1.25 s").wait_for(timeout=10_000)

@@ -1,4 +1,4 @@
-"""What the service asks of a broker, on each kind."""
+"""What the service requires of a broker, on each kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The documentation tells the truth: its examples run, its links lead somewhere."""
+"""The documentation is true: its examples run and its links work."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def test_the_readme_begins_with_the_demo_and_the_tests() -> None:
 
 
 def test_ci_calls_the_test_command_of_the_readme() -> None:
-    """What CI runs as tests is what the README tells people to run."""
+    """CI runs the tests that the README recommends."""
     lines = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
     assert first_commands()[1] in lines
 

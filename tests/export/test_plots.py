@@ -34,7 +34,8 @@ def test_every_sample_gets_its_pictures() -> None:
     """Attitude and residuals of each sample and the convergence, each well-formed as SVG and as PNG."""
     curves = {"samples": [flown_sample("a/b"), flown_sample("held", diverges=True)]}
     files = identification_plots(_document(), curves)
-    stems = ("attitude_a_b", "residuals_a_b", "attitude_held", "residuals_held", "convergence")
+    kinds = ("attitude", "residuals", "autocorrelation")
+    stems = (*(f"{kind}_{sample}" for kind in kinds for sample in ("a_b", "held")), "convergence")
     assert set(files) == {f"{stem}.{kind}" for stem in stems for kind in ("svg", "png")}
     for stem in stems:
         root = ET.fromstring(files[f"{stem}.svg"])  # noqa: S314 - our own file
@@ -111,7 +112,7 @@ def test_any_name_can_be_drawn() -> None:
     """Names with formulas, control characters, foreign letters or markup stay text, without a warning."""
     names = ["$x^2", "a\nb\0c", "航迹 один", "x" * 500, "<svg onload='alert(1)'>", "--><script>", "\ud800"]
     files = identification_plots(_document(), {"samples": [flown_sample(name) for name in names]})
-    assert len(files) == 2 * (2 * len(names) + 1)
+    assert len(files) == 2 * (3 * len(names) + 1)
     for content in (value for key, value in files.items() if key.endswith(".svg")):
         assert b"<script" not in content.lower()
         tags = {element.tag.rpartition("}")[2] for element in ET.fromstring(content).iter()}  # noqa: S314

@@ -40,7 +40,7 @@ def study(*rows: dict[str, Any], recommended: int | None = 2) -> dict[str, Any]:
 
 
 def test_the_picture_shows_accuracy_and_price() -> None:
-    """J of both roles on a logarithmic axis with the rigid model's beside, the time of a flight in ms."""
+    """J of both roles on a logarithmic axis, with the rigid model's, and the time of a flight in ms."""
     accuracy, price = study_figure(study(row(1), row(2), row(3))).axes
     fitted = next(line for line in accuracy.lines if line.get_label() == "fitted flights")
     assert np.allclose(fitted.get_ydata(), [1e-2, 1e-3, 1e-4])

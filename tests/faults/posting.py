@@ -93,7 +93,7 @@ class Client:
 
 
 class Posting(threading.Thread):
-    """Posts flights in the background, so many or until told to stop.
+    """Posts flights in the background, a given number or until stopped.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class Rig:
         slots: int = 1,
         environment: Mapping[str, str] | None = None,
     ) -> Child:
-        """Start a worker as `morphid serve` does, its operations walks, and the beat beside the first one."""
+        """Start a worker as `morphid serve` does, its operations walks, and with the first one the beat."""
         reported = {**self._environment, "MORPHID_WORKERS": str(slots), **(environment or {})}
         child = self._start(serve.worker_process(reported, slots), name, "--hostname", f"{name}@%h")
         if self.worker is None:

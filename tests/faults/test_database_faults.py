@@ -78,11 +78,11 @@ def test_postgres_crashes_in_mid_commit(rig: Rig, crashing_postgres: PostgresSer
         f"Postgres crashed 4 times: {len(rig.ledger.promises)} jobs accepted, {len(refused_s)} times 503 "
         f"(p95 {1e3 * percentile(refused_s, 0.95):.0f} ms); attempts of the running jobs {attempts}"
     )
-    assert refused_s, "nobody asked while it was away"
+    assert refused_s, "no request was sent while it was away"
 
 
 def test_a_sleeper_amid_a_transaction(rig: Rig) -> None:
-    """A process that stalls while it holds a lock: others are told to come back; nobody waits for ever."""
+    """A process that stalls while it holds a lock: others get a retry response; nothing waits for ever."""
     rig.start_api()
     job_id = rig.add(steps=5, published=False, ends=frozenset({"cancelled"}))
     with rig.database.write() as sleeper:
@@ -92,13 +92,13 @@ def test_a_sleeper_amid_a_transaction(rig: Rig) -> None:
         waited_s = time.monotonic() - began
     assert (answer.status_code, answer.json()["code"]) == (503, "database_unavailable")
     assert answer.headers["Retry-After"]
-    print(f"told to come back after {waited_s:.1f} s")
+    print(f"retry response after {waited_s:.1f} s")
     assert httpx.post(f"{rig.url}/jobs/{job_id}/cancel", timeout=LONGEST_WAIT_S).status_code == 200
 
 
 @pytest.mark.parametrize("pair", ["sqlite-embedded"])
 def test_two_processes_hammer_one_file(pair: str, tmp_path: Path, root: Path) -> None:
-    """Writers and readers of two processes on one SQLite file: nobody is ever told that it is locked."""
+    """Writers and readers of two processes on one SQLite file never get the error that it is locked."""
     url = f"{pair.partition('-')[0]}:///{tmp_path / 'hammered.sqlite3'}"
     upgrade(url)
     command = [sys.executable, "-m", "tests.faults.hammer", url, str(HAMMER_S)]

@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.faults, pytest.mark.timeout(300)]
 
 
 def make_small(rig: Rig, *, results: bool) -> dict[str, str]:
-    """Leave the workers little room; give what they must be told for it."""
+    """Leave the workers little space; return the settings for that."""
     if rig.database.engine.dialect.name == "sqlite":
         with rig.database.read() as session:
             pages = int(session.scalar(text("PRAGMA page_count")) or 0)

@@ -31,7 +31,7 @@ def start(rig: Rig, *, slots: int = 1) -> None:
 
 
 def test_a_job_whose_message_is_lost(rig: Rig) -> None:
-    """A job nobody was told of begins all the same."""
+    """A job that was never announced starts all the same."""
     start(rig)
     for _ in range(3):
         runs_soon(rig)
@@ -57,7 +57,7 @@ def test_without_a_broker(rig: Rig) -> None:
 
 @pytest.mark.faults
 def test_a_worker_that_starts_without_a_broker(rig: Rig) -> None:
-    """A worker that has never seen a broker runs jobs; told to end, it ends at once."""
+    """A worker that has never seen a broker runs jobs, and ends at once on request."""
     rig.take_away("broker")
     worker = rig.start_worker(environment=ALONE)
     job_id = rig.add(steps=3, pause_s=0.01, published=False)

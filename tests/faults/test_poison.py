@@ -1,4 +1,4 @@
-"""Jobs that kill their worker in every attempt, beside others that do not."""
+"""Jobs that kill their worker in every attempt, together with others that do not."""
 
 from __future__ import annotations
 

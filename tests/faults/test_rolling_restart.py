@@ -1,4 +1,4 @@
-"""Rolling restart: new processes beside the old ones, then the old ones end, under constant load."""
+"""Rolling restart: new processes start, then the old ones end, under constant load."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Proxy:
 
 
 class Load(threading.Thread):
-    """Posts flights and polls what it posted, on connections that it keeps, until told to stop.
+    """Posts flights and polls them, on connections that it keeps, until stopped.
 
-    Whatever is not an answer as it should be is a failure, but for a door that nobody opens: no byte was
-    sent, and any proxy tries the next one.
+    Every unexpected response is a failure, except a refused connection: no byte was sent, and any proxy tries
+    the next one.
     """
 
     def __init__(self, rig: Rig, proxy: Proxy) -> None:
@@ -85,7 +85,7 @@ class Load(threading.Thread):
 
 
 def start_api(rig: Rig, name: str) -> str:
-    """Start one more API process beside the others; give its address once it answers."""
+    """Start one more API process; return its address once it responds."""
     port = free_port(0)
     spec = serve.api_process({**rig._environment, "MORPHID_PORT": str(port)}, LOOPBACK, port)
     child = rig.supervisor.start(replaced(spec, name=name))

@@ -1,4 +1,4 @@
-"""What is told of a worker is true: it takes jobs, or it does not, whatever its process looks like."""
+"""The reported state of a worker is true: it takes jobs or not, whatever its process looks like."""
 
 from __future__ import annotations
 

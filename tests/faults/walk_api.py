@@ -17,7 +17,7 @@ publish_once = Publisher.publish
 
 
 def publish(self: Publisher, job_id: str) -> None:
-    """Die, or send the message as often as asked."""
+    """Die, or send the message the requested number of times."""
     crash = Path(os.environ.get("MORPHID_TEST_CRASH_FILE", "/nonexistent"))
     if crash.exists():
         crash.write_text(job_id)

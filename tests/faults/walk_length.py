@@ -5,7 +5,7 @@ Apart from the worker's module, whose import replaces what this process can do.
 
 from __future__ import annotations
 
-STEPS_PER_S = 10  # of a flight's duration: how a request at the API's door says how long a walk shall be
+STEPS_PER_S = 10  # of a flight's duration: sets the length of a walk in a request
 
 
 def flight_steps(duration_s: float) -> int:

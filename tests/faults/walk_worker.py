@@ -31,7 +31,7 @@ class FaultyWalk(Walk):
     """A walk that can swell its checkpoints, end slowly, eat memory and kill its worker."""
 
     def steps(self, checkpoint: bytes | None, stop: operations.Stop) -> Iterator[operations.Step]:
-        """Walk, with what was asked for."""
+        """Walk as requested."""
         for step in super().steps(checkpoint, stop):
             number = step.progress["generation"]
             if number == self.request.get("dies_at"):
@@ -64,7 +64,7 @@ def begin(request: operations.Document, _threads: int) -> Walk:
 
 
 def begin_flight(request: operations.Document, _threads: int) -> Walk:
-    """Begin a walk where the API was asked for a flight."""
+    """Start a walk in place of the requested flight."""
     return FaultyWalk({"seed": SEED, "steps": flight_steps(request["duration_s"]), "pause_s": PAUSE_S})
 
 

@@ -29,7 +29,7 @@ def test_the_example_meets_no_obstacle() -> None:
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_the_soft_wing_is_named(number: int) -> None:
-    """A modulus in GPa where Pa are asked for: pointer and name are those of the wing that has it."""
+    """A modulus in GPa instead of Pa: pointer and name are those of the wing that has it."""
     found = obstacle(with_modulus(number, 2.1), example_flight())
     assert found is not None
     assert found.pointer == f"/aircraft/surfaces/{number}/material/youngs_modulus_pa"

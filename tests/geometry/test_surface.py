@@ -87,7 +87,7 @@ def test_sections_follow_the_taper() -> None:
 
 
 def test_a_chord_that_is_not_said_is_the_uniform_one() -> None:
-    """Root or tip may be given beside the chord of the rest; the root is at the hinge where not said."""
+    """Root or tip chord may be given in addition to the chord; the root is at the hinge by default."""
     document = {"name": "w", "side": "left", "span_m": 2.0, "thickness_m": 0.1, "material": WOOD}
     hinge = Hinge(position_m=[0.1, -0.35, 0.2], axis="z")
     for given, chords in (

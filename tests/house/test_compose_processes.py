@@ -101,7 +101,7 @@ def composition(root: Path, tmp_path: Path, postgres_server: GivenPostgres) -> I
 
 
 def test_the_composed_redis_asks_for_its_password(composition: Composition, tmp_path: Path) -> None:
-    """Its command, run with this machine's server: no arguments tell the password, and all must have it."""
+    """Its command, run with this machine's server: no arguments reveal the password, and all must have it."""
     redis_server = tmp_path / "bin" / "redis-server"
     redis_server.parent.mkdir()
     redis_server.symlink_to(find_server())

@@ -17,7 +17,7 @@ WORKER_MAY_KNOW = (
         "app.health.presence",
         "app.health.broker",
         "app.on_end",
-    ),  # what it tells of itself
+    ),  # its own description
 )
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "common", "misc"}
 MAX_LINES = 500  # 400 is the aim; a little over is better than a file torn apart

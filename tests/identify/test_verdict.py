@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from morphcore.identify.cost import SampleCase
-from morphcore.identify.diagnoses import WRONG_DATA, error_share
+from morphcore.identify.diagnoses import WRONG_DATA
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.identify.verdict import GRADES, Verdict, verdict
 from morphcore.simulate.trajectory import Role, Trajectory
@@ -79,7 +79,7 @@ def test_white_noise_is_no_error_of_the_model() -> None:
     noisy = fit(noise_rad=0.004)
     errors = noisy.errors("identified")[:, 1]
     assert np.sqrt(np.mean(errors**2)) > 0.02 * np.sqrt(np.mean(MOTION**2))
-    assert error_share(noisy) < 0.01
+    assert noisy.error_share() < 0.01
     assert verdict([fit("train"), noisy]).grade == "good"
     # an error of the same size with a shape
     assert verdict([fit("train"), fit(share=0.04)]).grade == "usable"
@@ -113,7 +113,13 @@ def test_bounds_and_undetermined_parameters_are_named() -> None:
     assert verdict(fits, undetermined=["lag_s", "lift_factor"], at_bound=["lift_factor"]).grade == "good"
 
 
-@pytest.mark.parametrize("code", sorted(WRONG_DATA))
+def test_a_delay_that_the_fit_allows_for_is_usable() -> None:
+    """Its parameters are sound, the recorders are not; a fit that did not allow for it is poor."""
+    assert verdict([fit("train", share=1e-3), fit()], [warning("late")]).grade == "usable"
+    assert verdict([fit("train", share=0.008), fit()], [warning("late")]).grade == "poor"
+
+
+@pytest.mark.parametrize("code", sorted(WRONG_DATA - {"late"}))
 def test_wrong_data_are_poor_however_well_they_fit(code: str) -> None:
     """In a fitted flight; in one that was held out the model is not concerned, only its proof."""
     fits = [fit("train"), fit()]
@@ -127,6 +133,18 @@ def test_warnings_of_the_method_lower_the_grade_and_harmless_ones_do_not() -> No
     fits = [fit("train"), fit()]
     assert verdict(fits, [warning("large_alpha")]).grade == "usable"
     assert verdict(fits, [warning("compressible"), warning("gap")]).grade == "good"
+
+
+def test_what_the_fit_has_allowed_for_is_said() -> None:
+    """Biases and delays are no reason to doubt a fit that knows them."""
+    estimates = {"bias": {"phi": {"value": -2e-3}, "psi": {"value": 0.7}}, "delay_s": {"value": 0.0115}}
+    found = verdict([fit("train"), fit()], measurement={"a": estimates, "b": {"bias": {}, "delay_s": None}})
+    assert found.grade == "good"
+    assert (
+        "The fit has found and allowed for biases of roll and pitch up to 2 mrad and delays up to 12 ms."
+        in (found.reasons)
+    )
+    assert not any("allowed" in r for r in verdict([fit("train"), fit()], measurement={"a": {}}).reasons)
 
 
 def test_a_search_that_was_stopped_is_usable_at_best() -> None:

@@ -110,7 +110,7 @@ def test_many_wait_for_an_end(rig: Rig, tell: Tell) -> None:
         return calls, Times.of(at - begun for _, at in answers)
 
     calls, ends = asyncio.run(measure())
-    tell(f"GET /jobs/{{id}} beside {WAITERS} waiting calls: {calls}")
+    tell(f"GET /jobs/{{id}} during {WAITERS} waiting calls: {calls}")
     tell(f"from the first of {WAITERS} ends to the answers: {ends}")
     assert calls.p95_ms < CALL_P95_MS
     assert ends.worst_ms < 1e3 * ALL_ANSWERED_S
@@ -156,7 +156,7 @@ def test_a_thousand_idle_streams(rig: Rig, tell: Tell) -> None:
         f"{STREAMS} idle streams: {rss / 1e6:.0f} MB resident ({before / 1e6:.0f} MB without), "
         f"{100.0 * load:.0f} per cent of a core"
     )
-    tell(f"GET /jobs/{{id}} beside them: {calls}")
+    tell(f"GET /jobs/{{id}} meanwhile: {calls}")
     tell(f"from a worker's commit to the stream: {news}")
     assert rss < MAX_RSS
     assert calls.p95_ms < CALL_P95_MS
@@ -192,13 +192,13 @@ def test_thousands_of_streams_are_not_noticed(rig: Rig, tell: Tell) -> None:
         begun, worked = time.monotonic(), sum(api.cpu_times()[:2])
         idle = await time_of_others(rig.url, other, others_ids)
         load = (sum(api.cpu_times()[:2]) - worked) / (time.monotonic() - begun)
-        tell(f"beside {CROWD} idle streams: {idle}, {100.0 * load:.0f} per cent of a core")
+        tell(f"during {CROWD} idle streams: {idle}, {100.0 * load:.0f} per cent of a core")
         enough = threading.Event()
         news = asyncio.create_task(asyncio.to_thread(report_until, rig, ids, enough))
         busy = await time_of_others(rig.url, other, others_ids)
         enough.set()
         await news
-        tell(f"beside {CROWD} streams with news: {busy}")
+        tell(f"during {CROWD} streams with news: {busy}")
         for _, _, writer in streams:
             writer.close()
         return idle, busy

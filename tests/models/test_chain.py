@@ -41,7 +41,7 @@ def accelerations(rates, model):
 
 
 def drag_wrenches(model, batch, particle, tree, motion, density):
-    """Profile drag on every body (b, 6) anew: half rho Cd A |v| v at the centroid of each link's planform."""
+    """Profile drag on every body (b, 6), independently: half rho Cd A |v| v at each link's centroid."""
     bodies, origins = link_bodies(model)
     twists = body_twists(tree, motion)
     wrench = np.zeros((tree.bodies, 6))

@@ -289,7 +289,7 @@ def test_one_set_for_all_is_a_factor_on_each_beam() -> None:
 
 
 def test_wings_that_are_not_mirror_images_share_nothing() -> None:
-    """A wing of another chord: each side has its own parameters, whether asked for or not."""
+    """A wing of another chord: each side has its own parameters, whether requested or not."""
     model = chain(NAMES[:2], **{"left wing": {"chord_m": 0.41}})
     assert search_space(model).dimension == 2 * 7 + 3 + 2
     guess = physical_guess(model)

@@ -45,7 +45,7 @@ def unbent(model: FlexibleModel) -> NodePoses:
 
 
 def test_mass_is_that_of_the_aircraft() -> None:
-    """A unit acceleration as one rigid body asks for the mass and, turning, for the inertia by quadrature."""
+    """A unit rigid acceleration requires the mass as force and, in rotation, the inertia by quadrature."""
     model = flexible_model(odd_aircraft(), example_flight(), elements=4)
     poses, zero = unbent(model), np.zeros((model.beams.nodes, 6))
     lifted = zero.copy()

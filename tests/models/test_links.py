@@ -179,7 +179,7 @@ def test_a_uniform_chain_stands_for_the_whole_beam(links):
 def test_a_tapered_chain_stands_for_the_whole_beam(links, wing):
     """The same laws of wings with half the chord at the tip, against quadrature.
 
-    Joints lie where flap asks for them: its laws are exact as on a uniform wing. Torsion and edgewise
+    Joints lie where flap requires them: its laws are exact as on a uniform wing. Torsion and edgewise
     stiffness fall by other powers of the chord; their slope (twist) is exact all the same, and the rest
     within 1.3 and 18 per cent over the square of n - 1.
     """

@@ -26,6 +26,8 @@ EXTRA = (
     "sweep_deg",
     "x_rad",
     "p_rad_s",
+    "qz",
+    "frames",
 )
 # keys of schedules, and columns of drives: one in the place of another
 DRIVE_KEYS = ("both", "left", "right", "sweep", "fold", "sweep_left", "fold_right", "elevator", "cant_left")

@@ -75,6 +75,13 @@ FOLD_SAMPLE: Document = {
     "sweep_left_deg": [0.0, 0.0, 1.0, 2.0],
     "sweep_right_rad": [0.0, 0.0, 0.01, 0.02],
     "vx_m_s": [150.0] * 4,
+    "p_deg_s": [0.0, None, 1.0, 2.0],
+}
+TURNED_SAMPLE: Document = {  # a quaternion in other axes, and a channel that turns with them
+    **{name: values for name, values in EXAMPLE_SAMPLE.items() if name[:3] not in ("phi", "the", "psi")},
+    **dict(zip(("qw", "qx", "qy", "qz"), ([0.6] * 4, [0.0] * 4, [0.0] * 4, [0.8] * 4), strict=True)),
+    "frames": {"earth": "ENU", "body": "FLU"},
+    "q_rad_s": [0.0, None, 0.1, 0.2],
 }
 BODY = {"mass_kg": 875.0, "inertia_kg_m2": [[60.0, 0.0, -1.0], [0.0, 1800.0, 0.0], [-1.0, 0.0, 1850.0]]}
 AS_IDENTIFIED = {"lattice": {"chordwise": 2, "spanwise": 6}, "step_s": 0.005, "start": "given"}
@@ -119,6 +126,7 @@ EXAMPLES: dict[str, tuple[Document, ...]] = {
         EXAMPLE_REQUEST,
         RICH_IDENTIFICATION,
         {**EXAMPLE_REQUEST, "aircraft": FOLDING, "samples": [FOLD_SAMPLE]},
+        {**EXAMPLE_REQUEST, "samples": [TURNED_SAMPLE]},
     ),
     "study": (EXAMPLE_STUDY, {**RICH_IDENTIFICATION, "model": {"links_per_wing": [1, 2]}, "search": {}}),
     "simulate": (

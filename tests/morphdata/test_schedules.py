@@ -198,7 +198,7 @@ def test_what_moves_nothing_or_too_much_is_refused(document: Any, code: str, poi
 
 
 def test_a_misspelt_key_is_guessed() -> None:
-    """By name; and a schedule that stands where schedules by drive are wanted is told how."""
+    """By name; a schedule in place of schedules by drive gets a specific hint."""
     ((_, _, hint),) = refusals({"swep_left": RATE}, EXAMPLE_AIRCRAFT)
     assert "Did you mean 'sweep_left'?" in hint
     assert "sweep" in refusals(RATE, EXAMPLE_AIRCRAFT)[0][2]

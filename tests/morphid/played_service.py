@@ -19,7 +19,7 @@ class PlayedService:
     result : of the job.
     ending : final status.
     files : what the job leaves behind.
-    request : what was asked for when the job was posted.
+    request : the request with which the job was posted.
     """
 
     def __init__(

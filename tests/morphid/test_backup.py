@@ -184,7 +184,7 @@ def test_postgres_has_its_own_tools(tmp_path: Path) -> None:
 
 
 def test_the_commands_say_what_was_copied(url: str, tmp_path: Path) -> None:
-    """`morphid db backup` and `restore` tell how many jobs are in the copy."""
+    """`morphid db backup` and `restore` report the number of jobs in the copy."""
     database = Database(url)
     add(database, 1)
     database.dispose()

@@ -21,7 +21,7 @@ RUNNER = CliRunner()
 
 @pytest.mark.parametrize("interrupts", [1, 2])
 def test_ctrl_c_ends_it(interrupts: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first is asked for between two measurements, an exception may be lost; the second ends at once."""
+    """The first is checked between measurements, as an exception may be lost; the second ends at once."""
     reached: list[str] = []
 
     def measure(*_: object, **__: object) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Data folders of any name: database, queue, logs, copies and keys lie where they were asked."""
+"""Data folders of any name: database, queue, logs, copies and keys are created where requested."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def test_a_wrong_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_other_packages_than_tested(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A version that will do but is not the one that the tests ran with is told of."""
+    """An accepted but untested version is reported."""
     constraints = tmp_path / "constraints.txt"
     constraints.write_text("numpy==2.1.0  # other\nabsent==1\nwinonly==1; sys_platform == 'win32'\n")
     monkeypatch.setattr(machine, "CONSTRAINTS", constraints)
@@ -114,13 +114,13 @@ def test_a_compiler_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_more_workers_than_cores() -> None:
-    """Jobs that would fight for cores and memory are told of."""
+    """Jobs that would compete for cores and memory are reported."""
     assert states(machine.cores(1))["cores"] is State.OK
     assert states(machine.cores(1000)) == {"cores": State.WARN, "memory": State.WARN}
 
 
 def test_contradicting_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Settings that the service refuses are told in its own words; unsafe ones it takes are warned of."""
+    """Refused settings are reported in the service's words; unsafe but accepted ones cause warnings."""
     monkeypatch.setattr(machine, "COMPILE", """print('{"numba": "0", "cache": "/"}')""")
     monkeypatch.setenv("MORPHID_LEASE_S", "1")
     last = list(round_here(tmp_path))[-1]
@@ -150,7 +150,7 @@ def test_few_open_files(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_scarce_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A disk with less room than is needed is told of; SQLite on a network disk is refused."""
+    """A disk with too little space is reported; SQLite on a network disk is refused."""
     assert states(machine.data_dir(tmp_path, sqlite=True))["data directory"] is State.OK
     (tmp_path / "file").touch()
     assert states(machine.data_dir(tmp_path / "file" / "var", sqlite=True)) == {"data directory": State.FAIL}
@@ -195,7 +195,7 @@ def test_sqlite_in_every_state(settings: Settings, monkeypatch: pytest.MonkeyPat
 
 
 def test_postgres_that_is_not_there(tmp_path: Path) -> None:
-    """A database that does not answer is a fault; its password is not told."""
+    """A database that does not respond is a fault; its password is not shown."""
     settings = Settings(
         data_dir=tmp_path, database_url="postgresql://u:hush-hush@127.0.0.1:1/x?connect_timeout=2"
     )
@@ -219,7 +219,7 @@ def test_a_broker_in_every_state(broker_url: str) -> None:
 
 
 def test_workers_and_jobs_in_every_state(settings: Settings) -> None:
-    """No workers, living ones, stalled ones; jobs whose worker is gone, jobs that wait beside a free slot."""
+    """No workers, live ones, stalled ones; jobs whose worker is gone, jobs that wait despite a free slot."""
     store = Database(settings.database_url)
     assert states(service.work(settings)) == {"workers": State.WARN, "jobs": State.OK}
     with store.write() as session:

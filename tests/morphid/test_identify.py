@@ -91,14 +91,48 @@ def test_bounds_that_make_no_sense_are_named(examples: Path, bounds: str, code: 
     assert reported in " ".join(ended.stderr.replace("│", " ").split())
 
 
-def test_the_verdict_is_printed(examples: Path, play: Play) -> None:
-    """After the tables a word says whether the model may be believed, and what to do next."""
-    fit = {**RESULT["fit"][0], "role": "held_out", "range_rad": {"phi": 0.1, "theta": 0.2, "psi": 0.1}}  # type: ignore[index]
-    play(PlayedService("identify", {**RESULT, "fit": [fit]}))
+STATISTICS: dict[str, object] = {
+    "theil": 0.0123,
+    "theil_bias": 0.25,
+    "theil_variance": 0.05,
+    "theil_covariance": 0.7,
+    "lag_1": 0.91,
+    "ljung_box_p": 1e-9,
+    "white": False,
+    "drive_correlation": -0.62,
+}
+
+
+@pytest.mark.parametrize(("grade", "used"), [("good", True), ("usable", True), ("poor", False)])
+def test_the_verdict_is_printed(examples: Path, play: Play, grade: str, used: bool) -> None:  # noqa: FBT001
+    """After the tables a word says whether the model may be believed, why, and what to do next."""
+    verdict = {"grade": grade, "reasons": ["It is so."], "next_steps": ["Fly once more."]}
+    play(PlayedService("identify", {**RESULT, "verdict": verdict}))
     ended = RUNNER.invoke(app, arguments(examples))
     assert ended.exit_code == Exit.OK, ended.output
-    assert "Verdict: good" in ended.stdout
-    assert "morphid simulate" in ended.stdout
+    after = ended.stdout.partition(f"Verdict: {grade}")[2]
+    assert after.index("It is so.") < after.index("Fly once more.")
+    assert ("morphid simulate" in after) is used
+
+
+def test_a_result_of_an_earlier_version_has_no_verdict(examples: Path, play: Play) -> None:
+    """Nothing is said where the service has not judged."""
+    play(PlayedService("identify", RESULT))
+    ended = RUNNER.invoke(app, arguments(examples))
+    assert ended.exit_code == Exit.OK, ended.output
+    assert "Verdict" not in ended.stdout
+
+
+def test_statistics_of_residuals_are_printed(examples: Path, play: Play) -> None:
+    """Theil's U, its parts in per cent, correlations, whiteness; silent channels have no row."""
+    silent = dict.fromkeys(STATISTICS)
+    fit = {**RESULT["fit"][0], "statistics": {"theta": STATISTICS, "phi": silent}}  # type: ignore[index]
+    play(PlayedService("identify", {**RESULT, "fit": [fit]}))
+    ended = RUNNER.invoke(app, arguments(examples))
+    (row,) = (line for line in ended.stdout.splitlines() if "0.0123" in line)
+    assert row.split()[1:] == ["θ", "0.0123", "25", "5", "70", "0.91", "no", "-0.62"]
+    residuals = ended.stdout[ended.stdout.index("Theil") :].partition("Equivalent model")[0]
+    assert "φ" not in residuals
 
 
 def test_json_on_standard_output_is_nothing_but_json(examples: Path, play: Play) -> None:

@@ -81,7 +81,7 @@ def test_a_key_has_what_was_asked_for(here: Path) -> None:
     ],
 )
 def test_what_makes_no_key_is_a_sentence(here: Path, words: tuple[str, str], reported: str) -> None:
-    """Nothing is stored, and the way out is told."""
+    """Nothing is stored, and the hint is shown."""
     result = keys(here, "create", "--owner", "lab", "--name", "x", *words)
     assert result.exit_code in (Exit.USAGE, Exit.INVALID_INPUT)
     assert reported in result.output
@@ -102,7 +102,7 @@ def test_revoking_is_by_prefix_or_id_and_for_good(here: Path) -> None:
 
 
 def test_owners_are_listed_apart_and_deeds_are_noted(here: Path) -> None:
-    """`--owner` chooses; the audit log tells what the operator did, without secrets."""
+    """`--owner` chooses; the audit log records what the operator did, without secrets."""
     document = made(here)
     keys(here, "create", "--owner", "other", "--name", "x")
     keys(here, "revoke", document["prefix"])

@@ -34,6 +34,7 @@ UNCERTAINTY = {
         "damping_nms_rad.joint_1.edgewise": [None, None],
         "lag_s": [None, 0.005],
     },
+    "cramer_rao_percent": {"division.1": 1.234, "damping_nms_rad.joint_1.edgewise": 4e5, "lag_s": None},
     "undetermined": ["damping_nms_rad.joint_1.edgewise"],
     "at_bound": ["stiffness_nm_rad.joint_1.flap"],
 }
@@ -55,7 +56,7 @@ def shown(result: dict[str, Any], width: int = 80) -> str:
 
 @pytest.mark.parametrize("separate", [False, True])
 def test_names_are_those_of_the_uncertainty(separate: bool) -> None:  # noqa: FBT001
-    """Names and values are the library's, in its order: no interval stands beside another parameter."""
+    """Names and values are the library's, in its order: no interval is shown for another parameter."""
     model = chain_model(reference_aircraft(), reference_flight(), 3)
     space = search_space(model, separate_wings=separate)
     batch = physical_guess(model, separate_wings=separate)
@@ -87,6 +88,8 @@ def test_rows_have_intervals_and_marks() -> None:
     assert lines["stiffness_nm_rad.joint_1.flap"].rstrip().endswith("bound")
     assert "up to 0.005" in lines["lag_s"]
     assert "fixed" in lines["profile_drag"]
+    assert lines["division.1"].split()[:3] == ["division.1", "0.45", "1.2"]  # the Cramer-Rao bound
+    assert ">1e3" in lines["damping_nms_rad.joint_1.edgewise"]
     grey = [
         line for line in shown({"model": MODEL, "uncertainty": UNCERTAINTY}).splitlines() if "unseen" in line
     ]

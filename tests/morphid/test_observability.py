@@ -81,7 +81,7 @@ def collector() -> Iterator[Collector]:
 
 @pytest.fixture(scope="module")
 def live(collector: Collector, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveService]:
-    """A service that tells everything."""
+    """A service that logs everything."""
     environment = {
         "MORPHID_LOG_FORMAT": "json",
         "MORPHID_TRACES": collector.address,  # type: ignore[attr-defined]

@@ -36,7 +36,7 @@ class PlayedRunner:
         self._interrupts = interrupts
 
     def steps(self) -> Generator[tuple[Stage, Progress]]:
-        """Tell two steps, with Ctrl-C before the second."""
+        """Report two steps, with Ctrl-C before the second."""
         try:
             yield TRUTH, Progress(0.5, "0.2 rad/s")
             for _ in range(self._interrupts):
@@ -49,7 +49,7 @@ class PlayedRunner:
 
 @pytest.fixture
 def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[PaperSettings]:
-    """Play the stages; give the settings that the command asks for."""
+    """Play the stages; return the settings that the command requests."""
     seen: list[PaperSettings] = []
 
     def play(settings: PaperSettings, folder: Path) -> PlayedRunner:
@@ -88,7 +88,7 @@ def test_the_table_shows_asked_and_measured(
 
 @pytest.mark.parametrize("interrupts", [1, 2])
 def test_ctrl_c_says_how_to_go_on(interrupts: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Exit code 130 and the sentence that the same command goes on, after one Ctrl-C or a second one."""
+    """Exit code 130 and a hint to run the same command again, after one Ctrl-C or a second one."""
     runner = PlayedRunner(tmp_path, interrupts)
     monkeypatch.setattr(morphcore.paper, "paper_runner", lambda *_: runner)
     before = signal.getsignal(signal.SIGINT)
@@ -130,7 +130,7 @@ def _started(folder: Path) -> subprocess.Popen[str]:
 def test_the_quick_form_from_end_to_end(tmp_path: Path) -> None:
     """Interrupted once, it goes on and ends within five minutes of work; a third run has nothing to do.
 
-    The page holds all tables and figures and asks for nothing outside. Of the figures asked for, those that
+    The page contains all tables and figures and no external references. Of the required figures, those that
     do not depend on the machine's speed are met.
     """
     first = _started(tmp_path)
@@ -160,7 +160,7 @@ def test_the_quick_form_from_end_to_end(tmp_path: Path) -> None:
     third = _started(tmp_path)
     again, errors = third.communicate(timeout=MAX_QUICK_S)
     assert third.returncode == Exit.OK, errors
-    assert json.loads(again) == summary, "nothing was measured anew"
+    assert json.loads(again) == summary, "nothing was measured again"
     assert time.monotonic() - begin < 30.0
 
 

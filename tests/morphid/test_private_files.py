@@ -1,4 +1,4 @@
-"""What holds secrets is nobody else's from its first byte, however careless the process that asks for it."""
+"""Files with secrets are private from their first byte, however careless the requesting process."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_keys_and_copies(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_somebody_else_is_left_and_said(tmp_path: Path) -> None:
-    """Where other things lie, the folder keeps its mode, and one sentence tells what that means."""
+    """Where other things lie, the folder keeps its mode, and a sentence explains what that means."""
     (tmp_path / "thesis.tex").touch()
     tmp_path.chmod(0o755)
     code = (

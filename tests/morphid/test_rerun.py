@@ -1,4 +1,4 @@
-"""``morphid jobs rerun``: what was asked for is asked again, as it was or changed."""
+"""``morphid jobs rerun``: a request is posted again, unchanged or changed."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_changes_are_made_where_they_point(play: Play) -> None:
 
 @pytest.mark.parametrize(("ending", "code"), [("succeeded", Exit.OK), ("failed", Exit.FAILED)])
 def test_it_can_be_followed(play: Play, ending: str, code: Exit) -> None:
-    """With --watch the exit code tells how the new job ended."""
+    """With --watch the exit code is that of the new job's outcome."""
     play(PlayedService("identify", RESULT, ending, request=REQUEST))
     done = RUNNER.invoke(app, ["jobs", "rerun", "job_1", "--watch", "--url", "http://morphid"])
     assert done.exit_code == code, done.output

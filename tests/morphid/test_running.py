@@ -34,7 +34,7 @@ class PlayedWork:
 
     Parameters
     ----------
-    request : what was asked.
+    request : the request.
     best : of the interrupted work.
     """
 
@@ -119,7 +119,7 @@ def test_a_refusal_names_the_option(
     pointer: str,
     option: str,
 ) -> None:
-    """What the library refuses by its JSON pointer is told with the option that brought it in."""
+    """A refusal of the library by JSON pointer is reported with the option that set the field."""
 
     def refuse(_request: Document) -> PlayedWork:
         raise InvalidInput("it will not do", pointer=pointer, hint="do better")

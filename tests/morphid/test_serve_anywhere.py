@@ -45,7 +45,7 @@ class Life:
     announced : what it said when a child died.
     imported : modules of the working folder that anybody imported.
     watch : every file and folder of the data folder with all modes that it ever had.
-    commands : by name, the ends of commands that a user ran beside it.
+    commands : by name, the outcomes of commands that a user ran meanwhile.
     """
 
     base: Path
@@ -167,7 +167,7 @@ def test_nothing_of_the_working_folder_is_imported(life: Life) -> None:
 
 
 def test_a_service_lives_in_a_folder_of_any_name(life: Life) -> None:
-    """`serve` with all its children; its keys are made from beside it; nothing lies anywhere else."""
+    """`serve` with all its children; keys are made from another process; no files are created elsewhere."""
     for name in ("keys", "ready"):
         assert life.commands[name].returncode == 0, life.commands[name]
     assert {each.name for each in life.base.iterdir()} == {FOLDER_NAMES[0]}

@@ -27,7 +27,7 @@ FLIGHTS = [f"train_rate_{rate}" for rate in ("0.2", "0.5", "0.8")]
 
 
 def samples_of(played: PlayedService, *words: str) -> list[tuple[str, str]]:
-    """Names and roles that a service is asked with."""
+    """Names and roles in a request to a service."""
     ended = RUNNER.invoke(app, command(played.operation, *words, *URL))
     assert ended.exit_code == 0, ended.output
     return [(item["name"], item["role"]) for item in played.body["samples"]]

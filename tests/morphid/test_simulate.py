@@ -46,7 +46,7 @@ def test_a_flight_is_the_librarys_and_a_sample_again(tmp_path: Path) -> None:
         dict.fromkeys(("left", "right"), ConstantRate(0.0, 0.6, 0.3)),
         model=parameters_from_document(PARAMETERS),
         duration_s=0.5,
-        lattice=Lattice(chordwise=1, spanwise=4),  # the one that stands beside the parameters
+        lattice=Lattice(chordwise=1, spanwise=4),  # the one given with the parameters
     ).trajectory
     # nine digits are written
     np.testing.assert_allclose(written.euler, flown.euler, rtol=0.0, atol=1e-9)
@@ -184,3 +184,15 @@ def test_the_service_flies_the_same(live_service: LiveService, tmp_path: Path) -
         ended = RUNNER.invoke(app, command("simulate", *words, *more, "--out", tmp_path / f"{name}.csv"))
         assert ended.exit_code == Exit.OK, ended.output
     assert (tmp_path / "here.csv").read_bytes() == (tmp_path / "there.csv").read_bytes()
+
+
+def test_a_rate_on_an_aircraft_with_several_drives_asks_for_the_drive() -> None:
+    """The hint names the option and the drives to choose from, and the command that it gives is accepted."""
+    aircraft = EXAMPLES / "two_hinges" / "aircraft.json"
+    line = command("simulate", "--rate", "1", "--final", "0.2", "--duration", "0.1")
+    line[line.index("--aircraft") + 1] = str(aircraft)
+    ended = RUNNER.invoke(app, line)
+    assert ended.exit_code == Exit.INVALID_INPUT
+    said = " ".join(ended.stderr.split())
+    assert "--drive sweep" in said
+    assert "fold" in said

@@ -73,7 +73,7 @@ def test_a_long_life_forgives_the_past(tmp_path: Path) -> None:
 
 
 def test_the_report_names_the_cause(tmp_path: Path) -> None:
-    """Exit codes and signals are told by name, and the log keeps the child's last words."""
+    """Exit codes and signals are reported by name, and the log keeps the child's last output."""
     overseer, said = supervisor(tmp_path)
     child = overseer.start(ChildSpec("quitter", QUITTER))
     assert not overseer.wait_until(child, lambda: False, 10.0), "a dead child never becomes ready"

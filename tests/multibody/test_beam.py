@@ -313,7 +313,7 @@ def test_weight_hangs_the_beam_by_its_mass() -> None:
 
 
 def test_a_beam_bent_too_far_says_so() -> None:
-    """An element that turns by more than 1.5 rad is an error that tells what to do."""
+    """An element that turns by more than 1.5 rad is an error with a remedy."""
     box = Box()
     beams, poses = straight(box.section(), box.length, 1)
     poses.move(np.array([[0.0] * 6, [1.6, 0.0, 0.0, 0.0, 0.0, 0.0]]))

@@ -96,7 +96,7 @@ def test_mass_matrix_is_the_hessian_of_the_kinetic_energy(seed: int) -> None:
 @LAWS
 @given(SEEDS)
 def test_accelerations_need_no_effort(seed: int) -> None:
-    """Inverse dynamics of the forward dynamics' answer asks for no effort."""
+    """Inverse dynamics of the forward dynamics' solution requires no forces."""
     case = Case(seed)
     effort = inverse_dynamics(case.tree, case.motion, case.acceleration, case.wrench, GRAVITY_N)
     loads = np.abs(bias(case.tree, case.motion, case.wrench, GRAVITY_N)).max()

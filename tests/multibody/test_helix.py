@@ -9,9 +9,9 @@ from scipy.linalg import expm, solve
 from morphcore.frames import skew
 from morphcore.multibody.kernels import helix as helix_kernels
 from morphcore.multibody.kernels.helix import TERMS
-from tests.kernels import doors
+from tests.kernels import module_from_python
 
-helix = doors(helix_kernels)
+helix = module_from_python(helix_kernels)
 
 RNG = np.random.default_rng(17)
 

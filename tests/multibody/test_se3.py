@@ -8,9 +8,9 @@ from scipy.linalg import expm
 
 from morphcore.frames import skew
 from morphcore.multibody.kernels import se3 as se3_kernels
-from tests.kernels import doors
+from tests.kernels import module_from_python
 
-se3 = doors(se3_kernels)
+se3 = module_from_python(se3_kernels)
 
 RNG = np.random.default_rng(5)
 ANGLES = (1e-9, 1e-4, 0.03, 0.4, 1.4)  # rad: below, at and above the switches between series and closed forms

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore import frames
-from tests.kernels import doors
+from tests.kernels import module_from_python
 from tests.multibody.trees import random_inertia
 from tests.oracles.kernels import spatial as spatial_kernels
 
-spatial = doors(spatial_kernels)
+spatial = module_from_python(spatial_kernels)
 
 SEEDS = st.integers(0, 2**32 - 1)
 LAWS = settings(max_examples=30, deadline=None)  # no deadline: the first example compiles

@@ -29,7 +29,7 @@ def optimisation(
     search: ScheduleSettings = QUICK,
     **options: Any,
 ) -> ScheduleOptimisation:
-    """An optimisation with the physical guess of the example aircraft; no flexible flights unless asked."""
+    """An optimisation with the physical guess of the reference aircraft; flexible flights only on request."""
     parameters = physical_guess(chain_model(reference_aircraft(), reference_flight(), links))
     return ScheduleOptimisation(
         reference_aircraft(),

@@ -24,7 +24,7 @@ NO_LIMIT = TorqueLimit(None)
 class Bench:
     """Flights replaced by formulas: errors curve gently about a wanted point, torques are linear in it.
 
-    Every asked point is remembered.
+    Every requested point is recorded.
     """
 
     def __init__(self, wanted=LATE, max_nm=None, space=SPACE):
@@ -46,7 +46,7 @@ class Bench:
 
     @property
     def flown(self):
-        """All points asked for, (n, d)."""
+        """All requested points, (n, d)."""
         return np.concatenate(self.requested)
 
 
@@ -151,7 +151,7 @@ def test_starts_rest_when_they_stall_or_fall_behind():
 
 @pytest.mark.parametrize("knots", [4, 6, 12, 20])
 def test_probes_keep_the_limits_at_every_corner(knots):
-    """Beside schedules at their limits there are probes that keep them, along every unknown."""
+    """Near schedules at their limits there are feasible probes along every unknown."""
     space = MorphSpace(
         Morph(final_rad=1.0, duration_s=2.0, knots=knots),
         Limits(max_rate_rad_s=1.0, max_accel_rad_s2=8.0),

@@ -135,7 +135,7 @@ def test_the_constant_rate_keeps_the_limits_wherever_a_spline_does(limits, durat
 
 
 def test_reached_extremes_are_those_of_the_flown_spline():
-    """Closed forms of a finished schedule against 20,000 samples of it; one that turns back is told."""
+    """Closed forms of a finished schedule against 20,000 samples of it; one that reverses is detected."""
     rng = np.random.default_rng(0)
     for _ in range(20):
         time = np.concatenate([[0.0], np.sort(rng.uniform(0.2, 1.8, 4)), [2.0]])

@@ -97,7 +97,7 @@ def test_weights_count_each_angle():
 
 
 def test_torques_come_without_changing_the_flight(flights):
-    """With torques asked for the departures are the same to the bit; the jolt of short ramps shows."""
+    """With torques requested the departures are bit-identical; the jolt of short ramps shows."""
     plain, full = flights.fly(SCHEDULES, torque=False), flights.fly(SCHEDULES, torque=True)
     np.testing.assert_array_equal(plain.departure, full.departure)
     assert plain.torque.shape == (3, 0)

@@ -91,7 +91,7 @@ def test_the_front_spans_from_the_shortest_to_the_given_duration(points):
 
 
 def test_a_duration_between_samples_is_looked_at_too():
-    """The longest duration is the one that was asked for, whole samples or not."""
+    """The longest duration is the requested one, whether a whole number of samples or not."""
     assert (
         durations(
             Morph(final_rad=1.0, duration_s=1.996, goal="minimum_time", max_variation_rad2=1.0), SHORTEST_S

@@ -140,7 +140,7 @@ def test_waiting_schedules_wait():
 
 
 def test_the_last_angle_is_exact():
-    """A schedule ends at the angle that was asked for, not beside it by round-off."""
+    """A schedule ends exactly at the requested angle, without round-off."""
     space = MorphSpace(Morph(final_rad=0.7, duration_s=1.1, initial_rad=0.1, knots=7), Limits(), 1.1)
     schedule = space.schedule(space.centre)
     assert schedule.knot_angle_rad[0] == 0.1

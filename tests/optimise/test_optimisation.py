@@ -48,7 +48,7 @@ def without_times(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def by_simulation(schedule: Any, model: Any, end_s: float) -> np.ndarray:
-    """Departures (k, 3) of a schedule flown by the simulator's front door."""
+    """Departures (k, 3) of a schedule flown by `simulate`."""
     flown = fly(
         reference_aircraft(),
         reference_flight(),
@@ -138,7 +138,7 @@ def test_resumes_from_any_step_to_the_identical_result(
 
 
 def test_every_step_has_a_result() -> None:
-    """From the first step on there is a best so far; it never gets dearer, and the fraction rises to one."""
+    """From the first step on there is a best so far; its cost never rises, and the fraction rises to one."""
     run = optimisation()
     steps = list(run.steps())
     best = [step.best_cost for step in steps]

@@ -52,7 +52,7 @@ def test_extrema_are_those_of_dense_sampling(knots):
 
 
 def test_knots_out_of_order_give_finite_numbers():
-    """A search may ask about knots that are not in order; the answer is a number, not a warning."""
+    """A search may evaluate knots that are out of order; the result is a number without a warning."""
     shapes = clamped_shapes(np.array([[0.0, 0.7, 0.3, 1.0]]), np.array([[0.0, 0.3, 0.6, 1.0]]))
     for part in (shapes.rate, shapes.first, shapes.turning_rate(), shapes.turning_values()):
         assert np.all(np.isfinite(part))

@@ -6,7 +6,7 @@ before it, at its own anchor. The world's axes stay those of N, with z down; gra
 model.
 
 Names: body ``body_<b>`` (only bodies with mass), joint ``base``, ``joint_<coordinate>``, ``hinge_<hinge>``.
-The prescribed hinges are plain joints: whoever drives the model sets their motion.
+The prescribed hinges are plain joints: the caller sets their motion.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The stage runner: what is kept, what is made anew, where it goes on."""
+"""The stage runner: what is kept, what is recomputed, and where it continues."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_an_interrupted_stage_goes_on_from_its_checkpoint(tmp_path: Path) -> Non
 
 
 def test_a_killed_run_finds_a_recent_checkpoint(tmp_path: Path) -> None:
-    """Checkpoints are written on the way, not only when the runner is told to stop."""
+    """Checkpoints are written on the way, not only when the runner is stopped."""
     works, stages = chain()
     hours = iter([3600.0 * i for i in range(100)])
     steps = StageRunner(stages, tmp_path, clock=lambda: next(hours)).steps()
@@ -139,7 +139,7 @@ def test_stages_out_of_order_are_refused(tmp_path: Path) -> None:
 
 
 def test_the_file_tells_where_it_was_made(tmp_path: Path) -> None:
-    """Machine and inputs stand beside the result; the machine is not part of the key."""
+    """Machine and inputs are stored with the result; the machine is not part of the key."""
     _, stages = chain()
     first = StageRunner(stages, tmp_path, where={"machine": "here"})
     list(first.steps())

@@ -48,7 +48,7 @@ class Formula:
         return Batch(self.known)
 
     def evaluate(self, batch: Batch, stop: Stop | None) -> Outcome:
-        """Evaluate the formula; a stop is asked first."""
+        """Evaluate the formula; a stop is checked first."""
         if stop is not None and stop():
             raise Interrupted
         self.evaluated.append(batch.points)

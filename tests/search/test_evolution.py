@@ -1,4 +1,4 @@
-"""CMA-ES: it arrives, goes on from what it was told, and leaves no trace."""
+"""CMA-ES: it converges, resumes from the costs it received, and has no side effects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_reaches_the_least_point_of_the_box(d: int) -> None:
 
 
 def test_goes_on_from_what_it_was_reported() -> None:
-    """Another strategy, told the same costs, asks for the same points; so does one told otherwise between."""
+    """Another strategy given the same costs requests the same points, even after other costs in between."""
     settings, problem = EvolutionSettings(particles=12, generations=9), unit_cube(ellipsoid, np.full(6, 0.4))
     first, other = (EvolutionStrategy(problem, settings, 3) for _ in range(2))
     state = searched(problem, first)[-2].solver

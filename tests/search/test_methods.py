@@ -89,7 +89,7 @@ def test_the_best_only_gets_better_and_progress_rises(make: Make) -> None:
 
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 def test_tasks_evaluated_elsewhere_are_the_search_itself(make: Make) -> None:
-    """Where a step needs costs alone, told them it goes on to the state that the loop goes to."""
+    """If a step needs costs only, receiving them leads to the same state as the loop."""
     problem = unit_cube(wavy, GUESS)
     states = searched(problem, make(problem))
     requested = 0

@@ -1,7 +1,7 @@
 """Free flights in MuJoCo with profile drag on the links: wings forced by the air, prescribed hinges.
 
-The dynamics are MuJoCo's alone (tests/multibody/mujoco_flight.py); the drag is written anew from the
-velocities that MuJoCo reports.
+The dynamics are MuJoCo's alone (tests/multibody/mujoco_flight.py); the drag is implemented independently from
+the velocities that MuJoCo reports.
 """
 
 from __future__ import annotations

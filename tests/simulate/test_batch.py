@@ -51,7 +51,7 @@ def again(flown, index):
 
 
 def test_company_does_not_matter(flown):
-    """A flight is bit for bit the same alone, in another order, and beside others."""
+    """A flight is bit-identical alone, in another order, and together with others."""
     states = flown[3].states
     particles = states.shape[1]
     order = np.random.default_rng(1).permutation(particles)

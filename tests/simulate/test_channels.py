@@ -269,7 +269,7 @@ def test_service_and_library_refuse_the_same(
 
 
 def test_no_channels_are_no_columns() -> None:
-    """An empty list is a request too; the start's tips are told all the same."""
+    """An empty list is a request too; the start's tips are reported all the same."""
     found = flown("equivalent", [], duration_s=0.05)
     assert found.trajectory.extra == {}
     assert found.start_tips_z["left"] < -0.01

@@ -75,7 +75,7 @@ def test_a_trimmed_aircraft_flies_on() -> None:
 
 
 def test_halving_the_step_changes_nothing() -> None:
-    """Attitude at 1 ms and at 0.5 ms differ by less than 1e-5 rad (asked: 1e-4)."""
+    """Attitude at 1 ms and at 0.5 ms differ by less than 1e-5 rad (required: 1e-4)."""
     assert np.abs(flown(0.001) - flown(0.0005)).max() < 1e-5
 
 
@@ -89,7 +89,7 @@ def test_what_a_step_keeps_does_not_show(monkeypatch: pytest.MonkeyPatch) -> Non
 
     def renewing(run: flexible.FlexibleRun, row: int) -> None:
         while run.row < row:
-            run._scratch.inverse[:] = 0.0  # so that each step asks for one
+            run._scratch.inverse[:] = 0.0  # so that each step requests one
             fly_to(run, run.row + 1)
 
     monkeypatch.setattr(flexible.Stepper, "coefficients", exact)
@@ -107,7 +107,7 @@ def test_the_stepper_is_of_second_order() -> None:
 
 
 def test_doubling_the_elements_changes_nothing() -> None:
-    """Ten elements a wing hold attitude to 1e-5 rad against twenty (asked: 1e-3)."""
+    """Ten elements a wing hold attitude to 1e-5 rad against twenty (required: 1e-3)."""
     assert np.abs(flown() - flown(elements=20)).max() < 1e-5
 
 
@@ -177,7 +177,7 @@ def test_other_aircraft_fly_as_the_rigid_model_does(aircraft: dict[str, Any], fi
 def test_chains_of_more_links_tend_to_the_beams() -> None:
     """Tip deflection at trim: nominal chains stand for the whole beam, and miss it as 1 / (n - 1)^2.
 
-    Three links are within 5 per cent. Of eight, what is left is what chains and beams differ in beside the
+    Three links are within 5 per cent. Of eight, the rest is what chains and beams differ in besides the
     number of links: 1 per cent, the chain's lattice is not bent.
     """
     beams = trimmed_tip(simulate_hold("flexible"))

@@ -1,4 +1,4 @@
-"""One flight through the front door: kinematics, symmetry, limits, files, refusals."""
+"""One flight with `simulate`: kinematics, symmetry, limits, files, refusals."""
 
 from __future__ import annotations
 

@@ -192,5 +192,5 @@ def test_wings_of_their_own_need_the_whole() -> None:
     """Half an aircraft refuses parameters that differ from wing to wing."""
     model = example_model(2)
     assert model.half is not None
-    with pytest.raises(InvalidInput, match="of 2 wings"):
+    with pytest.raises(InvalidInput, match="for 2 wings"):
         lane_constants(model.half, physical_guess(model, separate_wings=True), 0.005)

@@ -1,4 +1,4 @@
-"""Surfaces on several hinges and about any axis: against independent dynamics, and what symmetry asks."""
+"""Surfaces on several hinges and about any axis: against independent dynamics and symmetry."""
 
 from __future__ import annotations
 

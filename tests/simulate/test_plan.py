@@ -173,7 +173,7 @@ def test_a_common_path_refuses_what_leaves_its_range():
 
 @pytest.mark.parametrize("times", [0, 1, 3])
 def test_a_coarser_plan_is_the_plan_of_the_coarser_grid(times):
-    """Motion, wind and lattice at steps and middles are those that planning anew gives."""
+    """Motion, wind and lattice at steps and middles are those of a new plan."""
     model = example_model(2)
     schedules = [ConstantRate(0.0, 0.5, 0.4, start_s=0.1, ramp_s=0.1), Hold()]
     grid = time_grid(np.linspace(0.0, 0.6, 61))

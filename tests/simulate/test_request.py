@@ -1,4 +1,4 @@
-"""Flights from request documents: what they ask for is flown, and told in the names of the API."""
+"""Flights from request documents: flown as requested, and reported with the names of the API."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_the_variation_does_not_hang_on_the_rows() -> None:
 
 
 def test_identified_parameters_fly_with_what_they_were_identified_with() -> None:
-    """Lattice, step and start stand beside an identification's parameters; the request may overrule them."""
+    """Lattice, step and start come with an identification's parameters; the request may override them."""
 
     def flown(**model: Any) -> FlownWith:
         return flown_with(SimulateRequest.parse(request(model={"kind": "equivalent", **model})).model)

@@ -125,12 +125,12 @@ def test_tables_do_as_well_as_the_schedule_they_tabulate():
 
 
 def test_a_table_keeps_its_rows_and_its_flat_parts():
-    """Every row is met; where the table is flat the hinge is at rest, without overshoot beside a corner."""
+    """Every row is met; where the table is flat the hinge is at rest, without overshoot next to a corner."""
     times = np.linspace(0.0, 2.0, 41)
     angles = np.clip(times - 0.5, 0.0, 1.0)
     schedule = Tabulated(times, angles)
     np.testing.assert_allclose(schedule.motion(times).angle, angles, atol=1e-15)
-    rest = np.linspace(0.0, 0.45, 91)  # flat, but for the last row beside the corner
+    rest = np.linspace(0.0, 0.45, 91)  # flat, except for the last row next to the corner
     np.testing.assert_allclose(schedule.motion(rest).angle, 0.0, atol=1e-15)
     np.testing.assert_allclose(schedule.motion(rest).rate, 0.0, atol=1e-13)
     everywhere = schedule.motion(np.linspace(0.0, 2.0, 4001)).angle

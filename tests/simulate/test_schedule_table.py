@@ -47,8 +47,8 @@ def test_units_stand_in_the_names(tmp_path: Path) -> None:
 def test_a_written_schedule_is_read_back(tmp_path: Path) -> None:
     """A spline sampled every 10 ms and read back moves the hinge alike.
 
-    The interpolation is off by 2e-6 rad beside the end, where the acceleration jumps by 3 rad/s^2;
-    a straight line between two rows would be off by (10 ms)^2 / 8 * 3 rad/s^2 = 4e-5 rad there.
+    The interpolation is off by 2e-6 rad next to the end, where the acceleration jumps by 3 rad/s^2; a
+    straight line between two rows would be off by (10 ms)^2 / 8 * 3 rad/s^2 = 4e-5 rad there.
     """
     spline = Spline(np.array([0.0, 0.7, 1.4, 2.0]), np.array([0.0, 0.2, 0.9, 1.0]))
     path = tmp_path / "s.csv"

@@ -176,7 +176,7 @@ def test_energy_of_a_tumbling_rigid_aircraft_to_round_off():
 
 @pytest.mark.parametrize("links", [1, 3, 8])
 def test_accelerations_balance_momentum_and_power_to_round_off(links):
-    """Without air and thrust, what the lanes' accelerations ask of the outside is nothing.
+    """Without air and thrust, the lanes' accelerations require no external forces.
 
     By Newton and Euler's recursion the rate of change of momentum is the wrench on the base, and the power
     that goes into kinetic and elastic energy is that wrench's plus the joints' plus the hinges': with

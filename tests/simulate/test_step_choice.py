@@ -1,4 +1,4 @@
-"""The step chosen for given flights holds its tolerance, and asks for no shorter one than needed."""
+"""The step chosen for given flights meets its tolerance, and is no shorter than needed."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_turbulence_does_not_choose():
 
 @pytest.mark.parametrize("start_s", [0.0, 40.0, 99.0])
 def test_of_a_long_flight_the_fastest_morph_is_looked_at(start_s):
-    """As much as asked for, around the fastest morph, out of the flight's own rows."""
+    """The requested length, around the fastest morph, from the flight's own rows."""
     times_s = np.linspace(0.0, 100.0, 1001)
     slow, fast = ConstantRate(0.0, 0.1, 20.0, start_s=20.0), ConstantRate(0.0, 0.5, 0.5, start_s=start_s)
     part = busiest_part([slow, fast], times_s, 10.0)

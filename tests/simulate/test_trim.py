@@ -61,8 +61,8 @@ def test_forces_balance_by_an_independent_sum():
     """Weight is borne by the air and thrust: what the trim's thrust leaves of it is the lattice's lift.
 
     Sum over the whole aircraft by Newton and Euler's recursion on the separately built tree, at rest, under
-    gravity: the wrench it asks for is thrust plus air. With the air's lift known from the dynamic pressure
-    and the trimmed lift coefficient of flat wings, they agree.
+    gravity: the required wrench is thrust plus air. With the air's lift known from the dynamic pressure and
+    the trimmed lift coefficient of flat wings, they agree.
     """
     model = example_model(3)
     batch = physical_guess(model)

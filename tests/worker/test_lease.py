@@ -41,7 +41,7 @@ def test_work_that_never_stops_ends_its_process(queue: Queue, database: Database
 
 
 def test_work_that_stops_in_time_is_left_alone(queue: Queue, database: Database) -> None:
-    """Work that heeds its stop signal ends with its process alive."""
+    """Work that follows its stop signal ends with its process alive."""
     job_id = queue.add()
     ended = threading.Event()
     with database.write() as connection:

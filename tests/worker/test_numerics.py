@@ -103,7 +103,7 @@ def test_a_home_is_enough(
 
 
 def test_kernels_warm_up_once() -> None:
-    """However often a process asks, the kernels are made ready once."""
+    """However often a process starts them, the kernels are prepared once."""
     calls: list[int] = []
     kernels = Kernels(calls.append, threads=2)
     kernels.start()
@@ -113,7 +113,7 @@ def test_kernels_warm_up_once() -> None:
 
 
 def test_waiting_for_kernels_can_be_stopped() -> None:
-    """A wait for the compiler ends when it is told to."""
+    """A wait for the compiler ends on a stop."""
     release = threading.Event()
     kernels = Kernels(lambda _threads: release.wait(10.0), threads=1)
     assert not kernels.wait(lambda: True, poll_s=0.01)
@@ -121,7 +121,7 @@ def test_waiting_for_kernels_can_be_stopped() -> None:
 
 
 def test_a_failing_warm_up_does_not_block() -> None:
-    """When the kernels cannot be made ready, the job itself meets the trouble and reports it."""
+    """If the kernels cannot be prepared, the job itself fails and reports it."""
 
     def broken(_threads: int) -> None:
         raise OSError("no cache directory")

@@ -26,7 +26,7 @@ def test_rate_and_remaining_time_are_those_of_this_attempt() -> None:
 
 
 def test_work_without_flights_has_no_rate() -> None:
-    """A single flight counts none: its remaining time is told, a rate of zero is not."""
+    """A single flight counts none: its remaining time is shown, but not a rate of zero."""
     pace = Pace(ticking().__next__)
     pace.progress(Step({"fraction": 0.0}, b""))
     second = pace.progress(Step({"fraction": 0.5}, b""))

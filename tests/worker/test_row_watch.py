@@ -15,7 +15,7 @@ from worker.row_watch import ANSWER_WITHIN_S, RowWatch, work_waits
 
 
 class FakeWorker:
-    """A worker with one slot, whose pool keeps what it is asked."""
+    """A worker with one slot, whose pool records its tasks."""
 
     use_eventloop = True
 
@@ -69,7 +69,7 @@ def test_waiting_work_wakes_the_worker(worker: FakeWorker, watch: RowWatch, woke
 def test_a_busy_worker_does_not_look(
     worker: FakeWorker, watch: RowWatch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While all slots are taken nobody is asked, and nobody owes an answer."""
+    """While all slots are taken no check is sent, and no answer is pending."""
     monkeypatch.setattr(state, "reserved_requests", {"a request"})
     watch._look(worker)
     worker.now += 3600.0
@@ -78,7 +78,7 @@ def test_a_busy_worker_does_not_look(
 
 
 def test_children_that_do_not_answer_are_known(worker: FakeWorker, watch: RowWatch) -> None:
-    """One question at a time, another after a while; how long none was answered is told, until one is."""
+    """One check at a time, another after a while; the time without an answer is reported until one comes."""
     for _ in range(3):
         watch._look(worker)
         worker.now += 1.0

@@ -83,7 +83,7 @@ def test_the_most_urgent_job_runs_first(queue: Queue, make_runner: MakeRunner) -
 def test_stop_and_resume_give_the_undisturbed_result(
     queue: Queue, database: Database, make_runner: MakeRunner
 ) -> None:
-    """A worker told to end hands its job back; the next one ends it with the undisturbed result."""
+    """A worker that shuts down hands its job back; the next one ends it with the undisturbed result."""
     job_id = queue.add(pause_s=0.05)
     assert make_runner(shutting_down=StopAfter(0.4)).run_next() == (Ending.RELEASED, job_id)
     released = queue.job(job_id)

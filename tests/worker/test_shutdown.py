@@ -1,4 +1,4 @@
-"""The children of a worker learn of its end, and nobody else can tell them."""
+"""The children of a worker are informed of its shutdown, and by no one else."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _armed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def seen_in_a_child() -> bool:
-    """Fork as Celery's pool does, and ask there."""
+    """Fork as Celery's pool does, and check there."""
     child = os.fork()
     if child == 0:
         os._exit(int(shutdown.announced()))

@@ -22,6 +22,8 @@ from worker.operations.library_work import SearchWork, shown
 
 Array = NDArray[np.float64]
 
+POSTERIOR_FILE = "posterior.npz"
+
 
 class IdentificationWork(SearchWork):
     """An identification whose generations can be flown in parts by several workers."""
@@ -59,7 +61,8 @@ def begin(request: Document, threads: int) -> SearchWork:
 
 def _files(result: IdentifyResult, document: Document) -> dict[str, bytes]:
     curves = result.curves()
-    return {**identification_plots(document, curves), **curve_tables(curves)}
+    drawn = {} if result.posterior is None else {POSTERIOR_FILE: result.posterior.to_file()}
+    return {**identification_plots(document, curves), **curve_tables(curves), **drawn}
 
 
 def _packed(values: Array) -> bytes:

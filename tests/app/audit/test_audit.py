@@ -128,7 +128,7 @@ def test_what_is_rolled_back_was_never_done(database: Database) -> None:
 
 
 def test_old_deeds_are_forgotten(database: Database) -> None:
-    """Retention removes what is older than it keeps, by the database's clock, and tells how much."""
+    """Retention removes entries older than its limit, by the database's clock, and reports their number."""
     with database.write() as session:
         for number in range(3):
             repository.insert_entry(session, Action.JOB_POST, owner="lab", target=f"job_{number}")

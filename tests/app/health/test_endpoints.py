@@ -58,7 +58,7 @@ def submitted(service: RunningService) -> str:
 def test_without_broker_and_workers_the_service_is_degraded(any_service: RunningService) -> None:
     """Jobs are taken and kept while broker and workers are away: 200, and the truth about each part.
 
-    Who asks strictly is told 503.
+    A strict check returns 503.
     """
     assert any_service.client.get("/livez").json()["status"] == "alive"
     answer = any_service.client.get("/readyz")
@@ -73,7 +73,7 @@ def test_without_broker_and_workers_the_service_is_degraded(any_service: Running
 
 
 def test_metrics_count_jobs(any_service: RunningService) -> None:
-    """Rows and metrics tell the same: depth of the queue, attempts, ends, lost leases, waits, run times."""
+    """Rows and metrics agree: depth of the queue, attempts, ends, lost leases, waits, run times."""
     first, second = submitted(any_service), submitted(any_service)
     submitted(any_service)
     claim = any_service.claim(first)
@@ -101,7 +101,7 @@ def test_metrics_count_jobs(any_service: RunningService) -> None:
 
 
 def test_requests_are_measured_by_route(service: RunningService) -> None:
-    """However many jobs there are, the route is one; whoever waits for an end does not spoil the latency."""
+    """The route label does not depend on the number of jobs; waiting requests do not distort the latency."""
     job = submitted(service)
     route = (("method", "GET"), ("route", "/jobs/{job_id}"))
 
@@ -140,7 +140,7 @@ def equipped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running
 
 
 def parts(service: RunningService) -> tuple[str, str, str]:
-    """Ask for readiness anew: whole, broker, workers."""
+    """Request readiness again: overall, broker, workers."""
     reported = service.client.get("/readyz").json()
     return reported["status"], reported["broker"], reported["workers"]["status"]
 

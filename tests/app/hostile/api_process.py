@@ -120,7 +120,7 @@ def api_process(folder: Path, **settings: object) -> Iterator[ApiProcess]:
 
 @dataclass
 class Onlooker:
-    """Asks for /livez over and over beside an attack; measures the slowest answer and the highest memory."""
+    """Requests /livez repeatedly during an attack; measures the slowest answer and the highest memory."""
 
     api: ApiProcess
     slowest_s: float = 0.0

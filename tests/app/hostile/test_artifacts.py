@@ -31,7 +31,7 @@ def finished(service: RunningService) -> str:
 
 @pytest.mark.parametrize("name", NASTY_NAMES)
 def test_nasty_names_are_not_stored(service: RunningService, finished: str, name: str) -> None:
-    """A worker that is told to store such a name fails; the database never sees it."""
+    """A worker that stores such a name fails; the database never sees it."""
     with service.database.write() as session, pytest.raises(ValueError, match="plain file name"):
         store_artifacts(session, finished, {name: b"x"})
 

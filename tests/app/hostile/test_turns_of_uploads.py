@@ -80,7 +80,7 @@ def test_one_owners_bombs_hold_up_nobody_else(keyed: RunningService, bombs: list
         start = time.monotonic()
         assert upload(client, "x.csv", FLIGHT) == 201
         took_s = time.monotonic() - start
-        print(f"a small upload beside {BOMBS} bombs of another owner: {took_s:.2f} s")
+        print(f"a small upload next to {BOMBS} bombs of another owner: {took_s:.2f} s")
         assert took_s < OTHERS_WAIT_S
         assert len(bombs) < BOMBS, "nobody waited"
         assert {answer.result() for answer in sent} <= {422, 503}

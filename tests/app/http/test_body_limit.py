@@ -59,5 +59,5 @@ def test_body_at_the_limit_passes(service: RunningService) -> None:
 
 
 def test_nonsense_length_is_survived(service: RunningService) -> None:
-    """A service that was told nonsense goes on."""
+    """A service survives nonsensical requests."""
     assert service.client.get("/livez", headers={"X-Long": "x" * 5000}).status_code == 200

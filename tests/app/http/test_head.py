@@ -41,7 +41,7 @@ def known(service: RunningService) -> Document:
 
 
 def readable_paths() -> Iterator[str]:
-    """Every path of the OpenAPI document that has GET, and the pages and files beside it."""
+    """Every path of the OpenAPI document that has GET, and the pages and static files."""
     for path, operations in routed_app().openapi()["paths"].items():
         if "get" in operations:
             yield path

@@ -79,7 +79,7 @@ def test_a_form_on_another_site_posts_nothing(service: RunningService) -> None:
 
 
 def test_links_to_the_service_work(service: RunningService) -> None:
-    """Whoever follows a link from elsewhere, or types the address, gets the page."""
+    """A user who follows a link from elsewhere, or types the address, gets the page."""
     for site in ("cross-site", "same-site", "none"):
         headers = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
         assert status(service, "GET", "/", headers) == 200
@@ -96,7 +96,7 @@ def test_the_services_own_page_and_programs_are_let_in(service: RunningService) 
 
 
 def test_no_answer_opens_the_service_to_other_sites(service: RunningService) -> None:
-    """There is no CORS header, not even for a preflight that asks nicely."""
+    """There is no CORS header, not even for a valid preflight request."""
     requested = {"Origin": "https://evil.example", "Access-Control-Request-Method": "POST"}
     requested |= {"Access-Control-Request-Headers": "authorization"}
     for headers in (requested, {}):
@@ -164,7 +164,7 @@ def test_refusals_are_problem_documents(service: RunningService) -> None:
 
 
 def test_a_service_with_keys_still_refuses_foreign_pages(tmp_path: Path) -> None:
-    """A page of another site gets no answer that tells whether a key is valid."""
+    """A page of another site cannot find out whether a key is valid."""
     url = f"sqlite:///{tmp_path / 'service.sqlite3'}"
     with running_service(Settings(database_url=url, broker_url=DEAD_BROKER, auth="keys")) as keyed:
         assert status(keyed, "GET", "/jobs", {"Sec-Fetch-Site": "cross-site"}) == 403

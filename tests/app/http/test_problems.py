@@ -34,7 +34,7 @@ from tests.app.running_service import RunningService
 def test_every_refusal_is_a_problem(
     service: RunningService, method: str, path: str, status: int, code: str
 ) -> None:
-    """Whoever refuses, router, schema or store: the same kind of document with a stable code."""
+    """Refusals by router, schema or store are all the same kind of document with a stable code."""
     answer = service.client.request(method, path)
     assert answer.status_code == status
     assert answer.headers["content-type"] == "application/problem+json"
@@ -53,7 +53,7 @@ def test_every_refusal_is_a_problem(
     ],
 )
 def test_allow_header_names_every_method(service: RunningService, path: str, allow: str) -> None:
-    """405 tells all methods that the path has."""
+    """405 lists all methods of the path."""
     answer = service.client.put(path)
     assert (answer.status_code, answer.headers["allow"]) == (405, allow)
 

@@ -53,7 +53,7 @@ def test_pages_run_their_own_scripts_only(service: RunningService) -> None:
 
 
 def test_https_is_remembered(service: RunningService) -> None:
-    """Whoever came by https (through a proxy that says so) is told to come back by https."""
+    """Responses to requests by https (as reported by a proxy) require https from then on."""
     answer = service.client.get("/livez", headers={"X-Forwarded-Proto": "https"})
     assert answer.headers["strict-transport-security"] == HSTS
 

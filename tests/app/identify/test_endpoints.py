@@ -18,7 +18,7 @@ from tests.app.running_service import RunningService
 
 
 def post(service: RunningService, document: Document, **headers: str) -> httpx.Response:
-    """Ask for an identification."""
+    """Make a request for an identification."""
     return calls.post(service, "/identify", document, **headers)
 
 

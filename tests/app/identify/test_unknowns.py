@@ -1,4 +1,4 @@
-"""The unknowns that a request is told are those that the search has."""
+"""The unknowns reported for a request are those of the search."""
 
 from __future__ import annotations
 

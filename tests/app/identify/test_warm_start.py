@@ -1,4 +1,4 @@
-"""Laws of `search.warm_start` at the door, over real HTTP on both databases."""
+"""Laws of `search.warm_start` at the API, over real HTTP on both databases."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_begins_from_the_recommended_model_of_a_study(service: RunningService) -
 
 
 def never_flown() -> Document:
-    """A result of before: a model beside flights that it did not fly."""
+    """An earlier result: a model together with flights that it did not fly."""
     return {**RESULT, "fit": [{**RESULT["fit"][0], "J_identified": None}]}
 
 

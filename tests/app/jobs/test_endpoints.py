@@ -37,7 +37,7 @@ def kinds(events: Iterable[Document]) -> list[str]:
 
 
 def sse(answer: httpx.Response) -> Iterator[Document]:
-    """Read the events of a stream; comments are told as events of the type `comment`."""
+    """Read the events of a stream; comments are returned as events of the type `comment`."""
     event: Document = {}
     for line in answer.iter_lines():
         if line.startswith(":"):
@@ -80,7 +80,7 @@ def test_life_of_a_job(any_service: RunningService) -> None:
 
 
 def test_failure_is_reported(any_service: RunningService) -> None:
-    """A failed job tells its code and hint, in the job and where the result would be."""
+    """A failed job reports its code and hint, in the job and in place of the result."""
     job_id = new_job(any_service)
     error = {
         "code": "trim_not_found",
@@ -140,7 +140,7 @@ def test_pages_hold_every_job_once(any_service: RunningService) -> None:
 
 
 def test_stream_replays_and_follows(any_service: RunningService) -> None:
-    """A stream tells the past, then the present, and ends with the job; ids rise by one without a gap."""
+    """A stream sends past events, then new ones, and ends with the job; ids rise by one without a gap."""
     service = any_service
     job_id = new_job(service)
     claim = service.claim(job_id)
@@ -160,7 +160,7 @@ def test_stream_replays_and_follows(any_service: RunningService) -> None:
         events = []
         for event in sse(answer):
             events.append(event)
-            if event["type"] == "comment" and len(events) > 3:  # the past was told
+            if event["type"] == "comment" and len(events) > 3:  # past events have been sent
                 alive.set()
     worker.join()
     reported = [event for event in events if event["type"] != "comment"]
@@ -186,7 +186,7 @@ def test_stream_goes_on_where_it_broke_off(any_service: RunningService, how: str
 
 
 def test_events_as_json_are_the_same_rows(any_service: RunningService) -> None:
-    """Polling with `Accept: application/json` reads the rows that the stream tells."""
+    """Polling with `Accept: application/json` reads the same rows as the stream."""
     job_id = new_job(any_service)
     any_service.progress(any_service.claim(job_id), fraction=0.5)
     accept = {"headers": {"Accept": "application/json"}}
@@ -202,7 +202,7 @@ def test_events_as_json_are_the_same_rows(any_service: RunningService) -> None:
 
 
 def test_stream_ends_when_the_job_is_deleted(service: RunningService) -> None:
-    """Whoever follows a job that is deleted is not left waiting."""
+    """A client that follows a deleted job is not left waiting."""
     job_id = new_job(service)
     following = threading.Event()
 
@@ -235,7 +235,7 @@ def test_waiting_ends_with_the_job(service: RunningService) -> None:
 
 
 def test_many_watchers_cost_one_query(service: RunningService) -> None:
-    """A hundred clients on one job are all told; a hundred idle streams do not stop other answers."""
+    """A hundred clients of one job all get its events; a hundred idle streams do not block other requests."""
     job_id = new_job(service)
     claim = service.claim(job_id)
     limits = httpx.Limits(max_connections=120)

@@ -89,7 +89,7 @@ def test_bad_wishes_are_named(service: RunningService, execution: Document, poin
 
 
 def test_queue_is_shown_while_it_lasts(any_service: RunningService) -> None:
-    """The answer to POST, the job and a validation tell the place; a claimed job has none any more."""
+    """The response to POST, the job and a validation contain the place; a claimed job has none."""
     cancel_all(any_service)
     first, second = posted(any_service), posted(any_service)
     urgent = posted(any_service, priority=1)

@@ -199,7 +199,7 @@ def test_artifact_names_are_plain(database: Database) -> None:
 
 
 def test_cancel_in_every_state(database: Database) -> None:
-    """Queued ends at once, running winds down and the worker is told, an ended job stays as it is."""
+    """A queued job ends at once, a running one winds down through its worker, an ended one is unchanged."""
     job = new_job(database)
     with database.write() as session:
         assert store.request_cancel(session, OWNER, job.id).status is JobStatus.CANCELLED
@@ -294,7 +294,7 @@ def test_lost_messages_are_repeated(database: Database) -> None:
 
 
 def test_deadline_counts_from_the_first_claim(database: Database) -> None:
-    """A job past its deadline is told to its worker first, then ended by the reaper as expired."""
+    """A job past its deadline is reported to its worker first, then ended by the reaper as expired."""
     job = new_job(database, terms=Terms(max_seconds=1.0))
     assert current(database, job.id).deadline_at is None
     claim = claimed(database, job.id, lease_s=HOUR_S)

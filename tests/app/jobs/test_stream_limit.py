@@ -84,7 +84,7 @@ def open_stream(client: httpx.Client, events: str) -> int:
 
 
 def test_head_takes_no_place(client: httpx.Client) -> None:
-    """However often the headers of a stream are asked for, no stream is left open."""
+    """However often the headers of a stream are requested, no stream is left open."""
     events = f"/jobs/{new_job(client)}/events"
     for _ in range(5 * LIMIT):
         answer = client.head(events)

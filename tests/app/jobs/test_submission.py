@@ -1,4 +1,4 @@
-"""Laws that hold at the doors of every operation, over real HTTP, with the broker away."""
+"""Laws of every operation's endpoints, over real HTTP, with the broker unavailable."""
 
 from __future__ import annotations
 
@@ -81,13 +81,13 @@ def test_same_key_same_answer(any_service: RunningService, operation: Operation)
 
 
 def test_a_key_belongs_to_one_operation(service: RunningService) -> None:
-    """The same key at another operation's door is a conflict."""
+    """The same key for another operation is a conflict."""
     assert post(service, "/study", study_document(), **{"Idempotency-Key": "k"}).status_code == 202
     fault(post(service, "/identify", identify_document(), **{"Idempotency-Key": "k"}), 409)
 
 
 def test_validation_makes_no_job(service: RunningService, operation: Operation) -> None:
-    """Validate answers with a cost and starts nothing; what is wrong is told as the real call tells it."""
+    """Validation returns a cost and starts nothing; errors are the same as those of the real call."""
     before = service.client.get("/jobs", params={"limit": 200}).json()
     answer = service.client.post(f"/validate/{operation.name}", json=operation.request())
     assert answer.status_code == 200, answer.text
@@ -115,7 +115,7 @@ def test_validation_makes_no_job(service: RunningService, operation: Operation) 
 def test_what_all_refuse(
     service: RunningService, operation: Operation, path: str, value: Any, code: str
 ) -> None:
-    """NaN, infinity, text for numbers, unknown fields, an impossible vehicle: named at every door."""
+    """NaN, infinity, text for numbers, unknown fields, an impossible vehicle: reported by every operation."""
     first = fault(post(service, f"/{operation.name}", changed(operation.request(), path, value)))["errors"][0]
     assert (first["pointer"], first["code"]) == (path, code)
     assert first["hint"]

@@ -59,7 +59,7 @@ def test_reaps_while_no_worker_is_free(database: Database) -> None:
 
 
 def test_forgets_in_the_background(database: Database) -> None:
-    """What is older than the operator keeps disappears without anybody asking."""
+    """Data older than the operator's limits is deleted automatically."""
     ended(database, days_ago=2.0)
 
     def left() -> int:

@@ -16,7 +16,7 @@ from tests.app.jobs.test_turns import queue, served
 
 
 def places(database: Database) -> dict[str, int]:
-    """Tell the position of every queued job."""
+    """Return the position of every queued job."""
     with database.read() as session:
         rows = session.execute(select(jobs.c.id, jobs.c.owner).where(jobs.c.status == "queued")).all()
         census = count_queue(session)
@@ -28,7 +28,7 @@ def places(database: Database) -> dict[str, int]:
 
 @pytest.mark.parametrize("taken_before", [0, 1, 3])
 def test_positions_are_the_order_of_turns(database: Database, taken_before: int) -> None:
-    """Jobs begin in the order of their positions, whoever owns them and however many run already."""
+    """Jobs start in the order of their positions, for any owners and any number of running jobs."""
     queue(database, many=5, few=2, one=1)
     for owner, priority in (("many", 7), ("few", -3)):
         new_job(database, owner=owner, terms=Terms(priority=priority))
@@ -41,7 +41,7 @@ def test_positions_are_the_order_of_turns(database: Database, taken_before: int)
 
 
 def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
-    """What a validation tells is the position that the job has when it is posted then."""
+    """A validation reports the position that the job would have if posted then."""
     queue(database, many=4, few=1)
     served(database)
     with database.read() as session:
@@ -51,13 +51,13 @@ def test_the_next_one_has_the_place_that_it_gets(database: Database) -> None:
 
 
 def eta_of(database: Database, job: Job) -> float | None:
-    """When the job is told to begin, s."""
+    """Reported time to the start of the job, s."""
     with database.read() as session:
         return queue_place(session, job, count_queue(session)).eta_s
 
 
 def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
-    """Nothing known, nothing told; then ends needed before it, times the usual duration, over the workers."""
+    """Without data there is no estimate; then it is ends needed first, times usual duration, over workers."""
     queue(database, a=2)
     last = new_job(database, owner="a")
     assert eta_of(database, last) is None
@@ -80,7 +80,7 @@ def test_waiting_time_follows_from_what_jobs_took(database: Database) -> None:
 
 
 def test_the_queue_is_counted_once_for_all(database: Database) -> None:
-    """Within a second many ask and one counts; what changed among one's own jobs is seen at once."""
+    """Within a second many requests share one count; changes among an owner's own jobs are seen at once."""
     now = [0.0]
     view = QueueView(clock=lambda: now[0])
     queue(database, a=1, b=1)

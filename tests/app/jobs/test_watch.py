@@ -20,7 +20,7 @@ LOOK_CPU_S = 0.05  # of the event loop's thread; 0.15 s when every client was lo
 
 @pytest.fixture
 def numbers(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """The last event of each job, as the database would tell; the test changes it."""
+    """The last event of each job, in place of the database; the test changes it."""
     found: dict[str, int] = {}
 
     def reported(_watcher: JobWatcher, ids: list[str]) -> dict[str, int]:
@@ -31,7 +31,7 @@ def numbers(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 
 
 def played(play: Callable[[JobWatcher], Coroutine[Any, Any, None]]) -> None:
-    """Play beside a running watcher, whose database is the test's `numbers`."""
+    """Run a test with a watcher whose database is the test's `numbers`."""
 
     async def run() -> None:
         watcher = JobWatcher(cast(Database, None), POLL_S)
@@ -46,7 +46,7 @@ def played(play: Callable[[JobWatcher], Coroutine[Any, Any, None]]) -> None:
 
 
 def test_news_wake_those_who_have_not_seen_them(numbers: dict[str, int]) -> None:
-    """Whoever waits for a later event or another job sleeps on; a job that is gone wakes its clients."""
+    """Clients that wait for a later event or another job are not woken; those of a deleted job are."""
     numbers.update(one=3, two=1)
 
     async def play(watcher: JobWatcher) -> None:

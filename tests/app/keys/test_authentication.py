@@ -26,7 +26,7 @@ PATIENCE_S = 10.0
 
 
 def requested(service: RunningService, headers: dict[str, str], path: str = "/jobs") -> httpx.Response:
-    """Ask with these headers."""
+    """Send a request with these headers."""
     return service.client.get(path, headers=headers)
 
 
@@ -39,7 +39,7 @@ def test_a_key_opens(keyed_on_sqlite: RunningService) -> None:
 
 
 def test_whatever_is_wrong_with_a_key_the_answer_is_the_same(keyed_on_sqlite: RunningService) -> None:
-    """Unknown, forged, expired, revoked, malformed: one 401 that tells how to authenticate, no more."""
+    """Unknown, forged, expired, revoked, malformed: one 401 that says how to authenticate, and no more."""
     database = keyed_on_sqlite.database
     good, late, gone = make_key(database), make_key(database, expires_in_s=-1.0), make_key(database)
     with database.write() as session:
@@ -90,7 +90,7 @@ def test_the_scheme_has_no_case(keyed_on_sqlite: RunningService) -> None:
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/openapi.json", "/livez", "/readyz", "/static/app.js"])
 def test_the_public_list_needs_no_key(keyed_on_sqlite: RunningService, path: str) -> None:
-    """Pages and probes are open, and a wrong key beside the request does not matter there."""
+    """Pages and probes are public, and a wrong key in the request does not matter there."""
     assert requested(keyed_on_sqlite, {}, path).status_code in (200, 503)
     assert requested(keyed_on_sqlite, bearer("nonsense"), path).status_code in (200, 503)
 
@@ -135,7 +135,7 @@ def test_a_revoked_key_is_refused_within_seconds(keyed_on_sqlite: RunningService
 
 
 def test_a_stream_ends_with_its_key(keyed_on_sqlite: RunningService) -> None:
-    """Whoever follows a job hears nothing more of it once the key is revoked; the service takes no harm."""
+    """A client that follows a job gets nothing more once its key is revoked; the service is unaffected."""
     made = make_key(keyed_on_sqlite.database)
     with holder(keyed_on_sqlite, made.text) as client:
         job = client.post("/simulate", json=simulate_document()).raise_for_status().json()["id"]
@@ -174,7 +174,7 @@ def test_the_last_use_is_seen(keyed_on_sqlite: RunningService) -> None:
 
 
 def test_guessing_is_limited(keyed_on_sqlite: RunningService) -> None:
-    """An address that sends wrong keys is told to wait; who works there or elsewhere is not held up."""
+    """An address that sends wrong keys has to wait; valid keys there or elsewhere are not delayed."""
     place = {FROM_PROXY: "198.51.100.7"}
     good = make_key(keyed_on_sqlite.database).text
     assert requested(keyed_on_sqlite, {**bearer(good), **place}).status_code == 200

@@ -20,7 +20,7 @@ from tests.app.key_holders import make_key
 
 
 class Clock:
-    """Seconds that pass when told."""
+    """A clock set by the test, s."""
 
     now = 0.0
 
@@ -82,7 +82,7 @@ def test_only_the_digest_is_stored(database: Database) -> None:
 
 
 def test_wrong_unknown_expired_and_revoked_keys_open_nothing(database: Database) -> None:
-    """The reasons are told apart for the audit log, by the database's clock."""
+    """The reasons are distinguished for the audit log, by the database's clock."""
     keys = ring(database, Clock())
     made, late, gone = make_key(database), make_key(database, expires_in_s=-1.0), make_key(database)
     with database.write() as session:
@@ -112,7 +112,7 @@ def test_revoking_takes_effect_when_the_memory_is_stale(database: Database) -> N
 
 
 def test_a_thousand_requests_cost_one_read_and_no_write(database: Database) -> None:
-    """Within `FRESH_S` the database is asked once per key; the note of its use is left for afterwards."""
+    """Within `FRESH_S` the database is read once per key; recording its use is deferred."""
     noted = Noted()
     keys = ring(database, Clock(), noted)
     text = text_of(make_key(database))

@@ -44,7 +44,7 @@ def waiting_post(service: RunningService, made: NewKey, _job: str) -> Ended:
 
 
 def idle_stream(service: RunningService, made: NewKey, job: str) -> Ended:
-    """Follow a job of which there is nothing to tell."""
+    """Follow a job without news."""
     with holder(service, made.text) as client, client.stream("GET", f"/jobs/{job}/events") as stream:
         assert stream.status_code == 200
         reported = "".join(stream.iter_text())
@@ -97,7 +97,7 @@ def job(keyed_service: RunningService) -> Iterator[str]:
 def test_whoever_waits_is_ended_with_the_key(
     keyed_service: RunningService, job: str, end: Callable[[RunningService, NewKey], None]
 ) -> None:
-    """All kinds at once: a waiting request is told 401, a stream ends; none outlives its key by 3 s."""
+    """All kinds at once: a waiting request gets 401, a stream ends; none outlives its key by 3 s."""
     made = make_key(keyed_service.database)
     ends: dict[str, Ended] = {}
 
@@ -122,7 +122,7 @@ def test_whoever_waits_is_ended_with_the_key(
 
 
 def test_other_keys_of_the_owner_go_on(keyed_service: RunningService, job: str) -> None:
-    """A wait by another key of the same owner lasts as long as it was asked to."""
+    """A wait with another key of the same owner lasts for the full requested time."""
     lost, kept = make_key(keyed_service.database), make_key(keyed_service.database)
     answers: list[httpx.Response] = []
 

@@ -6,7 +6,7 @@ from app.keys.refusal_limit import BURST, NOTES_BURST, REFILL_S, REMEMBERED, Ref
 
 
 class Clock:
-    """Seconds that pass when told."""
+    """A clock set by the test, s."""
 
     now = 0.0
 

@@ -1,4 +1,4 @@
-"""Who may see what was asked for."""
+"""Who may see the request of a job."""
 
 from __future__ import annotations
 

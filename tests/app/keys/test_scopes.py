@@ -19,7 +19,7 @@ from app.openapi import openapi_document
 from tests.app.key_holders import holder, make_key
 from tests.app.running_service import RunningService
 
-ANY_KEY = {("GET", "/me")}  # tells a caller about itself only
+ANY_KEY = {("GET", "/me")}  # only reports on the caller itself
 
 
 def routes() -> Iterator[BaseRoute]:
@@ -72,7 +72,7 @@ def test_every_route_demands_a_scope_or_is_public() -> None:
 
 
 def test_the_paper_names_every_scope_and_public_path(root: Path) -> None:
-    """docs/security.md tells what the code does."""
+    """docs/security.md agrees with the code."""
     text = (root / "docs/security.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `([a-z:]+)` \|", text, re.MULTILINE)) == set(EVERY_SCOPE)
     (public,) = re.findall(r"^Public: (.*)\.\s+`GET /me`", text, re.MULTILINE)
@@ -103,7 +103,7 @@ def test_refusals_are_documented_everywhere() -> None:
 
 @pytest.mark.parametrize("scope", sorted(EVERY_SCOPE))
 def test_a_key_opens_what_its_scope_says(keyed_on_sqlite: RunningService, scope: Scope) -> None:
-    """Each operation lets in a key with its scope alone, and tells any other what it lacks."""
+    """Each operation accepts a key with only its scope, and tells other keys which scope is missing."""
     key = make_key(keyed_on_sqlite.database, scopes=[scope])
     with holder(keyed_on_sqlite, key.text) as client:
         for method, path, reported in operations():

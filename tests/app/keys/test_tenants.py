@@ -78,7 +78,7 @@ def made(answer: httpx.Response) -> str:
 
 
 def reported(answer: httpx.Response, ids: dict[str, str]) -> tuple[int, dict[str, str], str]:
-    """Everything that an answer tells, but for the ids that the caller sent and the time of day."""
+    """The contents of a response, except for ids sent by the caller and the time of day."""
     text = answer.text
     for identifier in ids.values():
         text = text.replace(identifier, "ID")

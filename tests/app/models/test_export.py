@@ -100,7 +100,7 @@ def test_a_failed_export_tells_what_its_job_tells(fresh: RunningService) -> None
 
 
 def test_another_job_takes_the_place_of_a_cancelled_one(fresh: RunningService) -> None:
-    """Cancelled is not failed: whoever asks again gets a file."""
+    """Cancelled is not failed: a repeated request gets a file."""
     address = f"/models/{identified(fresh)}/export"
     first = fresh.client.get(address, params={"format": "json"}, headers=NOT_WAITING).json()["id"]
     assert fresh.client.post(f"/jobs/{first}/cancel").json()["status"] == "cancelled"
@@ -140,7 +140,7 @@ def test_the_operation_takes_a_model_by_its_id(fresh: RunningService) -> None:
 
 
 def test_both_scopes_are_demanded(fresh: RunningService) -> None:
-    """It reads a model and starts a job: its description asks for leave for both."""
+    """It reads a model and starts a job: its description requires both scopes."""
     call = fresh.client.get("/openapi.json").json()["paths"]["/models/{model_id}/export"]["get"]
     (demanded,) = call["security"]
     assert set(demanded["api_key"]) == {Scope.DATA_READ, Scope.JOBS_WRITE}

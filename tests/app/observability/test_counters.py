@@ -20,7 +20,7 @@ def values(database: Database) -> dict[str, int]:
 
 
 def test_counters_add_up_over_their_rows(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whichever process counts, the sum is what was counted; labels tell counters apart."""
+    """The sum is right whichever process counts; labels distinguish counters."""
     for process in range(2 * SHARDS + 1):
         monkeypatch.setattr(os, "getpid", lambda process=process: process)
         with database.write() as session:

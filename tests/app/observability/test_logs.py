@@ -117,7 +117,7 @@ def test_nobody_forges_a_line(as_text: Written) -> None:
 
 
 def test_a_line_has_an_end(as_json: Written) -> None:
-    """A message of a megabyte is cut; one with the wrong arguments is told all the same."""
+    """A message of a megabyte is cut; one with the wrong arguments is logged all the same."""
     as_json.logger.info("x" * 1_000_000)
     as_json.logger.info("%d apples", "three")
     long, wrong = as_json.lines
@@ -139,7 +139,7 @@ def access() -> Iterator[Written]:
 
 
 def test_each_request_leaves_a_line(service: RunningService, access: Written) -> None:
-    """Route, status, time and owner; no query, and nothing of the probes that ask all day."""
+    """Route, status, time and owner; no query, and no lines for probes."""
     service.client.get("/jobs/job_none?token=hush", headers={"X-Request-ID": "mine"})
     service.client.get("/livez")
     service.client.get("/jobs")

@@ -106,7 +106,7 @@ def test_nonsense_from_callers_begins_a_new_trace(
 
 
 def test_off_means_off(service: RunningService) -> None:
-    """Without being asked for there is no trace on the row, whatever the caller sends."""
+    """Unless configured there is no trace on the row, whatever the caller sends."""
     answer = service.client.post("/identify", json=identify_document(), headers={"traceparent": CALLER})
     assert service.claim(answer.json()["id"]).traceparent is None
     assert tracing.current_traceparent() is None
@@ -135,7 +135,7 @@ def test_off_imports_nothing(root: Path, process: str, tracing: set[str]) -> Non
 def test_missing_packages_are_told_of(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Asked for but not installed: the service runs without traces and says what to install."""
+    """Configured but not installed: the service runs without traces and says what to install."""
     monkeypatch.setitem(sys.modules, "opentelemetry.exporter.otlp.proto.http.trace_exporter", None)
     assert not tracing.start_tracing("test", "http://127.0.0.1:4318")
     assert "morphid[telemetry]" in caplog.text

@@ -157,7 +157,7 @@ def no_child_left() -> bool:
 def test_whatever_a_parser_does_it_is_ended_and_reaped(
     monkeypatch: pytest.MonkeyPatch, code: str, words: str, file_of: FileOf
 ) -> None:
-    """Sleeping, spinning, babbling, dying: told in a sentence within the limit, and no process is left."""
+    """Sleeping, spinning, babbling, dying: reported in a sentence in time, and no process is left."""
     played(monkeypatch, code)
     start = time.monotonic()
     with pytest.raises(InvalidRequest, match=words):
@@ -207,7 +207,7 @@ def test_limits_hold_inside_a_parser(monkeypatch: pytest.MonkeyPatch, file_of: F
 
 
 def test_too_many_wait_in_vain(monkeypatch: pytest.MonkeyPatch, file_of: FileOf) -> None:
-    """One at a time; who waits too long is told to come again, and the turn is given back."""
+    """One at a time; a request that waits too long is refused as busy, and its turn is given back."""
     played(monkeypatch, "import time; time.sleep(60)")
     parsers = ParserPool(OwnerTurns(1, 1), Limits(wall_s=1), queue_s=0.2)
 

@@ -31,7 +31,7 @@ def stored(service: RunningService, document: Document) -> Document:
 
 
 def equivalent(**model: Any) -> Document:
-    """Ask for a flight of an equivalent model."""
+    """Make a request for a flight of an equivalent model."""
     return changed(simulate_document(), "/model", {"kind": "equivalent", **model})
 
 
@@ -90,7 +90,7 @@ def test_parameters_reach_the_worker(service: RunningService) -> None:
 
 
 def test_a_model_is_named_by_its_id(any_service: RunningService) -> None:
-    """`model_id` becomes the parameters of that model, flown as it was identified, unless told otherwise."""
+    """`model_id` becomes the parameters of that model, flown as it was identified, unless overridden."""
     model_id = identified(any_service, **AS_IDENTIFIED)
     read = stored(any_service, equivalent(model_id=model_id))
     # with its defaults, as one that stands in the request

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from morphdata.samples import EXAMPLE_SAMPLE
 from tests.app.calls import fault, post
 from tests.app.running_service import RunningService
 from tests.app.trajectories.test_endpoints import upload
+from tests.morphdata.samplefiles.test_matlab_hdf5 import COLUMNS, as_matlab
+from tests.morphdata.samplefiles.test_ulog_file import EULER, log
 from tests.morphdata.test_schedules import aircraft
 
 T = [0.0, 0.01, 0.02, 0.03]
@@ -137,3 +140,81 @@ def test_channels_survive_upload_reading_back_and_identification(any_service: Ru
     read = any_service.client.get(again.headers["location"]).json()
     assert read["p_rad_s"] == [0.0, None, np.pi / 2, np.pi]
     assert {field: read[field] for field in columns} == columns
+
+
+def test_odd_names_of_channels_harm_nothing(service: RunningService) -> None:
+    """A surface's name as long as one may be, and what is no name of a column."""
+    long = f"tip_z_{'x' * 150}"
+    _, back = uploaded(service, flight(**{"sweep": T, long: ["?"] * 4, "tip_z_<b>": T, "tip_z_ü": ["?"] * 4}))
+    assert "not a finite number" in back["unreadable"][long]
+    assert not [name for name in back if "<" in name or "ü" in name]
+
+
+def test_what_is_declared_about_a_file_counts(any_service: RunningService) -> None:
+    """Axes, a numbered quaternion, columns with a scale, a window of time: as the library reads them."""
+    half = 0.5**0.5
+    rows = "\n".join(f"{t},{half},0,0,{half},{1000 + 100 * t},{t}" for t in (0, 1, 2, 3, 4))
+    said = {"earth": "ENU", "body": "FLU", "quaternion": "wxyz", "between": "[1, 3]"}
+    said["columns"] = '{"sweep_deg": "servo*0.1-100"}'
+    answer = upload(any_service, f"t,q0,q1,q2,q3,servo,vx\n{rows}".encode(), "flight.csv", **said)
+    assert answer.status_code == 201, answer.text
+    back = any_service.client.get(answer.headers["location"]).json()
+    assert back["time_s"] == [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(back["psi_rad"], 0.0, atol=1e-15)  # its x axis points to y: north
+    np.testing.assert_allclose(back["sweep_rad"], np.deg2rad([10.0, 20.0, 30.0]))
+    assert back["vy_m_s"] == [1.0, 2.0, 3.0]
+    (sample,) = stored(any_service, request(answer.json()["id"], "z"))["samples"]
+    assert sample["sweep_rad"] == back["sweep_rad"]
+
+
+@pytest.mark.parametrize(
+    ("parts", "pointer"),
+    [
+        ({"earth": "north"}, "/earth"),
+        ({"quaternion": "zyxw"}, "/quaternion"),
+        ({"columns": "sweep=servo"}, "/columns"),
+        ({"columns": '{"sweep": 5}'}, "/columns/sweep"),
+        ({"columns": '{"2nd": "servo"}'}, "/columns/2nd"),
+        ({"columns": '{"sweep": "servo"}'}, "/file"),
+        ({"between": "[3, 1]"}, "/between"),
+        ({"between": "{}"}, "/between"),
+    ],
+)
+def test_odd_declarations_are_refused_by_their_part(
+    service: RunningService, parts: dict[str, str], pointer: str
+) -> None:
+    """Before the file is read, or because it lacks what was declared."""
+    answer = upload(service, flight(sweep=T), "flight.csv", **parts)
+    assert fault(answer)["pointer"] == pointer
+
+
+def test_samples_inline_in_other_axes_reach_the_job(service: RunningService) -> None:
+    """A quaternion, checked like angles; JSON uploads read back turned."""
+    columns = {"time_s": T, "sweep_rad": T, "frames": {"earth": "ENU", "body": "FLU"}, "vx_m_s": T}
+    columns |= {"qw": [0.5**0.5] * 4, "qx": [0.0] * 4, "qy": [0.0] * 4, "qz": [0.5**0.5] * 4}
+    answer = service.client.post("/trajectories", json=columns)
+    assert answer.status_code == 201, answer.text
+    back = service.client.get(answer.headers["location"]).json()
+    np.testing.assert_allclose(back["psi_rad"], 0.0, atol=1e-15)
+    assert back["vy_m_s"] == T
+    assert not {"qw", "frames"} & set(back)
+    inline = {**EXAMPLE_REQUEST, "samples": [{"name": "a", **columns}]}
+    assert service.client.post("/validate/identify", json=inline).status_code == 200
+    inline["samples"][0]["qw"] = [1.0] * 4
+    (found,) = fault(service.client.post("/validate/identify", json=inline))["errors"]
+    assert (found["code"], found["pointer"]) == ("no_rotation", "/samples/0/qw/0")
+
+
+def test_logs_and_hdf5_are_read_by_the_service(service: RunningService, tmp_path: Path) -> None:
+    """In the confined process, with their libraries."""
+    as_matlab(tmp_path / "a.mat", COLUMNS, "flight")
+    answer = upload(service, (tmp_path / "a.mat").read_bytes(), "a.mat")
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["rows"] == 50
+    columns = '{"sweep_deg": "actuator_outputs.output[0]*0.09-135"}'
+    answer = upload(service, log(), "a.ulg", columns=columns)
+    assert answer.status_code == 201, answer.text
+    back = service.client.get(answer.headers["location"]).json()
+    np.testing.assert_allclose(back["theta_rad"], EULER[:, 1], atol=1e-6)
+    assert len(back["p_rad_s"]) == len(EULER)
+    assert fault(upload(service, log(), "a.ulg"))["errors"][0]["code"] == "missing"

@@ -31,7 +31,7 @@ class Received:
 
 @dataclass
 class Receiver:
-    """A server on loopback and what it was told.
+    """A server on loopback and the messages it received.
 
     Attributes
     ----------

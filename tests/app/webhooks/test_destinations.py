@@ -238,7 +238,7 @@ def test_a_success_ends_the_row_of_failures(database: Database, there: Receiver)
 
 @on_sqlite
 def test_a_receiver_that_does_not_answer_the_challenge(database: Database, there: Receiver) -> None:
-    """It is asked as often as any message is sent, then the webhook is disabled; it can be reopened."""
+    """It is retried like any message, then the webhook is disabled; it can be reopened."""
     there.answers_challenges = False
     clock = HandClock()
     hook_id = challenged_hook(database, there.url())
@@ -290,7 +290,7 @@ def test_reopening_waits_for_nothing(database: Database, there: Receiver) -> Non
 def test_a_disabled_webhook_that_is_reopened_asks_before_it_sends(
     database: Database, there: Receiver
 ) -> None:
-    """What slipped into the table beside the disabling is not sent before the receiver has answered."""
+    """A delivery inserted concurrently with the disabling is not sent before the receiver has answered."""
     hook_id = new_hook(database, there.url())
     with database.write() as session:
         sql.disable(session, hook_id, "a test")

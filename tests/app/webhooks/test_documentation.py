@@ -1,4 +1,4 @@
-"""What docs/webhooks.md tells receivers is true."""
+"""The statements of docs/webhooks.md for receivers are true."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]
     "url", ["http://example.com/", "https://127.0.0.1/", "https://169.254.169.254/", "https://u@example.com/"]
 )
 def test_addresses_inside_are_refused(strict: RunningService, url: str) -> None:
-    """An address that nothing would be sent to is told at once, with its field."""
+    """An address to which nothing would be sent is refused at once, with its field."""
     problem = fault(post(strict, "/webhooks", {"url": url}))
     assert problem["errors"][0]["code"] == "address_refused"
     assert problem["pointer"] == "/url"
@@ -109,7 +109,7 @@ def test_there_is_an_end_to_webhooks(service: RunningService) -> None:
 
 
 def test_anothers_webhook_is_not_there(any_service: RunningService) -> None:
-    """Whatever is asked of another owner's webhook is 404."""
+    """Every request for another owner's webhook is 404."""
     hook_id = new_hook(any_service.database, NOBODY, owner="another")
     client = any_service.client
     for method, path in (
@@ -166,7 +166,7 @@ def test_a_jobs_end_arrives(development: RunningService) -> None:
 
 
 def test_a_new_webhook_is_told_nothing_until_its_receiver_answers(development: RunningService) -> None:
-    """The challenge is signed; ends before its answer are not kept, no test is sent, asking anew helps."""
+    """The challenge is signed; ends before its answer are dropped, no test is sent, a new challenge helps."""
     with receiver() as there:
         there.answers_challenges = False
         made = new(development, url=there.url())
@@ -187,7 +187,9 @@ def test_a_new_webhook_is_told_nothing_until_its_receiver_answers(development: R
         job_id = ended_job(development.database)
         until(lambda: len(there.received) == 2)
         assert json.loads(there.received[1].body)["data"]["id"] == job_id
-        assert development.client.post(f"{path}/enable").json()["status"] == "enabled"  # nothing to ask
+        assert (
+            development.client.post(f"{path}/enable").json()["status"] == "enabled"
+        )  # no challenge is needed
 
 
 def test_the_limit_holds_under_parallel_posts(any_service: RunningService) -> None:
@@ -219,7 +221,7 @@ def test_a_test_message_arrives(development: RunningService) -> None:
 
 
 def test_disabled_webhooks_are_told_and_enabled(any_service: RunningService) -> None:
-    """Why a webhook is disabled can be read; no test is sent to it; enabled, it is challenged anew."""
+    """Why a webhook is disabled can be read; no test is sent to it; enabled, it is challenged again."""
     from app.webhooks.deliveries import disable
 
     hook_id = new(any_service)["id"]

@@ -20,7 +20,7 @@ from tests.app.webhooks.receiver import NOBODY
 
 
 def test_an_end_makes_one_delivery(database: Database) -> None:
-    """Each way in which a worker ends a job is told once, in the documented form."""
+    """Each way in which a worker ends a job is reported once, in the documented form."""
     hook_id = new_hook(database, NOBODY)
     error = {"code": "diverged", "detail": "x" * 9000, "hint": "h", "extra": [1]}
     result = {"model": {"links_per_wing": 3}, "fit": []}
@@ -80,7 +80,7 @@ def test_only_who_asked_is_reported(database: Database) -> None:
 
 
 def test_no_end_no_delivery(database: Database) -> None:
-    """A transaction that is rolled back leaves neither; a stale worker's end tells nothing."""
+    """A transaction that is rolled back leaves neither; a stale worker's end reports nothing."""
     new_hook(database, NOBODY)
     job_id = new_job(database)
     with database.write() as session:

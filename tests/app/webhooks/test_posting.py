@@ -190,7 +190,7 @@ def test_an_endless_answer_is_not_read(server: Receiver, authority: Authority) -
     ],
 )
 def test_failures_are_answers(url: str, words: str) -> None:
-    """Whatever goes wrong is told in a sentence, and raises nothing."""
+    """Every failure is reported in a sentence and raises nothing."""
 
     def resolve(host: str, port: int) -> list[str]:
         host.encode("idna")

@@ -54,5 +54,5 @@ def test_a_receiver_may_ask_for_patience_but_not_for_haste() -> None:
     ],
 )
 def test_retry_after_is_seconds_or_a_date(value: str | None, seconds: float | None) -> None:
-    """Both forms of the header are read; whatever else stands there asks for nothing."""
+    """Both forms of the header are read; anything else is ignored."""
     assert parse_retry_after(value, NOW) == seconds

@@ -91,7 +91,7 @@ def test_failures_are_tried_again_on_schedule(database: Database, there: Receive
 
 @on_sqlite
 def test_retry_after_is_honoured(database: Database, there: Receiver) -> None:
-    """A receiver that asks for two minutes gets them."""
+    """A receiver that requests two minutes gets them."""
     there.answer = answer_with(429, Retry_After="120")  # type: ignore[assignment]
     clock = HandClock()
     new_hook(database, there.url())

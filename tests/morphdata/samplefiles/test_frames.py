@@ -108,6 +108,18 @@ def test_samples_inline_declare_their_axes(tmp_path: Path, earth: str, body: str
         require_flown(load_trajectory(tmp_path / "a.json"))
 
 
+@pytest.mark.parametrize(
+    "frames", ["ENU", {"earth": "NWU"}, {"earth": 5}, {"up": 1}, [], {"quaternion": "wxyz"}]
+)
+def test_odd_frames_in_a_json_file_are_refused(tmp_path: Path, frames: Any) -> None:
+    """They are never passed over: angles in unknown axes are no attitude."""
+    columns = {"t": T.tolist(), "sweep": T.tolist(), **dict.fromkeys(EULER, [0.0] * ROWS)}
+    (tmp_path / "a.json").write_text(json.dumps({**columns, "frames": frames}))
+    with pytest.raises(InvalidInput, match="frames cannot be read") as caught:
+        load_trajectory(tmp_path / "a.json")
+    assert "ENU" in caught.value.hint
+
+
 def test_the_axes_of_here_change_no_digit(tmp_path: Path) -> None:
     """Angles without a declaration, or with that of NED and FRD, are read as they are written."""
     WRITERS["csv"](tmp_path / "a.csv", {"t": T, "sweep": T, **dict(zip(EULER, FLOWN.T, strict=True))})

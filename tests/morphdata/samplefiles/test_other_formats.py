@@ -145,8 +145,8 @@ def opaque_variable(name: str, class_name: str) -> bytes:
 @pytest.mark.parametrize(
     ("name", "content", "said", "way_out"),
     [
-        ("hdf.mat", b"MATLAB 7.3 MAT-file".ljust(2000), "7.3", "-v7"),
-        ("hdf.mat", b"\x89HDF\r\n\x1a\n".ljust(2000), "7.3", "-v7"),
+        ("hdf.mat", b"MATLAB 7.3 MAT-file".ljust(2000), "not a readable MATLAB", "-v7"),
+        ("hdf.mat", b"\x89HDF\r\n\x1a\n".ljust(2000), "not a readable MATLAB", "-v7"),
         ("ts.mat", opaque_variable("theta", "timeseries"), "object", "-v7"),
         ("ts.mat", opaque_variable("flight", "table"), "object", "table2struct"),
         ("x.mat", b"", "not a readable MATLAB", "-v7"),

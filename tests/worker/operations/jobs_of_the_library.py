@@ -35,7 +35,7 @@ def vehicle() -> Document:
 
 
 def simulation(duration_s: float = 0.6, **model: Any) -> Document:
-    """Ask for a short flight on a coarse lattice."""
+    """Request a short flight on a coarse lattice."""
     return {
         **vehicle(),
         "model": {"kind": "rigid", "lattice": COARSE, **model},
@@ -45,7 +45,7 @@ def simulation(duration_s: float = 0.6, **model: Any) -> Document:
 
 
 def study(*links: int) -> Document:
-    """Ask for a study with searches of a few flights."""
+    """Request a study with searches of a few flights."""
     document = identification("train_rate_0.8", held_out=("train_asymmetric",))
     document["model"] = {"links_per_wing": list(links), "lattice": COARSE}
     document["search"] = {"method": "pso", "particles": 8, "generations": 2, "seed": 1}
@@ -65,7 +65,7 @@ def parameters() -> Document:
 
 
 def optimisation(**parts: Any) -> Document:
-    """Ask for a small optimisation on a coarse lattice, of a short morph with one knot to place."""
+    """Request a small optimisation on a coarse lattice, of a short morph with one knot to place."""
     return {
         **vehicle(),
         "model": {"parameters": parameters(), "lattice": COARSE},

@@ -117,7 +117,7 @@ def test_a_refusal_keeps_its_words() -> None:
 
 
 def test_a_stop_between_two_pictures_is_respected() -> None:
-    """Whoever cancels while plots are drawn waits for one picture, not for all of them."""
+    """A cancel while plots are drawn waits for one plot, not for all of them."""
     drawn: list[str] = []
 
     def files(_result: Counted, _document: Document) -> dict[str, bytes]:

@@ -56,7 +56,7 @@ def test_the_table_is_a_sample(worker: RealWorker, tmp_path: Path) -> None:
 
 
 def test_a_flight_is_cancelled_within_two_seconds(worker: RealWorker) -> None:
-    """A long flight of the flexible model stops soon after it is told to, and leaves no half result."""
+    """A long flight of the flexible model stops soon after the request, without a partial result."""
     job_id = worker.add("simulate", simulation(60.0, kind="flexible"))
     ending, took_s = worker.cancelled_after(job_id, fraction=1e-4)
     assert ending is Ending.CANCELLED
@@ -66,7 +66,7 @@ def test_a_flight_is_cancelled_within_two_seconds(worker: RealWorker) -> None:
 
 
 def test_a_second_attempt_flies_from_the_start(worker: RealWorker) -> None:
-    """A worker told to end hands the flight back; the next one flies it anew, says so, to the same flight."""
+    """A worker that shuts down hands the flight back; the next one restarts it, to the same flight."""
     request = simulation(4.0, kind="flexible", lattice={})  # long enough to be interrupted
     job_id = worker.add("simulate", request)
     assert worker.run(lambda: worker.job(job_id).progress is not None) is Ending.RELEASED

@@ -14,7 +14,7 @@ from tests.worker.operations.jobs_of_the_library import RealWorker, study, undec
 from worker.attempt import Ending
 from worker.operations import find_operation
 
-TIMES = {"flight_s", "identify_s", "wall_s", "plan_s", "reason"}  # measured, or telling what was measured
+TIMES = {"flight_s", "identify_s", "wall_s", "plan_s", "reason"}  # measured, or a text on measurements
 
 
 def timeless(document: Any) -> Any:

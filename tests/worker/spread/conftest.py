@@ -103,7 +103,7 @@ class Spread:
         return endings
 
     def work_together(self, runners: list[Runner], job_id: str, within_s: float = 60.0) -> None:
-        """Let workers in threads ask for work again and again until a job has ended."""
+        """Let workers in threads poll for work until a job has ended."""
         until = time.monotonic() + within_s
 
         def ask(runner: Runner) -> None:

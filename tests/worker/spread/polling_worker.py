@@ -1,4 +1,4 @@
-"""A worker process without a broker: it asks the job store again and again.
+"""A worker process without a broker that polls the job store.
 
 ``python -m tests.worker.spread.polling_worker URL NAME CHUNK_LEASE_S`` says ``ready`` when its kernels are.
 """

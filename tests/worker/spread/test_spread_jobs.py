@@ -51,7 +51,7 @@ def test_two_workers_give_the_result_of_one(spread: Spread) -> None:
     last = [rates_aside(spread.events(job_id, "progress")[-1]) for job_id in (together, single)]
     assert last[0] == last[1]
     seen = [payload["generation"] for payload in spread.events(together, "progress")]
-    assert seen == list(range(GENERATIONS + 1)), "every generation is told once"
+    assert seen == list(range(GENERATIONS + 1)), "every generation is reported once"
     assert spread.chunks(together) == []
     assert spread.flights.birds == 2 * BIRDS * GENERATIONS, "nothing is flown twice"
 
@@ -67,7 +67,7 @@ def test_one_message_for_each_chunk(spread: Spread) -> None:
 
 
 def test_progress_counts_all_workers(spread: Spread) -> None:
-    """The rate that is shown is that of the generation, whoever flew it."""
+    """The displayed rate is that of the generation, whichever workers flew it."""
     job_id = spread.add(pause_s=0.01)
     spread.work_together([spread.runner("w1"), spread.runner("w2")], job_id)
     rates = [payload["flights_per_s"] for payload in spread.events(job_id, "progress")][1:]
@@ -205,7 +205,7 @@ def test_a_chunk_that_is_refused_fails_the_job(spread: Spread) -> None:
 
 
 def test_a_stopped_worker_gives_its_chunk_back(spread: Spread) -> None:
-    """A worker told to end lets another fly its chunk at once, and no attempt is counted."""
+    """When a worker shuts down, another flies its chunk at once, and no attempt is counted."""
     job_id = spread.add(pause_s=0.5)
     spread.work(spread.runner(), maximum=1)
     requested_at = time.monotonic() + 0.2
@@ -243,7 +243,7 @@ def test_a_spread_job_ends_with_its_best(spread: Spread, why: str) -> None:
 
 
 def test_a_spread_job_that_nobody_flies_is_cancelled_at_once(spread: Spread) -> None:
-    """With nobody at work there is nobody to wind it down: like a queued job it ends in the call itself."""
+    """Without workers on it, it ends in the call itself like a queued job."""
     job_id = spread.add()
     spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
@@ -286,7 +286,7 @@ def test_lost_messages_are_repeated(spread: Spread) -> None:
         assert reap(session, republish_after_s=15.0).publish == (), "a chunk was touched just now"
         session.execute(update(job_chunks).values(at=database_time() - 20.0))
         assert reap(session, republish_after_s=15.0).publish == (job_id,) * 4
-        assert reap(session, republish_after_s=15.0).publish == (), "just told"
+        assert reap(session, republish_after_s=15.0).publish == (), "just announced"
     spread.work(spread.runner(), maximum=1)
     with spread.database.write() as session:
         session.execute(update(jobs).values(published_at=database_time() - 20.0))
