@@ -1,9 +1,9 @@
 """Identification that chooses the number of links per wing by the flights to fit.
 
-Models of one, two, three ... links are identified one after the other, and that under which the flights are
-most likely is taken: by the marginal likelihood that weighs the prior of each of them (`evidence`), which
-charges a model for every parameter that it needs. A link that only fits what no chain can fly does not raise
-it. The search ends with the largest number, or after two numbers in a row without a gain.
+Models of one, two, three ... links are identified one after the other, and the smallest is taken under which
+the flights are about as likely as under any: by the marginal likelihood that weighs the prior of each of them
+(`evidence`), which charges a model for every parameter that it needs. A link that only fits what no chain can
+fly hardly raises it. The search ends with the largest number, or after two in a row without a gain.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
 VERSION = "automatic links 1"  # of the checkpoint; another one is not read
+WORTH_A_LINK = 1.0  # by which links have to raise the logarithm of the likelihood: e times likelier
 FRUITLESS = 2  # numbers of links in a row that do not raise the likelihood end the search
 
 
@@ -44,12 +45,15 @@ class Tried:
     flights : int
     best_cost : float
         rad^2.
+    checkpoint : bytes
+        Of the end of its search.
     """
 
     links: int
     linear: Linear
     flights: int
     best_cost: float
+    checkpoint: bytes
 
 
 @stored
@@ -63,8 +67,6 @@ class AutoState:
         In rising order of links.
     search : bytes
         Checkpoint of the identification that runs, or empty.
-    best : bytes
-        Checkpoint of the likeliest one that is done, or empty.
     share : float
         How far the one that runs has come, 0..1.
     generation : int
@@ -76,7 +78,6 @@ class AutoState:
 
     tried: tuple[Tried, ...] = ()
     search: bytes = b""
-    best: bytes = b""
     share: float = 0.0
     generation: int = 0
     wall_s: float = 0.0
@@ -97,10 +98,10 @@ class AutoState:
         return {links: value - max(found.values()) for links, value in found.items()}
 
     @property
-    def chosen(self) -> int:
-        """The likeliest number of links."""
+    def chosen(self) -> Tried:
+        """The fewest links that are about as likely as the likeliest number."""
         found = self.likelihoods()
-        return max(found, key=lambda links: found[links])
+        return next(each for each in self.tried if found[each.links] >= -WORTH_A_LINK)
 
 
 class AutoIdentification:
@@ -218,20 +219,19 @@ class AutoIdentification:
             linear = linear_model(
                 error, jacobian, found.best - run.space.guess, run.prior_weight, run.shapes()
             )
-        tried = (*state.tried, Tried(links, linear, step.flights, step.best_cost))
+        tried = (*state.tried, Tried(links, linear, step.flights, step.best_cost, step.checkpoint))
         moved = replace(state, tried=tried, search=b"", share=0.0)
-        best = step.checkpoint if moved.chosen == links else state.best
-        fruitless = moved.chosen <= links - FRUITLESS
+        fruitless = moved.chosen.links <= links - FRUITLESS
         up = self.search.max_seconds is not None and state.wall_s >= self.search.max_seconds
-        return replace(moved, best=best, over=fruitless or len(tried) == len(AUTO_LINKS) or up)
+        return replace(moved, over=fruitless or len(tried) == len(AUTO_LINKS) or up)
 
     def _fraction(self, state: AutoState) -> float:
         return 1.0 if state.over else (len(state.tried) + state.share) / len(AUTO_LINKS)
 
     def _shown(self, state: AutoState) -> tuple[Identification, bytes]:
         """The identification whose result counts, with its checkpoint."""
-        if state.best:
-            return self.runs[state.chosen], state.best
+        if state.tried:
+            return self.runs[state.chosen.links], state.chosen.checkpoint
         return self.runs[AUTO_LINKS[0]], state.search
 
     def _with_report(self, result: IdentifyResult, state: AutoState) -> IdentifyResult:

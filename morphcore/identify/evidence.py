@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
+from morphcore.search.least_squares import EXACT_RMS
 
 Array = NDArray[np.float64]
 
@@ -159,8 +160,8 @@ def log_likelihood(linear: Linear, weights: Array, count: float | None = None) -
     """
     count = linear.count if count is None else count
     share = linear.stiffness + weights[:, None]
-    # J and the prior's cost together, at their minimum; never less than rounding
-    fitted = np.maximum(linear.square - (linear.pull / share).sum(axis=1), linear.rows * SMALLEST_RAD**2)
+    # J and the prior's cost together, at their minimum; never less than what a descent leaves of an exact fit
+    fitted = np.maximum(linear.square - (linear.pull / share).sum(axis=1), linear.rows * EXACT_RMS**2)
     variance = np.clip(fitted / count, weights * MIN_SPREAD**2, weights * MAX_SPREAD**2)
     occam = np.log(share / weights[:, None]).sum(axis=1)
     return np.asarray(-0.5 * (fitted / variance + count * np.log(variance) + occam))
