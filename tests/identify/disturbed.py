@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ def flown(name: str, *, late_s: float = 0.0) -> Trajectory:
     def late(values: Array) -> Array:
         return np.concatenate([np.full(rows, values[0]), values[: values.size - rows]])
 
-    columns = {angle: late(getattr(found, angle)) for angle in ANGLES}
+    columns: dict[str, Any] = {angle: late(getattr(found, angle)) for angle in ANGLES}
     channels = {channel: late(values) for channel, values in found.extra.items()}
     return replace(sample, **columns, extra={}, channels=channels)
 
@@ -83,10 +84,11 @@ def flown(name: str, *, late_s: float = 0.0) -> Trajectory:
 def noisy(sample: Trajectory, sigma_rad: float, seed: int) -> Trajectory:
     """White noise on the three angles, the first row included."""
     noise = np.random.default_rng(seed).normal(0.0, sigma_rad, (sample.time_s.size, 3))
-    return replace(sample, **{name: getattr(sample, name) + noise[:, k] for k, name in enumerate(ANGLES)})
+    columns: dict[str, Any] = {name: getattr(sample, name) + noise[:, k] for k, name in enumerate(ANGLES)}
+    return replace(sample, **columns)
 
 
-def biased(sample: Trajectory, **bias_rad: float) -> Trajectory:
+def biased(sample: Trajectory, **bias_rad: Any) -> Trajectory:
     """Constant biases of some angles."""
     return replace(sample, **{name: getattr(sample, name) + value for name, value in bias_rad.items()})
 
@@ -105,7 +107,7 @@ def outliers(sample: Trajectory, seed: int, rows: int = 3, off_rad: float = 0.05
     chosen, side = rng.choice(sample.time_s.size, rows, replace=False), rng.choice([-1.0, 1.0], rows)
     error = np.zeros(sample.time_s.size)
     error[chosen] = off_rad * side
-    return biased(sample, **dict.fromkeys(ANGLES, error))  # type: ignore[arg-type]
+    return biased(sample, **dict.fromkeys(ANGLES, error))
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class Found:
     relative: Array
     standard_error: Array
 
-    def measurement(self, sample: str) -> dict:  # type: ignore[type-arg]
+    def measurement(self, sample: str) -> dict[str, Any]:
         """What the result says of the measurement of a sample, by the name of its example."""
         return dict(self.result.to_document()["measurement"][f"train_{sample}"])
 

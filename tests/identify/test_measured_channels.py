@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ CHANNEL_TOLERANCE = 1e-3
 RATE_SIGMA, TIP_SIGMA, ANGLE_SIGMA = 5e-4, 5e-4, 1e-4
 
 
-def channels(**sigma: float) -> dict[str, dict[str, float]]:
+def channels(**sigma: float) -> Any:
     """Channels of a measurement with their sigmas."""
     return {name: {"sigma": value} for name, value in sigma.items()}
 
@@ -44,7 +45,7 @@ def test_channels_of_a_batch_are_those_of_a_single_flight(name: str) -> None:
     """The batch, which flies one half of a symmetric flight, reads what `simulate` reports row by row."""
     sample = flown(name)
     model = chain_model(reference_aircraft(), reference_flight(), LINKS)
-    measurement = Measurement(channels=channels(**dict.fromkeys(sample.channels, 1.0)))  # type: ignore[arg-type]
+    measurement = Measurement(channels=channels(**dict.fromkeys(sample.channels, 1.0)))
     (case,) = sample_cases(model, [sample], 0.01)
     case = replace(case, given=measured(sample, measurement, Openness()))
     ((_, found),) = shared_trims(model, truth(), [case], "trim")
@@ -84,8 +85,8 @@ def test_rates_and_tips_tell_the_torsion_stiffness() -> None:
         samples.append(replace(sample, channels=read))
     angles = channels(phi=ANGLE_SIGMA, theta=ANGLE_SIGMA, psi=ANGLE_SIGMA)
     more = channels(p=RATE_SIGMA, q=RATE_SIGMA, r=RATE_SIGMA, tip_left_z=TIP_SIGMA, tip_right_z=TIP_SIGMA)
-    alone = fitted(samples, Measurement(channels=angles))  # type: ignore[arg-type]
-    both = fitted(samples, Measurement(channels={**angles, **more}))  # type: ignore[arg-type]
+    alone = fitted(samples, Measurement(channels=angles))
+    both = fitted(samples, Measurement(channels={**angles, **more}))
     print(alone.standard_error, both.standard_error, alone.relative, both.relative)
     assert both.standard_error[1] < 0.5 * alone.standard_error[1]
     assert np.all(np.abs(both.relative) < 3.0 * both.standard_error)
@@ -99,7 +100,7 @@ def test_left_out_sigmas_are_those_of_the_noise() -> None:
             (noisy(flown(name), ANGLE_SIGMA, k), flown(name).time_s.size) for k, name in enumerate(TRAINING)
         )
     ]
-    found = fitted(samples, Measurement(channels={"theta": {}, "phi": {}, "psi": {}, "q": {}}))  # type: ignore[dict-item]
+    found = fitted(samples, Measurement.parse({"channels": {"theta": {}, "phi": {}, "psi": {}, "q": {}}}))
     sigma = found.measurement("asymmetric")["sigma"]
     assert sigma["q"] == pytest.approx(1e-3, rel=0.2)
     assert sigma["theta"] == pytest.approx(ANGLE_SIGMA, rel=0.2)
@@ -162,7 +163,7 @@ def test_nuisances_are_eliminated_exactly() -> None:
         ({"biases": True}, "/measurement/biases"),
     ],
 )
-def test_a_measurement_that_makes_no_sense_is_refused(measurement: dict, pointer: str) -> None:  # type: ignore[type-arg]
+def test_a_measurement_that_makes_no_sense_is_refused(measurement: dict[str, Any], pointer: str) -> None:
     """Where the field stands is said."""
     with pytest.raises(InvalidInput) as caught:
         Measurement.parse(measurement, "/measurement")
@@ -173,7 +174,7 @@ def test_a_channel_that_a_sample_lacks_is_refused() -> None:
     """Of a sample to fit; one that is held out may do without."""
     sample = flown("rate_0.8")
     without = replace(sample, name="without", channels={})
-    measurement = Measurement(channels={"q": {"sigma": 1e-3}})  # type: ignore[dict-item]
+    measurement = Measurement.parse({"channels": {"q": {"sigma": 1e-3}}})
 
     def run(*samples: Trajectory) -> Identification:
         return Identification(
