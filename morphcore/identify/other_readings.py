@@ -25,7 +25,8 @@ from morphcore.identify.cost import (
     sample_cases,
     shared_trims,
 )
-from morphcore.search.least_squares import FixedPrior, LeastSquares
+from morphcore.search.least_squares import LeastSquares
+from morphcore.search.prior import FixedPrior
 from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.trajectory import Trajectory

@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.search.checkpoint import stored
+from morphcore.search.prior import FixedPrior, Prior
 from morphcore.search.solver import Batch, Box, Outcome, Problem, Solver
 
 Array = NDArray[np.float64]
@@ -47,55 +48,6 @@ EXACT_RMS = 1e-8  # smaller residuals are round-off: nothing is left to fit
 NARROWING = ((3, 1.0), (6, 0.5))
 # of the box's width, by which a bound moves outward when a start is pushed against it
 WIDENING = 0.5
-
-
-class Prior(Protocol):
-    """What is known of a point before any residual is seen."""
-
-    @property
-    def point(self) -> Array:
-        """The most likely point (d,)."""
-        ...
-
-    @property
-    def first(self) -> Array:
-        """Weights (d,) with which a descent begins: the cost of one unit off the point, squared."""
-        ...
-
-    def weights(self, error: Array, jacobian: Array, offset: Array, present: Array) -> Array:
-        """Return the weights (d,) of the next iteration.
-
-        Parameters
-        ----------
-        error, jacobian : ndarray, shape (m,) and (m, d)
-            Residuals at a point, and their derivatives.
-        offset : ndarray, shape (d,)
-            The point less the most likely one.
-        present : ndarray, shape (d,)
-            The weights of the iteration before.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class FixedPrior:
-    """A prior whose weights do not depend on the residuals.
-
-    Attributes
-    ----------
-    point : ndarray, shape (d,)
-        The most likely point.
-    first : ndarray, shape (d,)
-        The weights.
-    """
-
-    point: Array
-    first: Array
-
-    def weights(self, error: Array, jacobian: Array, offset: Array, present: Array) -> Array:
-        """Return the weights as they are."""
-        del error, jacobian, offset
-        return present
 
 
 @stored

@@ -13,8 +13,9 @@ import pytest
 from morphcore.errors import InvalidInput
 from morphcore.search.evolution import EvolutionSettings, EvolutionStrategy
 from morphcore.search.hybrid import SCREENING, Hybrid
-from morphcore.search.least_squares import FixedPrior, LeastSquares
+from morphcore.search.least_squares import LeastSquares
 from morphcore.search.methods import METHODS, method
+from morphcore.search.prior import FixedPrior
 from morphcore.search.run import UNFINISHED, Search, SearchState
 from morphcore.search.solver import Outcome, Solver
 from morphcore.search.swarm import ParticleSwarm, SwarmSettings
