@@ -59,6 +59,8 @@ class Record:
         Derivatives of the residual by the sample's own nuisances: biases, delay, heading, initial state.
     nuisance_prior : ndarray, shape (n,)
         Weight of the prior of each nuisance in the fit, squared residual a squared unit; none if left out.
+    nuisance_spread : ndarray, shape (n,)
+        Standard deviation of each prior; 0 where there is none, and if left out.
     nuisance_slope : ndarray, shape (n, d), optional
         Derivatives of the fitted nuisances by the search coordinates, where ``jacobian`` contains them.
     first_row_channel : int or None
@@ -71,6 +73,7 @@ class Record:
     motion_rad: float | Array = 0.0
     nuisance: Array = field(default_factory=_no_columns)
     nuisance_prior: Array = field(default_factory=lambda: np.zeros(0))
+    nuisance_spread: Array = field(default_factory=lambda: np.zeros(0))
     nuisance_slope: Array | None = None
     first_row_channel: int | None = HEADING
 
@@ -285,9 +288,11 @@ class ColouredNoise:
     @property
     def _prior_variance(self) -> Array:
         """(w,) of the priors' own errors; a nuisance's prior is taken at its word."""
-        d = self.dimension
-        nuisance = 1.0 / np.maximum(self.held[d:], 1e-300)
-        return np.concatenate([np.full(d, self.spread**2), np.where(self.held[d:] > 0.0, nuisance, 0.0)])
+        spreads = [
+            each.nuisance_spread if each.nuisance_spread.size else np.zeros(each.nuisance_count)
+            for each in self.records
+        ]
+        return np.concatenate([np.full(self.dimension, self.spread), *spreads]) ** 2
 
     def _spread(self, model: NoiseModel) -> Array:
         """(w, w) sum_ij D_i' R(i - j) D_j of one model of the noise."""

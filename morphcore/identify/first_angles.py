@@ -62,8 +62,13 @@ def with_first_angles(
     columns = np.where(np.isfinite(columns), columns, 0.0)
     # an error of one standard deviation costs as much as the noise of one angle's row
     unit = max(PRIOR_RAD, *angle_noise(case.sample).values())
-    spread = np.array(list(noisy.values())) * PRIOR_RAD / unit
-    return replace(setup, angle_columns=columns, angle_spread=spread, angle_names=tuple(noisy))
+    return replace(
+        setup,
+        angle_columns=columns,
+        angle_spread=np.array(list(noisy.values())),
+        angle_unit_rad=unit,
+        angle_names=tuple(noisy),
+    )
 
 
 def _trimmed(

@@ -101,7 +101,9 @@ class Measured:
     angle_columns : ndarray, shape (k, c, n)
         Derivatives of the readings by errors of the first angles of noisy drives.
     angle_spread : ndarray, shape (n,)
-        Standard deviations of these, as far as `nuisance.PRIOR_RAD` counts for one.
+        Standard deviations of these, rad.
+    angle_unit_rad : float
+        What an error of one standard deviation costs, rad.
     angle_names : tuple of str
         Drives that these belong to.
     """
@@ -115,6 +117,7 @@ class Measured:
     start_spread: Array = field(default_factory=lambda: np.zeros(0))
     angle_columns: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     angle_spread: Array = field(default_factory=lambda: np.zeros(0))
+    angle_unit_rad: float = 1.0
     angle_names: tuple[str, ...] = ()
 
     @property

@@ -59,7 +59,7 @@ def reduced(setup: Measured, time_s: Array, flown: Array | Readings) -> Reduced:
         The flights' readings at those times, or at all times.
     """
     particles = flown.values.shape[0] if isinstance(flown, Readings) else flown.shape[0]
-    columns, spread = linear_columns(setup)
+    columns, prior = linear_columns(setup)
     linear = columns.shape[2]
     free_delay = setup.openness.delay
     delay, nuisance = np.zeros(particles), np.zeros((particles, linear))
@@ -70,14 +70,14 @@ def reduced(setup: Measured, time_s: Array, flown: Array | Readings) -> Reduced:
     if setup.loss != "linear":
         trust = _trust(setup, error - _medians(setup, error))
     for _ in range(rounds):
-        found, change = _solved(setup, error, slope, columns, spread, trust, delay)
+        found, change = _solved(setup, error, slope, columns, prior, trust, delay)
         nuisance = found
         if free_delay:
             delay = np.clip(delay + change, -MAX_DELAY_S, MAX_DELAY_S)
             error, slope = _errors(setup, time_s, flown, delay)
         if trust is not None:
             trust = _trust(setup, error + _linear_part(columns, nuisance))
-    nuisance, _ = _solved(setup, error, slope[..., :0], columns, spread, trust, delay)
+    nuisance, _ = _solved(setup, error, slope[..., :0], columns, prior, trust, delay)
     left = error + _linear_part(columns, nuisance)
     if free_delay:
         nuisance = np.concatenate([nuisance, delay[:, None]], axis=1)
@@ -85,14 +85,20 @@ def reduced(setup: Measured, time_s: Array, flown: Array | Readings) -> Reduced:
 
 
 def linear_columns(setup: Measured) -> tuple[Array, Array]:
-    """Columns (k, c, n) of offsets, start and first angles, and their spreads (n,): infinite of offsets."""
+    """Columns (k, c, n) of offsets, start and first angles, and weights (n,) of their priors: 0 of offsets."""
     rows, count = setup.values.shape
     offsets = np.zeros((rows, count, int(setup.offset.sum())))
     for number, channel in enumerate(np.flatnonzero(setup.offset)):
         offsets[:, channel, number] = 1.0
     columns = [offsets, *(c for c in (setup.start_columns, setup.angle_columns) if c.shape[2])]
-    free = np.full(offsets.shape[2], np.inf)
-    return np.concatenate(columns, axis=2), np.concatenate([free, setup.start_spread, setup.angle_spread])
+    weights = np.concatenate(
+        [
+            np.zeros(offsets.shape[2]),
+            (PRIOR_RAD / setup.start_spread) ** 2,
+            (setup.angle_unit_rad / setup.angle_spread) ** 2,
+        ]
+    )
+    return np.concatenate(columns, axis=2), weights
 
 
 def pseudo_residual(setup: Measured, error: Array) -> Array:
@@ -152,7 +158,7 @@ def _solved(
     error: Array,
     slope: Array,
     columns: Array,
-    spread: Array,
+    prior: Array,
     trust: Array | None,
     delay: Array,
 ) -> tuple[Array, Array]:
@@ -176,7 +182,7 @@ def _solved(
         for j in range(i + 1):
             gram[:, i, j] = gram[:, j, i] = np.sum(scaled * designs[j], axis=(1, 2))
     held = np.zeros(size)
-    held[:count] = (PRIOR_RAD / spread) ** 2
+    held[:count] = prior
     if size > count:
         held[count] = (PRIOR_RAD / DELAY_SPREAD_S) ** 2
         right[:, count] -= held[count] * delay

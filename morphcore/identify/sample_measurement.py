@@ -40,6 +40,8 @@ class Nuisances:
         Derivatives of the values by the search coordinates.
     prior : ndarray, shape (n,)
         Weights of their priors.
+    spread : ndarray, shape (n,)
+        Standard deviations of their priors; 0 where there is none.
     """
 
     names: tuple[str, ...]
@@ -47,6 +49,7 @@ class Nuisances:
     columns: Array
     slope: Array
     prior: Array
+    spread: Array
 
 
 def fitted_nuisances(run: Identification, point: Array) -> tuple[Nuisances, ...]:
@@ -62,7 +65,8 @@ def _nuisances(
 ) -> Nuisances:
     setup = case.setup
     left = reduced_errors(run.model, batch, case, found)
-    columns, spread = linear_columns(setup)
+    columns, prior = linear_columns(setup)
+    spread = np.concatenate([np.zeros(int(setup.offset.sum())), setup.start_spread, setup.angle_spread])
     names = [f"bias.{name}" for name, free in zip(setup.channels, setup.offset, strict=True) if free]
     if setup.start_columns.shape[2]:
         parts = LONGITUDINAL if case.plan.halved else range(len(START))
@@ -71,13 +75,12 @@ def _nuisances(
     if setup.openness.delay:
         names.append("delay")
         columns = np.concatenate([columns, left.slope[0][..., None]], axis=2)
+        prior = np.append(prior, (PRIOR_RAD / DELAY_SPREAD_S) ** 2)
         spread = np.append(spread, DELAY_SPREAD_S)
     known = np.isfinite(columns) & np.isfinite(setup.values)[..., None]
     weighted = np.where(known, columns, 0.0) * setup.weight[:, None]
     slope = (left.nuisance[1:] - left.nuisance[0]) / steps[:, None]
-    return Nuisances(
-        tuple(names), left.nuisance[0], weighted[:, setup.fitted], slope.T, (PRIOR_RAD / spread) ** 2
-    )
+    return Nuisances(tuple(names), left.nuisance[0], weighted[:, setup.fitted], slope.T, prior, spread)
 
 
 def fit_records(
@@ -109,6 +112,7 @@ def fit_records(
                 motion,
                 nuisance=nuisance.columns,
                 nuisance_prior=nuisance.prior,
+                nuisance_spread=nuisance.spread,
                 nuisance_slope=nuisance.slope,
                 first_row_channel=None,
             )
