@@ -220,16 +220,23 @@ class ColouredNoise:
     @cached_property
     def joint_covariance(self) -> Array:
         """(w, w) of all unknowns: the sandwich, or between flights if larger."""
-        bread = inverted(self.normal)
-        total = self.joint_middle + np.diag(self.held**2 * self._prior_variance)
-        within = np.asarray(bread @ total @ bread)
-        between = self.between_flights
+        within, between, d = self._within, self.between_flights, self.dimension
         if between is None:
             return within
-        d = self.dimension
         ratio = np.ones(within.shape[0])
         ratio[:d] = np.sqrt(np.maximum(np.diag(between) / np.maximum(np.diag(within)[:d], 1e-300), 1.0))
-        return np.asarray(within * np.outer(ratio, ratio))
+        total = within * np.outer(ratio, ratio)
+        # nuisances follow the search coordinates
+        slope = self.elimination[:, d:].T
+        total[d:, d:] += slope @ (total - within)[:d, :d] @ slope.T
+        return np.asarray(total)
+
+    @cached_property
+    def _within(self) -> Array:
+        """(w, w) of all unknowns: the sandwich."""
+        bread = inverted(self.normal)
+        total = self.joint_middle + np.diag(self.held**2 * self._prior_variance)
+        return np.asarray(bread @ total @ bread)
 
     @property
     def covariance(self) -> Array:

@@ -85,7 +85,7 @@ def reduced(setup: Measured, time_s: Array, flown: Array | Readings) -> Reduced:
 
 
 def linear_columns(setup: Measured) -> tuple[Array, Array]:
-    """Columns (k, c, n) of offsets, start and first angles, and weights (n,) of their priors: 0 of offsets."""
+    """Columns (k, c, n) of offsets, start and first angles; weights (n,) of their priors, 0 of offsets."""
     rows, count = setup.values.shape
     offsets = np.zeros((rows, count, int(setup.offset.sum())))
     for number, channel in enumerate(np.flatnonzero(setup.offset)):
