@@ -246,7 +246,9 @@ def test_request_document_runs() -> None:
     )
     run = identification_from_request(IdentifyRequest.parse(request))
     document = run.result(last(run).checkpoint).to_document()
-    assert set(document) == {"model", "fit", "uncertainty", "measurement", "search", "cost", "warnings"}
+    assert set(document) == {
+        *("model", "fit", "uncertainty", "measurement", "search", "cost", "verdict", "warnings")
+    }
     assert document["search"]["method"] == "pso"
 
 
