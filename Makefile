@@ -18,7 +18,7 @@ SIDE_BY_SIDE = $(AT_ONCE) --jobs=2
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library faults faults-postgres faults-others conformance bench check openapi locked format clean
+.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library test-extended faults faults-postgres faults-others conformance bench check openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -78,16 +78,20 @@ test-services: setup
 	@$(call timed,$(BIN)/pytest -q $(addprefix --ignore=,$(API_TESTS) $(LIBRARY_TESTS) $(COMMAND_TESTS)))
 
 SLOW_TESTS := $(BIN)/pytest -q --timeout 1800
+IN_COMPANY := slow and not timed and not extended
 
 test-slow: setup  ## the long proofs
 	@# tests of response times and of speed run alone
 	@$(call timed,$(SIDE_BY_SIDE) slow-services slow-library && $(SLOW_TESTS) -m "slow and timed")
 
 slow-services: setup
-	@$(call timed,$(SLOW_TESTS) -m "slow and not timed" $(addprefix --ignore=,$(LIBRARY_TESTS)))
+	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(addprefix --ignore=,$(LIBRARY_TESTS)))
 
 slow-library: setup
-	@$(call timed,$(SLOW_TESTS) -m "slow and not timed" $(LIBRARY_TESTS))
+	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(LIBRARY_TESTS))
+
+test-extended: setup  ## laws over hundreds of fits (hours)
+	@$(BIN)/pytest -q -s --timeout 36000 -m extended
 
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
 	@# both pairs run at the same time, because most of the time they wait; tests of response times run alone

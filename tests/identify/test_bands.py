@@ -86,6 +86,7 @@ def test_what_is_requested_comes_with_the_result() -> None:
     np.testing.assert_allclose(again[0].lower, result.bands[0].lower, atol=1e-12)
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.parametrize("links", [2, 3])
 def test_bands_hold_rows_of_unseen_flights(links: int) -> None:

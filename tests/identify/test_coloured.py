@@ -159,6 +159,7 @@ def test_what_only_the_prior_holds_has_no_interval() -> None:
     assert low < 1.0 < high
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.parametrize("links", [2, 3])
 @pytest.mark.parametrize("correlation", [0.0, 0.95])

@@ -151,6 +151,7 @@ def stiffness_error(samples: list[Trajectory]) -> Array:
     return np.asarray(found / truth()["stiffness_nm_rad"].reshape(-1)[:2] - 1.0)
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 def test_noise_of_the_drives_hardly_moves_the_stiffness() -> None:
     """0.5 mrad rms at 100 Hz: within 10 per cent in the median of 20 seeds (before: some 90 off)."""

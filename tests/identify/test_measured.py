@@ -118,6 +118,7 @@ def test_white_noise_is_seen_in_a_smooth_signal(sigma: float) -> None:
     assert white_noise(coarse, np.sin(3.0 * coarse)) == 0.0
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BIASED)
 def test_biases_and_delays_over_many_seeds(name: str) -> None:
@@ -135,6 +136,7 @@ def test_biases_and_delays_over_many_seeds(name: str) -> None:
     assert np.median(worst) < 3e-4
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.parametrize("loss", ["huber", "soft_l1"])
 def test_outliers_over_many_seeds(loss: str) -> None:

@@ -40,6 +40,7 @@ def test_two_aircraft_are_predicted_from_two_flights(seed: int) -> None:
     assert max(found.values()) <= WORST
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 def test_the_median_over_ten_aircraft() -> None:
     """Over ten aircraft and one to five flights to fit, all angles."""
@@ -50,6 +51,7 @@ def test_the_median_over_ten_aircraft() -> None:
     assert np.median(ratios) <= MEDIAN
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason=EXCEPTIONS)
 def test_the_worst_of_ten_aircraft() -> None:
@@ -60,6 +62,7 @@ def test_the_worst_of_ten_aircraft() -> None:
     assert max(ratios) <= WORST
 
 
+@pytest.mark.extended
 @pytest.mark.slow
 @pytest.mark.xfail(
     strict=True, reason="predictions of 5e-6 of the rigid model's J wander by more than a fifth"
