@@ -166,8 +166,9 @@ def test_what_only_the_prior_holds_has_no_interval() -> None:
 def test_intervals_of_fits_hold_the_truth(links: int, correlation: float) -> None:
     """200 fits of two synthetic flights, all angles noisy from the first row on: 90 to 99 per cent hold it.
 
-    Each fit has a truth of its own, up to a factor e off the guess: what the prior is taken to allow. Counted are the parameters whose interval is closed in at least
-    half of the fits; three standard deviations of chance (of 200 draws) are allowed on either side.
+    Each fit has a truth of its own, up to a factor e off the guess: what the prior is taken to allow.
+    Counted are the parameters whose interval is closed in at least half of the fits; three standard
+    deviations of chance (of 200 draws) are allowed on either side.
     """
     space = search_space(chain_model(reference_aircraft(), reference_flight(), links))
     held: dict[str, list[bool]] = {}
