@@ -9,15 +9,8 @@ from pydantic import ConfigDict, Field
 
 from morphdata.base import Result
 from morphdata.faults import Fault
-from morphdata.identify import (
-    EXAMPLE_REQUEST,
-    Angles,
-    IdentifiedParameters,
-    SampleFit,
-    SamplesRequest,
-    SearchedModel,
-    repeated_faults,
-)
+from morphdata.identified import Angles, IdentifiedParameters, SampleFit
+from morphdata.identify import EXAMPLE_REQUEST, SamplesRequest, SearchedModel, repeated_faults
 from morphdata.options import MODEL, Option
 from morphdata.parameters import MAX_LINKS
 from morphdata.verdict import Verdict

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from morphdata.identify import IdentifiedParameters, SampleFit
+from morphdata.identified import IdentifiedParameters, SampleFit
 
 
 class ModelSummary(BaseModel):

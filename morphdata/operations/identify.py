@@ -8,13 +8,8 @@ from typing import Any
 from morphdata.aircraft import Surface
 from morphdata.drives import SIDES, Hinge, drive_name, resolved, shown_drives
 from morphdata.identifiable import corrections
-from morphdata.identify import (
-    CostEstimate,
-    IdentifyRequest,
-    IdentifyResult,
-    SamplesRequest,
-    Search,
-)
+from morphdata.identified import CostEstimate, IdentifyResult
+from morphdata.identify import IdentifyRequest, SamplesRequest, Search
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
 from morphdata.vehicle import paired_by_reflection

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from morphdata.identify import CostEstimate
+from morphdata.identified import CostEstimate
 from morphdata.operations import identify
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.study import StudyRequest, StudyResult

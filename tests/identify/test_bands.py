@@ -15,8 +15,8 @@ from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import search_settings
 from morphcore.models.equivalent import chain_model
 from morphcore.simulate.trajectory import Trajectory
+from morphdata.identified import Uncertainty as UncertaintyDocument
 from morphdata.identify import EquivalentModel, IdentifySearch
-from morphdata.identify import Uncertainty as UncertaintyDocument
 from morphdata.uncertainty import PosteriorSettings, UncertaintySettings
 from tests.identify.flights import reference_aircraft, reference_flight, synthetic
 

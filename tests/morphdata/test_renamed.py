@@ -9,7 +9,8 @@ import pytest
 from morphdata.aircraft import Section
 from morphdata.base import Document
 from morphdata.faults import InvalidInput
-from morphdata.identify import AeroCorrections, Bounds, EquivalentModel, IdentifyRequest
+from morphdata.identified import AeroCorrections
+from morphdata.identify import Bounds, EquivalentModel, IdentifyRequest
 from morphdata.parameters import EXAMPLE_PARAMETERS, Corrections, Parameters
 from morphdata.renamed import under_both_spellings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from morphcore.errors import InvalidInput
-from morphdata.identify import IdentifyResult
+from morphdata.identified import IdentifyResult
 from morphdata.parameters import EXAMPLE_PARAMETERS, WholeResult
 from morphdata.simulate import EXAMPLE_SIMULATION, SimulateRequest
 
