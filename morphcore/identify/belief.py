@@ -40,7 +40,7 @@ class Belief:
     profiles : tuple of Profile
     """
 
-    space: SearchSpace | None = None
+    space: SearchSpace | None = field(default=None, repr=False)
     estimate: Array = field(default_factory=lambda: np.zeros(0))
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     noise_rad: Array = field(default_factory=lambda: np.zeros(ANGLES))

@@ -110,5 +110,5 @@ def test_bad_environments_are_refused():
         Turbulence(wind_20ft_m_s=1.0, sigma_high_m_s=-1.0)
     with pytest.raises(InvalidInput, match="generator"):
         air_velocity(TURBULENCE, flight(), [0.0, 1.0])
-    with pytest.raises(InvalidInput, match="rising"):
+    with pytest.raises(InvalidInput, match="increasing"):
         air_velocity(Environment(), flight(), [0.0, 0.0])

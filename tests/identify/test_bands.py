@@ -80,7 +80,8 @@ def test_what_is_requested_comes_with_the_result() -> None:
     shares = [np.mean(band.holds(each.euler)) for band, each in zip(result.bands, unseen, strict=True)]
     assert min(shares) > 0.75
     curves = {each["name"]: each for each in result.curves()["samples"]}
-    assert set(curves["fast"]["band"]["lower"]) == {"phi_rad", "theta_rad", "psi_rad"}
+    assert set(curves["fast"]["band"]) == {"phi_rad", "theta_rad", "psi_rad"}
+    assert set(curves["fast"]["band"]["theta_rad"]) == {"low", "high"}
     assert "band" not in curves["even"]
     again = predict_bands(result, unseen, seed=1)
     np.testing.assert_allclose(again[0].lower, result.bands[0].lower, atol=1e-12)
