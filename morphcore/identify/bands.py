@@ -21,6 +21,7 @@ from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, sha
 from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.search.least_squares import PROBE
+from morphcore.shown import Shown
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import check_stop, say
@@ -37,8 +38,8 @@ MIN_FLOWN = 20  # of the draws, to make a band of
 HEADING = 2  # the angle that a flight takes from its first row, noise and all
 
 
-@dataclass(frozen=True)
-class Band:
+@dataclass(frozen=True, repr=False)
+class Band(Shown):
     """Predictive band of one flight.
 
     Attributes

@@ -71,8 +71,8 @@ def test_a_flight_begins_in_trim_however_the_morph_begins(flights):
     """A morph that accelerates at once and the same after a rest of ten rows fly alike, ten rows apart.
 
     While nothing moves, trim holds; its Newton iteration leaves 1e-9 rad. A morph that begins with the flight
-    meets a step that remembers no slopes yet: that costs a hundred-thousandth of the motion, and a quarter of it
-    with half the step.
+    meets a step that remembers no slopes yet: that costs a hundred-thousandth of the motion, and a quarter
+    of it with half the step.
     """
     at_once = SCHEDULES[0]
     later = Spline(at_once.knot_time_s + 0.1, at_once.knot_angle_rad)
