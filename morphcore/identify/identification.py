@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, costs, longest_step, residuals, sample_cases
 from morphcore.identify.drive_histories import smoothed_drives
 from morphcore.identify.evidence import ChosenPrior
 from morphcore.identify.first_angles import with_first_angles
@@ -314,6 +314,9 @@ class Identification:
             points = np.stack([state.best, *(self.known if freed else ())])
             known = self.evaluate(Batch(points), stop)
         leader = int(np.argmin(known.cost))
+        if known.cost[leader] > DIVERGED_ANGLE**2 > state.best_cost:
+            # flights begin so far off their trim that they diverge: what linear algebra predicted is not there
+            return self._entered(state)
         flights = state.flights + points.shape[0] * self.flights_each
         row = {
             "generation": state.generation + 1,

@@ -165,7 +165,7 @@ def test_rigid_model_of_the_samples(name):
 
 @pytest.mark.parametrize("name", SAMPLES)
 def test_chains_come_close_to_the_samples(name):
-    """Nothing fitted, chains of 2, 4 and 8 links miss the samples' pitch by less than half of what one link does.
+    """Nothing fitted, chains of 2, 4 and 8 links miss the samples by less than half the pitch of one link.
 
     Two links have the compliance of the whole span already: what remains is common to all.
     """
