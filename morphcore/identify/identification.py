@@ -315,7 +315,7 @@ class Identification:
             known = self.evaluate(Batch(points), stop)
         leader = int(np.argmin(known.cost))
         if known.cost[leader] > DIVERGED_ANGLE**2 > state.best_cost:
-            # flights begin so far off their trim that they diverge: what linear algebra predicted is not there
+            # flights begin so far off their trim that they diverge: the prediction did not hold
             return self._entered(state)
         flights = state.flights + points.shape[0] * self.flights_each
         row = {
