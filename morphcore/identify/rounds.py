@@ -182,25 +182,26 @@ def _changed(before: tuple[Openness, ...], after: tuple[Openness, ...]) -> bool:
 def _freed(run: Identification, best: Array, found: tuple[Openness, ...]) -> tuple[Openness, ...]:
     """The same object, or one in which undeclared biases, delays or starts are free that lower J much."""
     opened = tuple(_opened(run, case, each) for case, each in zip(run.cases, found, strict=True))
+    # a start and a bias of the same angle say nearly the same: not both of them without being declared
     started = tuple(
         replace(each, start=each.start or run.measurement.initial_state is None, reference=best)
-        for each in opened
+        for each in found
     )
     # a rigid wing misses so much that anything would explain it
     if run.model.links_per_wing == 1 or run.measurement.loss != "linear":
         return found
-    if not _differ(started, found):
+    if not (_differ(started, found) or _differ(opened, found)):
         return found
     rms = float(np.sqrt(np.mean(run.linearised(best)[0] ** 2)))
     if rms > SHOWN_RMS_RAD and _differ(opened, found):
         gain, values = _gain(run, best, opened)
         if gain > FREED_GAIN and _plausible(values):
             return _explained(opened, "biases and delays", gain)
-    if rms > START_RMS_RAD and _differ(started, opened):
+    if rms > START_RMS_RAD and _differ(started, found):
         # from a start far off its trim the descent may have ended anywhere
         gain = max(_gain(run, point, started)[0] for point in (best, run.space.guess))
         if gain > START_GAIN:
-            return _explained(started, "biases, delays and starts off the trim", gain)
+            return _explained(started, "starts off the trim", gain)
     return found
 
 
