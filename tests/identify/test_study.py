@@ -239,8 +239,8 @@ def test_the_example_flights_want_few_links(seed: int) -> None:
     From one link to three J falls by more than a factor of 1000, fitted and held out, and every model of two
     links or more predicts the asymmetric flight with less than 1e-3 of the rigid model's J, three links every
     angle within 0.6 mrad. More links gain little, and harm little: of their parameters the flights, whose
-    residuals are correlated, see a third with three links at least, less than a quarter with six. The cost of a flight rises with the links, by less than
-    their number.
+    residuals are correlated, see a third with three links at least, less than a quarter with six. The cost
+    of a flight rises with the links, by less than their number.
     """
     samples = [example(name) for name in ("rate_0.2", "rate_0.5", "rate_0.8")]
     samples.append(example("asymmetric", "held_out"))

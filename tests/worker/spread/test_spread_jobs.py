@@ -211,7 +211,7 @@ def test_a_stopped_worker_gives_its_chunk_back(spread: Spread) -> None:
     requested_at = time.monotonic() + 0.2
     stopped = spread.runner(shutting_down=lambda: time.monotonic() > requested_at)
     assert stopped.run_next() == (Ending.RELEASED, job_id)
-    assert time.monotonic() - requested_at < 1.0
+    assert time.monotonic() - requested_at < 2.0, "what is promised of every stop"
     assert {(chunk.status, chunk.attempt) for chunk in spread.chunks(job_id)} == {("open", 0)}
 
 
