@@ -18,7 +18,7 @@ from typing import Any
 
 import h11
 import uvicorn
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from app.errors import HttpError, ServiceBusy, ServiceError
 from app.http.problems import closing_answer
@@ -122,6 +122,7 @@ class GuardedProtocol(H11Protocol):
         self._linger_timer: asyncio.TimerHandle | None = None
         self._drain_timer: asyncio.TimerHandle | None = None
         self._unread = 0  # bytes waiting for the client at the last check
+        self._lingering: RequestResponseCycle | None = None  # whose request went on after its response
         self._refused = False
         self._ending = False
 
@@ -166,7 +167,11 @@ class GuardedProtocol(H11Protocol):
         super().data_received(data)
         if self._ending and self.cycle is not None:
             self.cycle.keep_alive = False
-        self._cancel("_linger_timer" if self._between_requests() else "_header_timer")
+        if not self._between_requests():
+            self._cancel("_header_timer")
+        # the late rest of a request may come together with the next request
+        if self._between_requests() or self.cycle is not self._lingering:
+            self._cancel("_linger_timer")
 
     def _between_requests(self) -> bool:
         return self.conn.their_state is h11.IDLE
@@ -209,6 +214,7 @@ class GuardedProtocol(H11Protocol):
         still_sending = self.conn.their_state is h11.SEND_BODY
         super().on_response_complete()
         if still_sending and not self.transport.is_closing():
+            self._lingering = self.cycle
             self._linger_timer = self.loop.call_later(LINGER_S, self.transport.close)
 
     def pause_writing(self) -> None:

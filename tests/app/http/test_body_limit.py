@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Iterator
 
 import pytest
 
+from app.http.server import LINGER_S
 from tests.app.running_service import RunningService
 
 GIGABYTE = 2**30
@@ -61,3 +63,27 @@ def test_body_at_the_limit_passes(service: RunningService) -> None:
 def test_nonsense_length_is_survived(service: RunningService) -> None:
     """A service survives nonsensical requests."""
     assert service.client.get("/livez", headers={"X-Long": "x" * 5000}).status_code == 200
+
+
+def test_a_late_body_and_the_next_request_keep_the_connection(service: RunningService) -> None:
+    """The rest of an answered request that comes together with the next one closes nothing afterwards."""
+    url = service.client.base_url
+    head = f"HTTP/1.1\r\nHost: {url.host}:{url.port}\r\n"
+    ask = f"GET /livez {head}\r\n".encode()
+    with socket.create_connection((url.host, url.port), timeout=10.0) as connection:
+
+        def answer() -> bytes:
+            found = b""
+            while b"\r\n\r\n" not in found:
+                piece = connection.recv(65536)
+                assert piece, f"closed after {found!r}"
+                found += piece
+            return found.splitlines()[0]
+
+        connection.sendall(f"POST /livez {head}Content-Length: 10\r\n\r\n12345".encode())
+        assert answer().split()[1].startswith(b"4")
+        connection.sendall(b"67890" + ask)
+        assert b"200" in answer()
+        time.sleep(LINGER_S + 0.5)
+        connection.sendall(ask)
+        assert b"200" in answer()
