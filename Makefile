@@ -53,7 +53,7 @@ serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 
 # all suites at once, on two cores too: tests of services wait for processes, sockets and limits of time while
 # the library calculates, and no core is idle at the end
-test: setup  ## the tests (some five minutes on two cores)
+test: setup  ## the tests (a quarter of an hour on two cores)
 	@$(call timed,$(AT_ONCE) --jobs=4 test-api test-library test-command test-services)
 
 API_TESTS := tests/app tests/conformance
