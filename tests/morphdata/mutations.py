@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any
 
 from hypothesis import strategies as st
@@ -73,7 +74,8 @@ def _change(draw: st.DrawFn, document: Any, place: Place) -> None:
     if kind == "drop":
         del parent[key]
     elif kind == "perturb" and isinstance(value, int | float) and not isinstance(value, bool):
-        parent[key] = value * draw(st.sampled_from(FACTORS))
+        scaled = value * draw(st.sampled_from(FACTORS))
+        parent[key] = scaled if abs(scaled) < math.inf else value  # JSON has no infinity
     elif kind == "extra" and isinstance(value, dict):
         value[draw(st.sampled_from([*EXTRA, *(name[::-1] for name in value)]))] = _odd(draw)
     elif kind == "swap":
