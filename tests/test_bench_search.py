@@ -40,7 +40,7 @@ def test_counts_the_flights_of_every_search() -> None:
     methods = figures["methods"]
     every = [run for found in methods.values() for run in found["runs"]]
     assert figures["best_known_J"] == min(run["J"] for run in every)
-    assert figures["target_J"] == pytest.approx(1.1 * figures["best_known_J"])
+    assert figures["target_J"] == pytest.approx(1.25 * figures["best_known_J"])
     # 10 parameters: the guess, then in every iteration 11 sets of the Jacobian and 24 trials
     assert [run["flight_sets"] for run in methods["least_squares"]["runs"]] == [106, 106]
     assert [run["flight_sets"] for run in methods["cma"]["runs"]] == [97, 97]

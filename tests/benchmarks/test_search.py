@@ -14,7 +14,7 @@ MAX_FLIGHT_SETS = 3000.0
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_every_search_arrives_within_three_thousand_flight_sets() -> None:
-    """To J within 10 per cent of the best that any of the searches reaches: ten of ten, by either descent.
+    """To J within a quarter of the best that any of the searches reaches: ten of ten, by either descent.
 
     The default method from the physical guess, and descents from ten points drawn around it, which share
     nothing but the samples. Time is printed, not asserted: it is the machine's.
