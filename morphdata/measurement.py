@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -155,10 +155,3 @@ class SampleMeasurement(Result):
         default={}, description="White noise that the rows of each angle carry, from their third differences."
     )
     reason: str | None = Field(default=None, description="Why biases, delay or start were free or not.")
-
-
-def measurement_or_default(given: Measurement | dict[str, Any] | None) -> Measurement:
-    """Return the measurement of a request; what is left out is decided from the data."""
-    if isinstance(given, dict):
-        return Measurement.parse(given, "/measurement")
-    return Measurement() if given is None else given

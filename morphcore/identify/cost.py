@@ -21,7 +21,7 @@ from morphcore.identify.measurement import START, Measured, Openness, measured
 from morphcore.identify.nuisance import Reduced, pseudo_residual, reduced
 from morphcore.identify.readings import Readings, readings, rows_needed
 from morphcore.lanes import TOGETHER
-from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
@@ -165,15 +165,22 @@ def shared_trims(
         yield case, known[key]
 
 
+def trimmed_flight(
+    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim
+) -> tuple[ChainModel, LaneConstants, Array]:
+    """What flies a sample's plan, its constants with the trim's thrust, its trimmed state (p, rows)."""
+    flown = case.plan.flown(model)
+    constants = lane_constants(flown, batch, case.plan.grid.step_s)
+    constants.set_thrust(found.force_B, found.moment_B)
+    return flown, constants, trimmed_state(flown, batch, case.plan, found, psi=float(case.sample.psi[0]))
+
+
 def fly_attitudes(
     model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
 ) -> Array:
     """Euler angles (p, k, 3) at the sample's times; NaN from where a flight diverged, or untrimmed."""
     plan, sample = case.plan, case.sample
-    model = plan.flown(model)
-    constants = lane_constants(model, batch, plan.grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
-    state = trimmed_state(model, batch, plan, found, psi=float(sample.psi[0]))
+    model, constants, state = trimmed_flight(model, batch, case, found)
     attitude = np.empty((batch.particles, sample.time_s.size, 3))
     if plan.grid.at is not None:
         for chunk in fly_batch(model, plan, constants, state, record_rows=4, stop=stop):
@@ -194,10 +201,7 @@ def fly_readings(
 ) -> Readings:
     """All channels that a sample fits, at any time; NaN from where a flight diverged, or untrimmed."""
     plan, setup = case.plan, case.setup
-    flown = plan.flown(model)
-    constants = lane_constants(flown, batch, plan.grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
-    state = trimmed_state(flown, batch, plan, found, psi=float(case.sample.psi[0]))
+    flown, constants, state = trimmed_flight(model, batch, case, found)
     if any(setup.openness.start_value):
         state = moved_start(state, found.alpha, float(case.sample.psi[0]), setup.openness.start_value)
     count = rows_needed(setup.channels, flown.coordinates)

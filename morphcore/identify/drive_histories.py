@@ -21,14 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from morphcore.identify.measurement import white_noise
+from morphcore.identify.measurement import DIFFERENCE, divided_differences, white_noise
 from morphcore.simulate.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Bandwidth = float | Literal["auto"]
 
 MIN_NOISE_RAD = 5e-6  # white noise below it is rounding, and moves no wing
-ORDER = 3  # of the differences that are few in a history: pieces of constant acceleration
 WEIGHTS = np.geomspace(1.0, 3e4, 14)  # of the third differences, tried in turn
 REWEIGHTINGS = 25  # of a weight: each brings the differences that are zero nearer to it
 ROUND = 1e-2  # of the noise: a smaller third difference counts as none
@@ -148,7 +147,7 @@ def _trend(time_s: Array, angle_rad: Array, noise: float) -> Array:
     rows = angle_rad.size
     for weight in WEIGHTS:
         smooth, kinks = _filtered(time_s, angle_rad, noise, float(weight))
-        free = rows - min(kinks + ORDER, rows - 1)
+        free = rows - min(kinks + DIFFERENCE, rows - 1)
         score = rows * float(np.sum((angle_rad - smooth) ** 2)) / free**2
         if score < best:
             best, chosen = score, smooth
@@ -160,30 +159,19 @@ def _filtered(time_s: Array, angle_rad: Array, noise: float, weight: float) -> t
 
     The absolute values are squares with weights of their own, renewed a few times.
     """
-    differences = _third_differences(time_s)
+    # third differences at the mean row spacing
+    differences = 6.0 * float(np.mean(np.diff(time_s))) ** DIFFERENCE * divided_differences(time_s)
     count, rows = differences.shape[0], angle_rad.size
     size, inverse = np.zeros(count), np.ones(count)
     smooth = angle_rad
     for _ in range(REWEIGHTINGS):
-        system = np.zeros((ORDER + 1, rows))  # upper bands
-        for a in range(ORDER + 1):
-            for b in range(a, ORDER + 1):
+        system = np.zeros((DIFFERENCE + 1, rows))  # upper bands
+        for a in range(DIFFERENCE + 1):
+            for b in range(a, DIFFERENCE + 1):
                 product = weight * inverse * differences[:, a] * differences[:, b]
-                system[ORDER - (b - a), b : b + count] += product
-        system[ORDER] += 1.0
+                system[DIFFERENCE - (b - a), b : b + count] += product
+        system[DIFFERENCE] += 1.0
         smooth = solveh_banded(system, angle_rad)
-        size = np.abs(sum(differences[:, a] * smooth[a : a + count] for a in range(ORDER + 1)))
+        size = np.abs(sum(differences[:, a] * smooth[a : a + count] for a in range(DIFFERENCE + 1)))
         inverse = noise / np.sqrt(size**2 + (ROUND * noise) ** 2)
     return smooth, int(np.sum(size > 3.0 * ROUND * noise))
-
-
-def _third_differences(time_s: Array) -> Array:
-    """Weights (k - 3, 4) of neighbouring rows that give their third difference at the mean row spacing."""
-    count = time_s.size - ORDER
-    times = np.stack([time_s[i : i + count] for i in range(ORDER + 1)], axis=1)
-    weights = np.full(times.shape, 6.0 * float(np.mean(np.diff(time_s))) ** ORDER)
-    for a in range(ORDER + 1):
-        for b in range(ORDER + 1):
-            if a != b:
-                weights[:, a] /= times[:, a] - times[:, b]
-    return weights

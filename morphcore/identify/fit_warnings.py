@@ -11,14 +11,13 @@ from morphcore.errors import NotFlyable
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.obstacle import obstacle
-from morphcore.identify.cost import shared_trims
+from morphcore.identify.cost import shared_trims, trimmed_flight
 from morphcore.identify.diagnoses import WRONG_DATA
 from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.sample_fit import SampleFit
-from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
-from morphcore.simulate.trim import trimmed_state
 from morphcore.validity import (
     AirMotion,
     ResultWarning,
@@ -166,10 +165,7 @@ def _motions(run: Identification, best: ParameterBatch, fits: Sequence[SampleFit
     for number, (fit, (case, found)) in enumerate(zip(fits, trims, strict=True)):
         if not found.converged[0]:
             continue
-        flown, plan = case.plan.flown(run.model), case.plan
-        constants = lane_constants(flown, best, plan.grid.step_s)
-        constants.set_thrust(found.force_B, found.moment_B)
-        state = trimmed_state(flown, best, plan, found, psi=float(case.sample.psi[0]))
-        motion = chain_motion(flown, plan, constants, state)
+        flown, constants, state = trimmed_flight(run.model, best, case, found)
+        motion = chain_motion(flown, case.plan, constants, state)
         motions.append((f"sample {fit.case.sample.name!r}", f"/samples/{number}", motion))
     return motions

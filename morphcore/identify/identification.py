@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,7 +221,7 @@ class Identification:
         """Rows and channels of the residuals of each sample to fit."""
         return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in self.training]
 
-    @cached_property
+    @property
     def floors(self) -> dict[str, float]:
         """The least noise that each channel is credited with."""
         return self._first_openness[0].sigma

@@ -254,13 +254,7 @@ def white_noise(time_s: Array, values: Array) -> float:
     count = values.size - DIFFERENCE
     if count < MIN_DIFFERENCES:
         return 0.0
-    # weights of four neighbours whose combination no parabola moves: those of the divided difference
-    offsets = np.stack([time_s[i : i + count] for i in range(DIFFERENCE + 1)], axis=1)
-    weights = np.ones_like(offsets)
-    for i in range(DIFFERENCE + 1):
-        for j in range(DIFFERENCE + 1):
-            if i != j:
-                weights[:, i] /= offsets[:, i] - offsets[:, j]
+    weights = divided_differences(time_s)
     weights /= np.linalg.norm(weights, axis=1, keepdims=True)
     rows = np.stack([values[i : i + count] for i in range(DIFFERENCE + 1)], axis=1)
     differences = np.einsum("ki,ki->k", weights, rows)
@@ -269,3 +263,15 @@ def white_noise(time_s: Array, values: Array) -> float:
     if alternating < ALTERNATING:
         return 0.0
     return float(MAD_TO_SIGMA * np.median(np.abs(differences)))
+
+
+def divided_differences(time_s: Array) -> Array:
+    """Weights (k - 3, 4) of neighbouring rows for third divided differences: no parabola moves them."""
+    count = time_s.size - DIFFERENCE
+    times = np.stack([time_s[i : i + count] for i in range(DIFFERENCE + 1)], axis=1)
+    weights = np.ones_like(times)
+    for i in range(DIFFERENCE + 1):
+        for j in range(DIFFERENCE + 1):
+            if i != j:
+                weights[:, i] /= times[:, i] - times[:, j]
+    return weights

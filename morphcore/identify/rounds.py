@@ -82,7 +82,6 @@ def with_start(run: Identification, case: SampleCase, setup: Measured, batch: Pa
         moved = change.copy()
         if part is not None:
             moved[part] += START_PROBE * start_spread(run)[part]
-        # a start that is exactly the trim's counts as not moved: 1e-300 is as good and has its derivatives
         openness = replace(base.openness, start_value=tuple(float(v) for v in moved))
         probed = replace(case, given=replace(base, openness=openness))
         ((_, found),) = shared_trims(run.model, batch, (probed,), run.settings.start)
