@@ -7,14 +7,14 @@ take precedence: import from inside such a package by ``from morphcore.identify.
 from __future__ import annotations
 
 import gc
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 _collecting = gc.isenabled()
 gc.disable()  # the imports create no garbage, and collecting it would take a twentieth of their time
 try:
     from morphcore.export.formats import export
-    from morphcore.identify import Identification, IdentifyResult, identification_from_request, identify
+    from morphcore.identify import identification_from_request, identify
+    from morphcore.late import late_names
     from morphcore.simulate.flight import Simulation, simulate
     from morphcore.simulate.trajectory import Trajectory, load_trajectory
     from morphcore.warming import warm_up, warm_up_further
@@ -22,16 +22,28 @@ try:
     from morphdata.flight import Flight, load_flight
     from morphdata.version import VERSION
 finally:
+    if not gc.get_freeze_count():
+        gc.freeze()
+        gc.unfreeze()  # what was imported goes to the oldest generation without a look at each object
     if _collecting:
         gc.enable()
 
 if TYPE_CHECKING:
+    from morphcore.identify import Identification, IdentifyResult
     from morphcore.identify.study import study
     from morphcore.optimise import optimise_schedule
 
 __version__ = VERSION
 
-_LATE = {"optimise_schedule": "morphcore.optimise", "study": "morphcore.identify.study"}
+__getattr__ = late_names(
+    __name__,
+    {
+        "Identification": "morphcore.identify",
+        "IdentifyResult": "morphcore.identify",
+        "optimise_schedule": "morphcore.optimise",
+        "study": "morphcore.identify.study",
+    },
+)
 
 __all__ = [
     "Aircraft",
@@ -53,10 +65,3 @@ __all__ = [
     "warm_up",
     "warm_up_further",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Import rarely needed names on first use."""
-    if name not in _LATE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LATE[name]), name)

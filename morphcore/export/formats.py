@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from morphcore.errors import InvalidInput
 from morphcore.export.model_tables import Tables, model_tables, reference_trim
 from morphcore.geometry import aircraft as resolved
-from morphcore.identify.result import IdentifyResult
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, fitted
 from morphcore.models.parameters_document import parameter_batch, parameters_document
 from morphcore.shown import Shown
@@ -28,8 +27,11 @@ from morphdata.flight import Flight
 from morphdata.formats import FORMATS, ExportFormat, format_named
 from morphdata.parameters import Parameters, WholeResult, flown_with
 
+if TYPE_CHECKING:
+    from morphcore.identify.result import IdentifyResult
+
 Document = dict[str, Any]
-Given = IdentifyResult | ParameterBatch | Parameters | WholeResult | Document
+Given: TypeAlias = "IdentifyResult | ParameterBatch | Parameters | WholeResult | Document"
 Write = Callable[["ExportedModel"], bytes]
 
 
@@ -213,7 +215,7 @@ def export(
 
 def _given(model: Given) -> tuple[Any, Origin | None]:
     """The parameters in the form of a request, and what is known of their origin."""
-    if isinstance(model, IdentifyResult):
+    if not isinstance(model, ParameterBatch | Parameters | WholeResult | dict):
         model = model.to_document()
     if isinstance(model, ParameterBatch):
         return parameters_document(model), None

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.auto_links import AutoIdentification
-from morphcore.identify.bands import Band, predict_bands
-from morphcore.identify.identification import Identification
-from morphcore.identify.result import IdentifyResult
-from morphcore.identify.settings import SearchSettings, search_settings
-from morphcore.search.step import Step
+from morphcore.late import late_names
 from morphcore.simulate.trajectory import Trajectory
-from morphcore.stopping import Interrupted
 from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
+
+if TYPE_CHECKING:
+    from morphcore.identify.auto_links import AutoIdentification
+    from morphcore.identify.bands import Band, predict_bands
+    from morphcore.identify.identification import Identification
+    from morphcore.identify.result import IdentifyResult
+    from morphcore.identify.settings import SearchSettings
+    from morphcore.search.step import Step
+    from morphcore.stopping import Interrupted
+
+# imported on first use: together they would take a sixth of the time of importing the library
+__getattr__ = late_names(
+    __name__,
+    {
+        "AutoIdentification": "morphcore.identify.auto_links",
+        "Band": "morphcore.identify.bands",
+        "Identification": "morphcore.identify.identification",
+        "IdentifyResult": "morphcore.identify.result",
+        "Interrupted": "morphcore.stopping",
+        "SearchSettings": "morphcore.identify.settings",
+        "Step": "morphcore.search.step",
+        "predict_bands": "morphcore.identify.bands",
+    },
+)
 
 __all__ = [
     "AutoIdentification",
@@ -104,7 +122,7 @@ def identify(
         Flight.of(flight),
         samples,
         model or EquivalentModel(links_per_wing=links_per_wing),
-        search_settings(search or IdentifySearch(seed=seed)),
+        search or IdentifySearch(seed=seed),
         measurement=measurement,
         uncertainty=uncertainty,
     )
@@ -119,14 +137,26 @@ def _identification(
     flight: Flight,
     samples: Sequence[Trajectory],
     model: EquivalentModel,
-    search: SearchSettings,
+    search: IdentifySearch,
     *,
     measurement: Measurement | None,
     uncertainty: UncertaintySettings | None,
 ) -> Identification | AutoIdentification:
     """An identification with one number of links, or one that chooses it."""
+    from morphcore.identify.auto_links import AutoIdentification
+    from morphcore.identify.identification import Identification
+    from morphcore.identify.settings import search_settings
+
     kind = AutoIdentification if model.links_per_wing == "auto" else Identification
-    return kind(aircraft, flight, samples, model, search, measurement=measurement, uncertainty=uncertainty)
+    return kind(
+        aircraft,
+        flight,
+        samples,
+        model,
+        search_settings(search),
+        measurement=measurement,
+        uncertainty=uncertainty,
+    )
 
 
 def identification_from_request(
@@ -164,7 +194,7 @@ def identification_from_request(
     return _identification(
         *flown_inputs(request),
         request.model,
-        search_settings(request.search),
+        request.search,
         measurement=request.measurement,
         uncertainty=request.uncertainty,
     )
