@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.coloured import ANGLES, MIN_FLIGHTS, ColouredNoise
+from morphcore.identify.evidence import guess_spread, linear_model
 from morphcore.identify.likelihood import Likelihood
 from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.posterior import Posterior, posterior
 from morphcore.identify.profile import Profile, profile, require_names
+from morphcore.identify.sample_measurement import Nuisances, fit_records
 from morphcore.search.solver import Batch
 from morphdata.renamed import under_both_spellings
 
@@ -56,6 +59,34 @@ class Belief:
         if self.profiles:
             found["profile"] = under_both_spellings({each.name: each.to_document() for each in self.profiles})
         return found
+
+
+def fit_noise(
+    run: Identification,
+    estimate: Array,
+    residual: Array,
+    jacobian: Array,
+    motions_rad: Sequence[float],
+    nuisances: Sequence[Nuisances],
+) -> ColouredNoise:
+    """Compute the noise around a fit, with the prior that the fit was drawn to.
+
+    Parameters
+    ----------
+    run : Identification
+    estimate : ndarray, shape (d,)
+        The best search point.
+    residual, jacobian : ndarray, shape (m,) and (m, d)
+        There.
+    motions_rad : sequence of float
+        What the model adds to a rigid one, rms, of each sample to fit.
+    nuisances : sequence of Nuisances
+        Of each sample to fit.
+    """
+    weight = run.prior_weight
+    linear = linear_model(residual, jacobian, estimate - run.space.guess, weight, run.shapes())
+    parts = fit_records(run, residual, jacobian, motions_rad, nuisances)
+    return ColouredNoise(parts, weight, guess_spread(linear))
 
 
 def belief_of(run: Identification, estimate: Array, jacobian: Array, noise: ColouredNoise) -> Belief:

@@ -24,7 +24,6 @@ from morphcore.identify.noise_model import SMALLEST_RAD, Block, NoiseModel, bloc
 
 Array = NDArray[np.float64]
 
-HEADING = 2  # the channel whose first row is taken for the heading to begin with, noise and all
 ANGLES = 3  # channels of a row without further measurements: phi, theta, psi
 MIN_FLIGHTS = 3  # of a jackknife
 # errors that chains make on flights they were not fitted to, over the rms of what bending does to the
@@ -63,8 +62,6 @@ class Record:
         Standard deviation of each prior; 0 where there is none, and if left out.
     nuisance_slope : ndarray, shape (n, d), optional
         Derivatives of the fitted nuisances by the search coordinates, where ``jacobian`` contains them.
-    first_row_channel : int or None
-        The channel whose first row is not fitted but flown from, noise and all.
     """
 
     time_s: Array
@@ -75,7 +72,6 @@ class Record:
     nuisance_prior: Array = field(default_factory=lambda: np.zeros(0))
     nuisance_spread: Array = field(default_factory=lambda: np.zeros(0))
     nuisance_slope: Array | None = None
-    first_row_channel: int | None = HEADING
 
     @property
     def nuisance_count(self) -> int:
@@ -284,7 +280,6 @@ class ColouredNoise:
                 at,
                 sample=sample,
                 channel=channel,
-                from_first_row=channel == record.first_row_channel,
             )
             for sample, (record, at) in enumerate(zip(self.records, self.unknowns, strict=True))
             for channel in range(record.residual.shape[1])
@@ -308,7 +303,7 @@ class ColouredNoise:
         for each, scale in zip(self.blocks, model.scales_rad, strict=True):
             minimum = self.records[each.sample].discrepancy_rad[each.channel] if few else 0.0
             correlation = model.shape.correlation(each.time_s)
-            own = max(scale, minimum) ** 2 * each.gain.T @ correlation @ each.gain + each.fast
+            own = max(scale, minimum) ** 2 * each.gain.T @ correlation @ each.gain
             total[np.ix_(each.unknowns, each.unknowns)] += own
         return total
 

@@ -159,12 +159,29 @@ def log_likelihood(linear: Linear, weights: Array, count: float | None = None) -
         Independent rows; None for the model's own.
     """
     count = linear.count if count is None else count
-    share = linear.stiffness + weights[:, None]
-    # J and the prior's cost together, at their minimum; never less than what a descent leaves of an exact fit
-    fitted = np.maximum(linear.square - (linear.pull / share).sum(axis=1), linear.rows * EXACT_RMS**2)
-    variance = np.clip(fitted / count, weights * MIN_SPREAD**2, weights * MAX_SPREAD**2)
-    occam = np.log(share / weights[:, None]).sum(axis=1)
+    fitted, variance = _fitted(linear, weights, count)
+    occam = np.log1p(linear.stiffness / weights[:, None]).sum(axis=1)
     return np.asarray(-0.5 * (fitted / variance + count * np.log(variance) + occam))
+
+
+def guess_spread(linear: Linear) -> float:
+    """Standard deviation of the physical guess in search coordinates, by what the flights say of it.
+
+    Root mean square over all weights of the prior by their likelihood: few parameters tell their spread only
+    roughly, and that of the likeliest weight alone would promise too much.
+    """
+    likelihood = log_likelihood(linear, WEIGHTS)
+    _, variance = _fitted(linear, WEIGHTS, linear.count)
+    share = np.exp(likelihood - likelihood.max())
+    return float(np.sqrt(np.average(variance / WEIGHTS, weights=share)))
+
+
+def _fitted(linear: Linear, weights: Array, count: float) -> tuple[Array, Array]:
+    """(w,) J and the prior's cost together, at their minimum, and the likeliest variance of a residual."""
+    share = linear.stiffness + weights[:, None]
+    # never less than what a descent leaves of an exact fit
+    fitted = np.maximum(linear.square - (linear.pull / share).sum(axis=1), linear.rows * EXACT_RMS**2)
+    return fitted, np.clip(fitted / count, weights * MIN_SPREAD**2, weights * MAX_SPREAD**2)
 
 
 def log_evidence(linear: Linear, count: float | None = None) -> float:

@@ -40,12 +40,8 @@ class Block:
         Averages of the residual.
     design : ndarray, shape (b, w)
         Averages of the derivatives by the unknowns of the fit.
-    open_design : ndarray, shape (b, 1) or (b, 0)
-        What the data leave open and the fit took from the first row: the heading.
     gain : ndarray, shape (b, w)
         How the noise in each bin enters the estimate's right-hand side.
-    fast : ndarray, shape (w, w)
-        What the first row's own noise, faster than its bin, adds through the heading; rad^2.
     unknowns : ndarray of int, shape (w,)
         Places of the columns among all unknowns of the fit.
     sample, channel : int
@@ -55,9 +51,7 @@ class Block:
     time_s: Array
     residual: Array
     design: Array
-    open_design: Array
     gain: Array
-    fast: Array
     unknowns: NDArray[np.int64]
     sample: int
     channel: int
@@ -71,7 +65,6 @@ def block(
     *,
     sample: int,
     channel: int,
-    from_first_row: bool,
 ) -> Block:
     """Average one channel of one sample over its bins.
 
@@ -82,28 +75,16 @@ def block(
     design : ndarray, shape (k, w)
     unknowns : ndarray of int, shape (w,)
     sample, channel : int
-    from_first_row : bool
-        The flown channel begins where the first measured row is, noise and all.
     """
     bins = np.floor((time_s - time_s[0]) / max(np.ptp(time_s), 1e-300) * BINS * (1.0 - 1e-12))
     first = np.flatnonzero(np.diff(bins, prepend=-1.0))  # of each bin that has rows
     counts = np.diff(first, append=time_s.size).astype(np.float64)
     gain = np.add.reduceat(design, first, axis=0)
-    middle = np.add.reduceat(residual, first) / counts
-    fast = np.zeros((design.shape[1], design.shape[1]))
-    if from_first_row:
-        total = design.sum(axis=0)
-        scatter = residual - np.repeat(middle, counts.astype(np.int64))
-        fast = np.outer(total, total) * (scatter @ scatter) / time_s.size
-        gain = gain.copy()
-        gain[0] -= total
     return Block(
         time_s=np.add.reduceat(time_s, first) / counts,
-        residual=middle,
-        design=np.add.reduceat(design, first, axis=0) / counts[:, None],
-        open_design=np.ones((first.size, int(from_first_row))),
+        residual=np.add.reduceat(residual, first) / counts,
+        design=gain / counts[:, None],
         gain=gain,
-        fast=fast,
         unknowns=unknowns,
         sample=sample,
         channel=channel,
@@ -162,16 +143,14 @@ def noise_models(blocks: Sequence[Block], prior: Array, lengths_s: Sequence[floa
 
 def _restricted_likelihood(blocks: Sequence[Block], prior: Array, shape: NoiseShape) -> tuple[float, Array]:
     """Logarithm of the restricted likelihood of a shape, and the scales (blocks,) of the noise, rad."""
-    places, grams, crosses, squares, determinant = _whitened(blocks, prior.size, shape)
+    places, grams, crosses, squares, determinant = _whitened(blocks, shape)
     sizes = np.array([each.time_s.size for each in blocks], dtype=np.float64)
     scales = np.maximum(squares / sizes, SMALLEST_RAD**2)
-    width = prior.size + sum(each.open_design.shape[1] for each in blocks)
-    held = np.zeros(width)
-    held[: prior.size] = prior
+    width = prior.size
     normal, left = np.eye(width), squares
     for _ in range(ROUNDS):
         typical = float(np.exp(np.mean(np.log(scales))))
-        normal, right = np.diag(held / typical + 1e-300), np.zeros(width)
+        normal, right = np.diag(prior / typical + 1e-300), np.zeros(width)
         for at, gram, cross, scale in zip(places, grams, crosses, scales, strict=True):
             normal[np.ix_(at, at)] += gram / scale
             right[at] += cross / scale
@@ -191,22 +170,20 @@ def _restricted_likelihood(blocks: Sequence[Block], prior: Array, shape: NoiseSh
 
 
 def _whitened(
-    blocks: Sequence[Block], unknowns: int, shape: NoiseShape
+    blocks: Sequence[Block], shape: NoiseShape
 ) -> tuple[list[NDArray[np.int64]], list[Array], list[Array], Array, float]:
     """Places, normal matrices and right-hand sides of whitened blocks, their squares, log determinant."""
     places, grams, crosses, squares = [], [], [], []
-    determinant, opened = 0.0, unknowns
+    determinant = 0.0
     roots: dict[int, Array] = {}  # channels of a sample have their rows in common
     for each in blocks:
         if each.sample not in roots or roots[each.sample].shape[0] != each.time_s.size:
             roots[each.sample] = cholesky(shape.correlation(each.time_s), lower=True)
         root = roots[each.sample]
-        both = np.concatenate([each.residual[:, None], each.design, each.open_design], axis=1)
+        both = np.concatenate([each.residual[:, None], each.design], axis=1)
         rows = solve_triangular(root, both, lower=True)
         determinant += 2.0 * float(np.log(np.diag(root)).sum())
-        extra = each.open_design.shape[1]
-        places.append(np.concatenate([each.unknowns, np.arange(opened, opened + extra)]))
-        opened += extra
+        places.append(each.unknowns)
         grams.append(rows[:, 1:].T @ rows[:, 1:])
         crosses.append(rows[:, 1:].T @ rows[:, 0])
         squares.append(float(rows[:, 0] @ rows[:, 0]))

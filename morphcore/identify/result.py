@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.bands import Band, bands_of_cases
-from morphcore.identify.belief import Belief, belief_of
-from morphcore.identify.coloured import ColouredNoise
+from morphcore.identify.belief import Belief, belief_of, fit_noise
 from morphcore.identify.cost import SampleCase, fly_measured, shared_trims
 from morphcore.identify.cramer_rao import cramer_rao_percent
 from morphcore.identify.diagnoses import diagnoses
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.posterior import Posterior
 from morphcore.identify.sample_fit import ANGLES, SampleFit
-from morphcore.identify.sample_measurement import fit_records, fitted_nuisances, measurement_documents
+from morphcore.identify.sample_measurement import fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.identify.verdict import Verdict, verdict
 from morphcore.models.equivalent import ChainModel, ParameterBatch, physical_guess
@@ -200,7 +199,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         residual, jacobian = run.linearised(state.best)
         trained = [fit for fit in fits if fit.case.sample.role == "train"]
         motions = [_rms(fit.errors("rigid") * fit.case.weight) for fit in trained]
-        noise = ColouredNoise(fit_records(run, residual, jacobian, motions, nuisances), run.prior_weight)
+        noise = fit_noise(run, state.best, residual, jacobian, motions, nuisances)
         certainty = uncertainty(space, state.best, residual, jacobian, noise)
         belief = belief_of(run, state.best, jacobian, noise)
     held_out = [case for case in run.cases if case.sample.role == "held_out"]

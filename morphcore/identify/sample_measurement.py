@@ -114,7 +114,6 @@ def fit_records(
                 nuisance_prior=nuisance.prior,
                 nuisance_spread=nuisance.spread,
                 nuisance_slope=nuisance.slope,
-                first_row_channel=None,
             )
         )
     return tuple(found)

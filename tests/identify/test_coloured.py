@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from morphcore.identify.coloured import DISCREPANCY, HEADING, ColouredNoise, records
+from morphcore.identify.coloured import DISCREPANCY, ColouredNoise, Record, records
 from morphcore.identify.identification import Identification
 from morphcore.identify.parameters import Interval, search_space
 from morphcore.identify.settings import search_settings
@@ -21,6 +21,7 @@ from tests.identify.flights import reference_aircraft, reference_flight, synthet
 
 Array = NDArray[np.float64]
 
+HEADING = 2  # the channel that has a free offset
 PRIOR = 9e-10
 NOISE_RAD = 2e-4
 ROWS = 120
@@ -44,15 +45,28 @@ def slopes(rng: np.random.Generator, count: int, rows: int = ROWS, stop_s: float
 
 
 def estimate(jacobian: Array, noise: Array) -> tuple[Array, Array]:
-    """What a linear fit with the prior makes of noise (rows, 3): its error (d,) and what is left (m,).
+    """What a linear fit with the prior makes of noise (rows, 3): its error (d,) and what is left (rows, 3).
 
-    The flown heading begins where the first row has it, noise and all.
+    The heading's offset is free.
     """
-    error = -noise.copy()
-    error[:, HEADING] += noise[0, HEADING]
-    D, residual = jacobian.reshape(-1, jacobian.shape[-1]), error.ravel()
-    change = -np.linalg.solve(D.T @ D + PRIOR * np.eye(D.shape[1]), D.T @ residual)
-    return change, residual + D @ change
+    d = jacobian.shape[-1]
+    D = np.concatenate([jacobian, offset(jacobian.shape[0])], axis=2).reshape(-1, d + 1)
+    held = np.append(np.full(d, PRIOR), 0.0)
+    change = np.linalg.solve(D.T @ D + np.diag(held), D.T @ noise.ravel())
+    return change[:d], (D @ change).reshape(noise.shape) - noise
+
+
+def offset(rows: int) -> Array:
+    """Derivatives (rows, 3, 1) of the residuals by the heading's offset."""
+    columns = np.zeros((rows, 3, 1))
+    columns[:, HEADING] = 1.0
+    return columns
+
+
+def fitted_noise(time_s: Array, left: Array, jacobian: Array, prior: float) -> ColouredNoise:
+    """The noise around such a fit of one flight."""
+    record = Record(time_s, left, jacobian, nuisance=offset(time_s.size))
+    return ColouredNoise((record,), prior)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8, 0.95])
@@ -67,7 +81,7 @@ def test_intervals_hold_the_truth(correlation: float) -> None:
     hits, ratios = [], []
     for _ in range(150):
         change, left = estimate(jacobian, NOISE_RAD * first_order(rng, (ROWS, 3), correlation))
-        found = ColouredNoise(records([TIMES_S], left, jacobian.reshape(-1, 6)), PRIOR)
+        found = fitted_noise(TIMES_S, left, jacobian, PRIOR)
         with one_blas_thread():
             error = np.sqrt(np.diag(found.covariance))
         hits.append(np.abs(change) <= stdtrit(found.freedom, 0.975) * error)
@@ -82,11 +96,9 @@ def test_thinner_rows_tell_as_much_of_slow_noise() -> None:
     jacobian = slopes(rng, 5, 4 * ROWS)
     _, left = estimate(jacobian, NOISE_RAD * first_order(rng, (4 * ROWS, 3), 0.95))
     time_s = 0.01 * np.arange(4 * ROWS)
-    left = left.reshape(-1, 3)
 
     def errors(step: int) -> Array:
-        rows = jacobian[::step].reshape(-1, 5)
-        found = ColouredNoise(records([time_s[::step]], left[::step].ravel(), rows), PRIOR / step)
+        found = fitted_noise(time_s[::step], left[::step], jacobian[::step], PRIOR / step)
         return np.sqrt(np.diag(found.covariance))
 
     np.testing.assert_allclose(errors(4), errors(1), rtol=0.2)
@@ -147,8 +159,8 @@ def test_what_only_the_prior_holds_has_no_interval() -> None:
     jacobian[:, :, blind] = 0.0
     _, left = estimate(jacobian, 1e-5 * rng.normal(size=(ROWS, 3)))
     rows = jacobian.reshape(left.size, -1)
-    noise = ColouredNoise(records([TIMES_S], left, rows), PRIOR)
-    document = uncertainty(space, space.guess, left, rows, noise).to_document()
+    noise = fitted_noise(TIMES_S, left, jacobian, PRIOR)
+    document = uncertainty(space, space.guess, left.ravel(), rows, noise).to_document()
     assert document["method"] == "coloured"
     assert document["interval_95"]["damping_nms_rad.joint_1.edgewise"] == [None, None]
     former = "damping_nms_rad.joint_1.lag"  # written as well throughout version 0.2

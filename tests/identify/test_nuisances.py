@@ -59,10 +59,7 @@ def test_intervals_of_parameters_and_nuisances_hold_the_truth(correlation: float
         noise = [sizes * first_order(rng, (ROWS, CHANNELS), correlation) for _ in flights]
         change, left = fitted([f[0] for f in flights], [f[1] for f in flights], noise)
         found = ColouredNoise(
-            tuple(
-                Record(TIMES_S, own, f[0], nuisance=f[1], first_row_channel=None)
-                for own, f in zip(left, flights, strict=True)
-            ),
+            tuple(Record(TIMES_S, own, f[0], nuisance=f[1]) for own, f in zip(left, flights, strict=True)),
             PRIOR,
         )
         with one_blas_thread():
@@ -85,11 +82,9 @@ def test_eliminated_nuisances_are_those_that_are_fitted() -> None:
     D, B = jacobian.reshape(-1, PARAMETERS), nuisance.reshape(-1, CHANNELS + 1)
     slope = -np.linalg.lstsq(B, D, rcond=None)[0]
     reduced = (D + B @ slope).reshape(jacobian.shape)
-    joint = ColouredNoise(
-        (Record(TIMES_S, left, jacobian, nuisance=nuisance, first_row_channel=None),), PRIOR
-    )
+    joint = ColouredNoise((Record(TIMES_S, left, jacobian, nuisance=nuisance),), PRIOR)
     same = ColouredNoise(
-        (Record(TIMES_S, left, reduced, nuisance=nuisance, nuisance_slope=slope, first_row_channel=None),),
+        (Record(TIMES_S, left, reduced, nuisance=nuisance, nuisance_slope=slope),),
         PRIOR,
     )
     np.testing.assert_allclose(same.joint_covariance, joint.joint_covariance, rtol=1e-6, atol=1e-16)
@@ -106,8 +101,8 @@ def test_a_bias_that_is_fitted_costs_certainty() -> None:
     rng = np.random.default_rng(4)
     jacobian, nuisance = biased_record(rng, 5)
     _, (left,) = fitted([jacobian], [nuisance], [NOISE_RAD * first_order(rng, (ROWS, CHANNELS), 0.0)])
-    free = ColouredNoise((Record(TIMES_S, left, jacobian, nuisance=nuisance, first_row_channel=None),), 0.0)
-    known = ColouredNoise((Record(TIMES_S, left, jacobian, first_row_channel=None),), 0.0)
+    free = ColouredNoise((Record(TIMES_S, left, jacobian, nuisance=nuisance),), 0.0)
+    known = ColouredNoise((Record(TIMES_S, left, jacobian),), 0.0)
     ratio = np.sqrt(np.diag(free.covariance) / np.diag(known.covariance))
     assert np.all(ratio > 0.9)  # the estimates of the noise differ a little
     assert ratio.max() > 1.2
@@ -130,10 +125,7 @@ def test_leaving_a_flight_out_leaves_out_its_nuisances() -> None:
     _, left = fit([0, 1, 2, 3])
     without = np.stack([fit([k for k in range(4) if k != out])[0][:PARAMETERS] for out in range(4)])
     found = ColouredNoise(
-        tuple(
-            Record(TIMES_S, own, f[0], nuisance=f[1], first_row_channel=None)
-            for own, f in zip(left, flights, strict=True)
-        ),
+        tuple(Record(TIMES_S, own, f[0], nuisance=f[1]) for own, f in zip(left, flights, strict=True)),
         PRIOR,
     )
     assert found.between_flights is not None
