@@ -31,10 +31,8 @@ Residuals = Callable[[Array], Array]  # search points (p, d) -> residuals (p, m)
 CHAINS = 64
 FIRST_FLIGHTS = 3  # design points for each coefficient of the quadratic model
 FIRST_RADIUS = (0.1, 0.7)  # of the design in standard deviations of the linear model
-REFITS = 6  # of the quadratic model to flights at its own draws
-REFIT_DRAWS = 256
-LESSONS = 12  # refits of the model to the flights of the chains, before these count
-LESSON_MOVES = 12  # of the chains between two of them
+REFITS = 8  # of the quadratic model to flights at its own draws
+REFIT_DRAWS = 512
 DESCENT = 12  # steps towards the most likely point
 STEP_SHARES = np.geomspace(1.0, 1e-3, 16)  # of each, flown as one block of lanes
 WARMING = 30  # transitions of the model's chains before its draws are flown
@@ -206,7 +204,7 @@ def posterior(
     centre = _most_likely(flights, estimate)
     root = np.asarray(np.linalg.cholesky(likelihood.covariance), dtype=np.float64)
     model, z, step = _trained(flights, centre, root, rng)
-    points, density, acceptance = _chains(_instructed(flights, model, z, step, rng), settings)
+    points, density, acceptance = _chains(flights, model, z, step, settings, rng)
     searched = space.searched
     drawn = points.reshape(-1, points.shape[-1])
     return Posterior(
@@ -291,72 +289,31 @@ def _likeliest(flights: _Flights, rng: np.random.Generator) -> Array:
     return np.asarray(points[rng.choice(order, size=REFIT_DRAWS)])
 
 
-@dataclass
-class _Walk:
-    """Chains of search points that flights accept or not, c of them.
-
-    What they have been through is not kept here.
-    """
-
-    flights: _Flights
-    model: Surrogate
-    z: Array
-    step: float
-    rng: np.random.Generator
-    moves: int = 0
-    density: Array = field(default_factory=lambda: np.zeros(0))
-    forecast: Array = field(default_factory=lambda: np.zeros(0))
-
-    def begin(self, model: Surrogate) -> None:
-        """Take the proposals from a model from now on."""
-        self.model = model
-        if not self.density.size:
-            self.density = self.flights.fly(model.points(self.z))
-        self.forecast = model.log_density(self.z)
-
-    def move(self, *, keep: bool = False) -> float:
-        """Propose a move to each chain; return the share that was accepted."""
-        # where the model thinks too little of a point, no draw from far away takes its place: a near one does
-        self.moves += 1
-        near = self.moves % SHORT_EVERY == 0
-        size, leaps = (1, SHORT_LEAPS) if near else (TRANSITIONS, LEAPS)
-        moved, share = wander(self.model, self.z, self.rng, transitions=size, leaps=leaps, step=self.step)
-        if keep and not near:
-            self.step *= float(np.exp(0.5 * (share - WANTED_ACCEPTANCE)))
-        found = self.flights.fly(self.model.points(moved), keep=keep)
-        expected = self.model.log_density(moved)
-        with np.errstate(invalid="ignore"):
-            gain = (found - self.density) - (expected - self.forecast)
-        taken = np.log(self.rng.random(self.z.shape[0])) < np.nan_to_num(gain, nan=-np.inf)
-        self.z = np.where(taken[:, None], moved, self.z)
-        self.density = np.where(taken, found, self.density)
-        self.forecast = np.where(taken, expected, self.forecast)
-        return float(np.mean(taken))
-
-
-def _instructed(
-    flights: _Flights, model: Surrogate, z: Array, step: float, rng: np.random.Generator
-) -> _Walk:
-    """Chains whose model has learnt from their own flights.
-
-    The chains go where the flights find the posterior, also where the model has not looked for it.
-    """
-    walk = _Walk(flights, model, z, step, rng)
-    walk.begin(model)
-    for lesson in range(LESSONS):
-        share = float(np.mean([walk.move(keep=True) for _ in range(LESSON_MOVES)]))
-        say(f"posterior: lesson {lesson + 1} of {LESSONS}, {share:.0%} of proposals accepted")
-        walk.begin(flights.model(model.centre, model.root))
-    return walk
-
-
-def _chains(walk: _Walk, settings: PosteriorSettings) -> tuple[Array, Array, float]:
+def _chains(
+    flights: _Flights,
+    model: Surrogate,
+    z: Array,
+    step: float,
+    settings: PosteriorSettings,
+    rng: np.random.Generator,
+) -> tuple[Array, Array, float]:
     """Chains (n, c, d) of search points, their log densities (n, c), and the share that was accepted."""
-    flights, kept, densities, accepted = walk.flights, [], [], []
+    density, forecast = flights.fly(model.points(z)), model.log_density(z)
+    kept, densities, accepted = [], [], []
     while True:
-        accepted.append(walk.move())
-        kept.append(walk.model.points(walk.z))
-        densities.append(walk.density)
+        # where the model thinks too little of a point, no draw from far away takes its place: a near one does
+        near = len(kept) % SHORT_EVERY == SHORT_EVERY - 1
+        transitions, leaps = (1, SHORT_LEAPS) if near else (TRANSITIONS, LEAPS)
+        moved, _ = wander(model, z, rng, transitions=transitions, leaps=leaps, step=step)
+        found, expected = flights.fly(model.points(moved)), model.log_density(moved)
+        with np.errstate(invalid="ignore"):
+            gain = (found - density) - (expected - forecast)
+        taken = np.log(rng.random(z.shape[0])) < np.nan_to_num(gain, nan=-np.inf)
+        z = np.where(taken[:, None], moved, z)
+        density, forecast = np.where(taken, found, density), np.where(taken, expected, forecast)
+        kept.append(model.points(z))
+        densities.append(density)
+        accepted.append(float(np.mean(taken)))
         if len(kept) % CHECKED == 0 or flights.count >= settings.max_flights:
             first = int(BURNT * len(kept))
             points = np.stack(kept[first:])

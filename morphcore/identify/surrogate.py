@@ -18,15 +18,12 @@ from morphcore.identify.likelihood import Likelihood
 Array = NDArray[np.float64]
 
 LOOSEST_WEIGHT = 1e4  # misfit beyond which a flight has no less weight in the regression
-# variance of scores in the model, where that of flights is one: chains that go by a model get stuck where it
-# thinks too little of a point, so it is to reach further than the posterior
-DOUBT = 1.5
 RIDGE = 1e-6  # of the regression, in units of its mean square
 
 
 @dataclass(frozen=True)
 class Surrogate:
-    """Whitened scores s(z) = c + B z + z'Q z, over the root of DOUBT, at coordinates x = centre + root z.
+    """Whitened scores s(z) = c + B z + z'Q z of standardised coordinates x = centre + root z.
 
     Attributes
     ----------
@@ -86,7 +83,7 @@ def surrogate(
     weight = 1.0 / np.clip(log_density.max() - log_density, 1.0, LOOSEST_WEIGHT)
     normal = design.T @ (weight[:, None] * design)
     ridge = RIDGE * np.diag(np.diag(normal))
-    found = np.linalg.solve(normal + ridge, design.T @ (weight[:, None] * scores)) / np.sqrt(DOUBT)
+    found = np.linalg.solve(normal + ridge, design.T @ (weight[:, None] * scores))
     half = np.zeros((scores.shape[1], d, d))
     half[:, first, second] = found[1 + d :].T
     return Surrogate(
