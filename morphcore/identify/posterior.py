@@ -299,7 +299,9 @@ def _chains(
 ) -> tuple[Array, Array, float]:
     """Chains (n, c, d) of search points, their log densities (n, c), and the share that was accepted."""
     density, forecast = flights.fly(model.points(z)), model.log_density(z)
-    kept, densities, accepted = [], [], []
+    kept: list[Array] = []
+    densities: list[Array] = []
+    accepted: list[float] = []
     while True:
         # where the model thinks too little of a point, no draw from far away takes its place: a near one does
         near = len(kept) % SHORT_EVERY == SHORT_EVERY - 1
