@@ -25,9 +25,10 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatc
 from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
-from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import choose_step
+from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time

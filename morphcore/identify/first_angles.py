@@ -18,7 +18,8 @@ from morphcore.identify.drive_histories import DriveHistory
 from morphcore.identify.measurement import Measured, angle_noise
 from morphcore.identify.nuisance import PRIOR_RAD
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim
 

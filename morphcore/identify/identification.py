@@ -33,7 +33,7 @@ from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.search.step import Step
 from morphcore.simulate.compilation import compile_flights
 from morphcore.simulate.hinge_schedules import moved_flight
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread

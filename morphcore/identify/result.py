@@ -19,7 +19,7 @@ from morphcore.identify.cramer_rao import cramer_rao_percent
 from morphcore.identify.diagnoses import diagnoses
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.posterior import Posterior
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.identify.sample_measurement import fit_records, fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.identify.verdict import Verdict, verdict
@@ -29,6 +29,7 @@ from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
+from morphdata.measurement import ANGLES
 from morphdata.renamed import both_spellings, under_both_spellings
 
 if TYPE_CHECKING:

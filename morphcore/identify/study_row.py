@@ -10,11 +10,11 @@ import numpy as np
 from morphcore.errors import NotFlyable
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
+from morphdata.measurement import ANGLES
 
 Document = dict[str, Any]
 Role = Literal["train", "held_out"]

@@ -12,7 +12,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
-from morphdata.drives import resolved, shown_names, unmeasured_sides
+from morphdata.drive_keys import resolved, shown_names, unmeasured_sides
 from morphdata.faults import Fault, refuse
 from morphdata.samples import columns_of_aircraft, no_drive
 

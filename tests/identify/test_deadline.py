@@ -13,7 +13,7 @@ from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.optimise import ScheduleOptimisation
 from morphcore.search.swarm import SwarmSettings
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Deadline, Interrupted, listening, say
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened

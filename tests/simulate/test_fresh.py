@@ -9,8 +9,8 @@ import pytest
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trim import trim
 from morphdata.lattice import CORE_LAWS, Lattice, VortexCore
 from tests.models.chains import example_aircraft, example_flight, instant, random_batch
