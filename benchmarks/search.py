@@ -11,7 +11,8 @@ import numpy as np
 
 from benchmarks.setting import LINKS, RATE_SAMPLES, Bench, Clock, Figures
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.identification import CANDIDATE_SPREAD, Identification
+from morphcore.identify.descents import CANDIDATE_SPREAD
+from morphcore.identify.identification import Identification
 from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads

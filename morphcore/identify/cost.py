@@ -7,12 +7,12 @@ always; other channels count in proportion to their noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import euler_from_quaternion, euler_rates, quaternion_from_euler
@@ -210,6 +210,22 @@ def fly_readings(
     rows = np.concatenate([chunk.rows for chunk in chunks])
     rows[..., ~found.converged] = np.nan
     return readings(flown, batch, plan, found, rows, setup.channels, model)
+
+
+def reading_derivatives(
+    model: ChainModel, batch: ParameterBatch, flights: Iterable[tuple[SampleCase, Trim]], probe: ArrayLike
+) -> Array:
+    """Derivatives (k, c, n) of a sample's readings by differences of flights of one parameter set.
+
+    flights : the undisturbed one, and n with one thing each changed by its probe. probe : (n,) or one for
+    all. Where a flight diverged, the derivative is zero.
+    """
+    flown = [
+        fly_readings(model, batch, case, found).at(case.sample.time_s[None, :])[0][0]
+        for case, found in flights
+    ]
+    columns = np.stack([each - flown[0] for each in flown[1:]], axis=-1) / probe
+    return np.where(np.isfinite(columns), columns, 0.0)
 
 
 def moved_start(state: Array, alpha: Array, psi: float, change: Sequence[float]) -> Array:
