@@ -109,7 +109,7 @@ def test_an_optimisation_without_time_ends() -> None:
 
 
 @pytest.mark.parametrize("begin", [hopeless, optimisation])
-def test_progress_is_told_before_the_first_step(begin: Callable[..., Any]) -> None:
+def test_progress_is_reported_before_the_first_step(begin: Callable[..., Any]) -> None:
     """Who listens hears what is prepared from the first moment, the choice of the time step among it."""
     heard: list[str] = []
     steps: Iterator[Any] = begin().steps(stop=lambda: bool(heard))
