@@ -56,7 +56,6 @@ def search_figures(
     methods: Sequence[str] = METHODS,
     links_per_wing: int = LINKS,
     max_sets: int | None = None,
-    best_known: float | None = None,
     clock: Clock = time.perf_counter,
 ) -> Figures:
     """Search by several methods and seeds and count the flights.
@@ -66,7 +65,6 @@ def search_figures(
     samples : all of them are fitted. A flight set is one parameter set flown through all of them.
     methods : some of ``METHODS``; "paper" is the preset of that name.
     max_sets : a search is cut off after the step that exceeds it.
-    best_known : J to compare with, rad^2; None takes the least that any of these searches reaches.
     clock : rising seconds.
 
     Returns
@@ -87,8 +85,7 @@ def search_figures(
             )
             for seed in listed
         }
-    reached = min(run.costs[-1] for of_method in runs.values() for run in of_method.values())
-    best = reached if best_known is None else min(best_known, reached)
+    best = min(run.costs[-1] for of_method in runs.values() for run in of_method.values())
     target = (1.0 + WITHIN) * best
     return {
         "links_per_wing": links_per_wing,

@@ -246,11 +246,9 @@ def reduced_errors(
     return reduced(case.setup, case.sample.time_s, fly(model, batch, case, found, stop))
 
 
-def fly_measured(
-    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
-) -> Array:
+def fly_measured(model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim) -> Array:
     """Angles (p, k, 3) as the sample's sensors would have read them on the flights of parameter sets."""
-    return np.asarray(case.sample.euler + reduced_errors(model, batch, case, found, stop).error[..., :3])
+    return np.asarray(case.sample.euler + reduced_errors(model, batch, case, found).error[..., :3])
 
 
 def evaluate(
