@@ -18,7 +18,7 @@ SIDE_BY_SIDE = $(AT_ONCE) --jobs=2
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-identify test-library test-command test-services test-slow slow-services slow-library slow-timed test-extended faults faults-postgres faults-others faults-timed proofs conformance bench check check-types check-rest openapi locked format clean
+.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library slow-timed test-extended faults faults-postgres faults-others faults-timed conformance bench check check-types check-rest openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -54,7 +54,7 @@ serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 # all suites at once, on two cores too: tests of services wait for processes, sockets and limits of time while
 # the library calculates, and no core is idle at the end
 test: setup  ## the tests (a quarter of an hour on two cores)
-	@$(call timed,$(AT_ONCE) --jobs=5 test-identify test-library test-api test-command test-services)
+	@$(call timed,$(AT_ONCE) --jobs=4 test-api test-library test-command test-services)
 
 API_TESTS := tests/app tests/conformance
 LIBRARY_TESTS := $(wildcard tests/test_*.py) $(addprefix tests/, aero benchmarks docs export geometry identify \
@@ -68,12 +68,8 @@ timed = began=$$SECONDS; $(1); ended=$$?; echo "$@: $$((SECONDS - began)) s"; ex
 test-api: setup
 	@$(call timed,$(BIN)/pytest -q $(API_TESTS))
 
-# half of the library's processor time, and as its other half a process of its own: together they are the longest
-test-identify: setup
-	@$(call timed,$(BIN)/pytest -q tests/identify)
-
 test-library: setup
-	@$(call timed,$(BIN)/pytest -q $(filter-out tests/identify,$(LIBRARY_TESTS)))
+	@$(call timed,$(BIN)/pytest -q $(LIBRARY_TESTS))
 
 test-command: setup
 	@$(call timed,$(BIN)/pytest -q $(COMMAND_TESTS))
@@ -91,7 +87,7 @@ slow-services: setup
 	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(addprefix --ignore=,$(LIBRARY_TESTS)))
 
 slow-library: setup
-	@$(call timed,$(LAST) $(SLOW_TESTS) -m "$(IN_COMPANY)" $(LIBRARY_TESTS))
+	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(LIBRARY_TESTS))
 
 # tests of response times and of speed run alone
 slow-timed: setup
@@ -103,12 +99,6 @@ test-extended: setup  ## laws over hundreds of fits (hours)
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
 	@# both pairs run at the same time, because most of the time they wait; tests of response times run alone
 	@$(call timed,$(SIDE_BY_SIDE) faults-postgres faults-others && $(MAKE) --no-print-directory faults-timed)
-
-# the library calculates with what the others leave of the processor while they wait for leases, limits of time
-# and processes
-proofs: setup  ## test-slow and faults at the same time, as in CI
-	@$(call timed,$(AT_ONCE) --jobs=4 LAST="nice -n 19" slow-library faults-postgres faults-others slow-services \
-		&& $(MAKE) --no-print-directory faults-timed slow-timed)
 
 SPREAD_KILL := tests/worker/spread/test_spread_swarm.py::test_a_killed_process_costs_its_chunk
 FAULT_TESTS := $(BIN)/pytest -q -s tests/faults $(SPREAD_KILL) --timeout 900

@@ -26,7 +26,7 @@ COMPILING = "numba:compile"
 
 
 IMPORTED_FIRST = "numpy, scipy.optimize, numba"  # what the library computes with
-IMPORTS = 7  # of each, in turn
+IMPORTS = 11  # of each, in turn
 
 
 def import_times() -> Figures:
