@@ -18,7 +18,7 @@ SIDE_BY_SIDE = $(AT_ONCE) --jobs=2
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library test-extended faults faults-postgres faults-others conformance bench check openapi locked format clean
+.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library slow-timed test-extended faults faults-postgres faults-others faults-timed conformance bench check check-types check-rest openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -81,8 +81,7 @@ SLOW_TESTS := $(BIN)/pytest -q --timeout 1800
 IN_COMPANY := slow and not timed and not extended
 
 test-slow: setup  ## the long proofs
-	@# tests of response times and of speed run alone
-	@$(call timed,$(SIDE_BY_SIDE) slow-services slow-library && $(SLOW_TESTS) -m "slow and timed")
+	@$(call timed,$(SIDE_BY_SIDE) slow-services slow-library && $(MAKE) --no-print-directory slow-timed)
 
 slow-services: setup
 	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(addprefix --ignore=,$(LIBRARY_TESTS)))
@@ -90,22 +89,28 @@ slow-services: setup
 slow-library: setup
 	@$(call timed,$(SLOW_TESTS) -m "$(IN_COMPANY)" $(LIBRARY_TESTS))
 
+# tests of response times and of speed run alone
+slow-timed: setup
+	@$(call timed,$(SLOW_TESTS) -m "slow and timed")
+
 test-extended: setup  ## laws over hundreds of fits (hours)
 	@$(BIN)/pytest -q -s --timeout 36000 -m extended
 
 faults: setup  ## kill, stop, fill and mislead every process, on both pairs of database and broker
 	@# both pairs run at the same time, because most of the time they wait; tests of response times run alone
-	@$(SIDE_BY_SIDE) faults-postgres faults-others
-	@$(FAULT_TESTS) -m timed
+	@$(call timed,$(SIDE_BY_SIDE) faults-postgres faults-others && $(MAKE) --no-print-directory faults-timed)
 
 SPREAD_KILL := tests/worker/spread/test_spread_swarm.py::test_a_killed_process_costs_its_chunk
 FAULT_TESTS := $(BIN)/pytest -q -s tests/faults $(SPREAD_KILL) --timeout 900
 
 faults-postgres: setup
-	@$(FAULT_TESTS) -m "not timed" -k postgres
+	@$(call timed,$(FAULT_TESTS) -m "not timed" -k postgres)
 
 faults-others: setup
-	@$(FAULT_TESTS) -m "not timed" -k "not postgres"
+	@$(call timed,$(FAULT_TESTS) -m "not timed" -k "not postgres")
+
+faults-timed: setup
+	@$(call timed,$(FAULT_TESTS) -m timed)
 
 conformance: setup  ## one behaviour on SQLite and Postgres, embedded broker and Redis URL (MORPHID_TEST_*_URL)
 	@$(BIN)/pytest -q tests/conformance tests/app/jobs tests/app/test_database.py
@@ -114,9 +119,14 @@ bench: setup  ## the benchmark figures of this machine
 	@$(BIN)/morphid bench
 
 check: setup  ## formatting, lint, types, import contracts, OpenAPI document, migrations
+	@$(SIDE_BY_SIDE) check-types check-rest
+
+check-types: setup
+	$(BIN)/mypy
+
+check-rest: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python .ci/gates.py
 

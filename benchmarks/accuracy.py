@@ -10,7 +10,7 @@ from benchmarks.setting import ACCURACY_SAMPLES, LINKS, Array, Bench, Figures
 from morphcore.aero.operator import lattice_operator
 from morphcore.identify.cost import SampleCase, fly_attitudes, shared_trims
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 
 
 def step_error(bench: Bench) -> Figures:

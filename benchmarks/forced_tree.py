@@ -16,8 +16,9 @@ from benchmarks.setting import Array, Bench
 from morphcore.frames import quaternion_from_euler
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, lane_constants
 from morphcore.simulate.batch import fly_batch, initial_state
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import HingeMotion
+from morphcore.simulate.time_grid import TimeGrid
 from morphdata.lattice import Lattice
 
 TREE_LINKS = 4

@@ -16,8 +16,9 @@ from morphcore.geometry.surface import Surface
 from morphcore.identify.cost import SampleCase
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model
 from morphcore.paper.computation import benchmark_swarm
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trim import Trim, trim
 from morphcore.threads import use_threads
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -64,11 +63,6 @@ class ForcedMujoco:
         self._velocity = np.concatenate(
             [rotation_from_quaternion(quaternion) @ START_VELOCITY_B, START_RATES_B]
         )
-
-    @cached_property
-    def degrees_of_freedom(self) -> int:
-        """With the hinges."""
-        return int(self.model.nv)
 
     def reset(self, step_s: float) -> None:
         """Back to the start."""

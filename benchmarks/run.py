@@ -22,7 +22,7 @@ from benchmarks.single_flights import flexible_flight, single_flights
 from benchmarks.start_up import cold_compilation, first_generation, import_times
 from benchmarks.work_precision import quick_work_precision
 from morphcore.errors import InvalidInput
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import check_stop
 from morphcore.threads import use_threads
 from morphcore.warming import warm_up

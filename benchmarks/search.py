@@ -11,7 +11,8 @@ import numpy as np
 
 from benchmarks.setting import LINKS, RATE_SAMPLES, Bench, Clock, Figures
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.identification import CANDIDATE_SPREAD, Identification
+from morphcore.identify.descents import CANDIDATE_SPREAD
+from morphcore.identify.identification import Identification
 from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads
@@ -55,7 +56,6 @@ def search_figures(
     methods: Sequence[str] = METHODS,
     links_per_wing: int = LINKS,
     max_sets: int | None = None,
-    best_known: float | None = None,
     clock: Clock = time.perf_counter,
 ) -> Figures:
     """Search by several methods and seeds and count the flights.
@@ -65,7 +65,6 @@ def search_figures(
     samples : all of them are fitted. A flight set is one parameter set flown through all of them.
     methods : some of ``METHODS``; "paper" is the preset of that name.
     max_sets : a search is cut off after the step that exceeds it.
-    best_known : J to compare with, rad^2; None takes the least that any of these searches reaches.
     clock : rising seconds.
 
     Returns
@@ -86,8 +85,7 @@ def search_figures(
             )
             for seed in listed
         }
-    reached = min(run.costs[-1] for of_method in runs.values() for run in of_method.values())
-    best = reached if best_known is None else min(best_known, reached)
+    best = min(run.costs[-1] for of_method in runs.values() for run in of_method.values())
     target = (1.0 + WITHIN) * best
     return {
         "links_per_wing": links_per_wing,

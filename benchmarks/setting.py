@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import SampleCase, sample_cases
 from morphcore.models.equivalent import ChainModel
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.stopping import check_stop
 from morphcore.threads import thread_count

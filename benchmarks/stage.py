@@ -32,7 +32,8 @@ from morphcore.models.kernels.layout import (
 from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
-from morphcore.simulate.plan import FlightPlan, OperatorTable, surface_accelerations, surface_rows
+from morphcore.simulate.operator_table import OperatorTable
+from morphcore.simulate.plan import FlightPlan, surface_accelerations, surface_rows
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.trim import Trim, trimmed_state
 

@@ -31,7 +31,8 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify.cost import sample_schedules
 from morphcore.models.equivalent import ChainModel, chain_model, lane_constants, physical_guess
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
+from morphcore.simulate.plan import FlightPlan, flight_plan
+from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import trim, trimmed_state
 

@@ -59,16 +59,6 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def axis_rotation(axis: int, angle: float) -> Array:
-    """Rotation by ``angle`` (rad, right-handed) about axis 0, 1 or 2: child components to parent's."""
-    c, s = np.cos(angle), np.sin(angle)
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    rotation = np.eye(3)
-    rotation[j, j] = rotation[k, k] = c
-    rotation[j, k], rotation[k, j] = -s, s
-    return rotation
-
-
 def euler_rates(euler: ArrayLike, omega_B: ArrayLike) -> Array:
     """Time derivatives of (phi, theta, psi), shape (..., 3), rad/s, from body rates p, q, r.
 

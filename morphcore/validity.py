@@ -27,7 +27,7 @@ LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent o
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
 LARGEST_ERROR = 0.05  # share of the motion, rms
-MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/plan.py)
+MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from morphcore.models.equivalent import chain_model, lane_constants, physical_gu
 from morphcore.search import evolution, swarm
 from morphcore.simulate.compilation import SMALL, compile_flights, tiny_aircraft
 from morphcore.simulate.flight import flight_steps
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import use_threads

@@ -13,6 +13,7 @@ from morphdata.faults import Fault
 from morphdata.options import MEASUREMENT, Option
 
 ANGLES = ("phi", "theta", "psi")
+ANGLE_COLUMNS = tuple(f"{name}_rad" for name in ANGLES)  # as files and documents call them
 # they start anew with every simulated flight, or say nothing that the drives cause
 UNFITTED = ("vx", "vy", "x", "y", "z", "hinge_torque")
 MAX_CHANNELS = 64

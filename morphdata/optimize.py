@@ -12,7 +12,8 @@ from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Angle, Document, Result
-from morphdata.drives import Drive, resolved, shown_names
+from morphdata.drive_keys import resolved, shown_names
+from morphdata.drives import Drive
 from morphdata.execution import Request
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.flight import EXAMPLE_FLIGHT, Flight

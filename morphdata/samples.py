@@ -22,15 +22,8 @@ from pydantic_core import CoreSchema, PydanticKnownError
 from morphdata.axes import ATTITUDE_FIELDS, Axes, QuaternionSeries, in_axes_of_here
 from morphdata.base import AngleSeries, ChannelSeries, Document, Identifier, SampleName, TimeSeries
 from morphdata.channels import channel_field, document_name, is_channel
-from morphdata.drives import (
-    RESERVED,
-    SWEEPS,
-    Drive,
-    resolved,
-    resolved_columns,
-    shown_names,
-    unmeasured_sides,
-)
+from morphdata.drive_keys import resolved, resolved_columns, shown_names, unmeasured_sides
+from morphdata.drives import RESERVED, SWEEPS, Drive
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.declared import NOTHING, Declared

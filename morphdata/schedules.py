@@ -11,7 +11,8 @@ from pydantic import ConfigDict, FailFast, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 from morphdata.base import Angle, Document
-from morphdata.drives import SWEEPS, Drive, resolved
+from morphdata.drive_keys import resolved
+from morphdata.drives import SWEEPS, Drive
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, escaped
 from morphdata.samplefiles.fault import said_of

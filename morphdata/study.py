@@ -11,6 +11,7 @@ from morphdata.base import Result
 from morphdata.faults import Fault
 from morphdata.identified import Angles, IdentifiedParameters, SampleFit
 from morphdata.identify import EXAMPLE_REQUEST, SamplesRequest, SearchedModel, repeated_faults
+from morphdata.measurement import SampleMeasurement
 from morphdata.options import MODEL, Option
 from morphdata.parameters import MAX_LINKS
 from morphdata.verdict import Verdict
@@ -70,6 +71,9 @@ class StudyRow(Result):
     fit: list[SampleFit]
     model: IdentifiedParameters | None = Field(
         description="null if no model of this size could fly the samples to fit."
+    )
+    measurement: dict[str, SampleMeasurement] = Field(
+        default={}, description="Biases, delay, heading and noise by fitted sample, as of an identification."
     )
     verdict: Verdict | None = Field(default=None, description="As of an identification with this model.")
     warnings: Warnings = Field(default=[])

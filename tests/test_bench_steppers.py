@@ -40,6 +40,12 @@ def swinging():
     return model, *course_of(model)
 
 
+@pytest.fixture(scope="module")
+def fine(swinging):
+    """Attitude of a flight that all candidates converge to."""
+    return attitude(swinging, "ROS2, extrapolated 1-2", 0.001)
+
+
 def attitude(swinging, name, step_s):
     """Euler angles (k, 3) every 20 ms of a stepper's flight."""
     model, course, found = swinging
@@ -63,12 +69,11 @@ def test_compiled_step_is_the_stepper_in_python(swinging):
 @pytest.mark.parametrize(
     "name", [name if name == SHIPPED else pytest.param(name, marks=pytest.mark.slow) for name in STEPPERS]
 )
-def test_every_candidate_converges_with_its_order(swinging, name):
+def test_every_candidate_converges_with_its_order(swinging, fine, name):
     """Halving the step divides the error by two to its order at least, to the same attitude for all.
 
     Below 1e-8 rad stands what a course's lattice, looked up linearly along the path, adds.
     """
-    fine = attitude(swinging, "ROS2, extrapolated 1-2", 0.001)
     coarse, half = (np.abs(attitude(swinging, name, step) - fine).max() for step in (0.005, 0.0025))
     assert coarse / half > 0.85 * 2.0 ** ORDER.get(name, 2) or coarse < 1e-8
     assert coarse < 2e-3

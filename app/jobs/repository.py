@@ -105,16 +105,14 @@ def _newest_ids(
     return sorted(found, reverse=True)[:limit]
 
 
-def event_page(
-    session: Session, owner: str, job_id: str, after: int, limit: int = EVENT_PAGE
-) -> JobEventPage:
+def event_page(session: Session, owner: str, job_id: str, after: int) -> JobEventPage:
     """Events of a job after number `after`, oldest first."""
     job = get_job(session, owner, job_id)
     rows = session.execute(
         select(job_events.c.seq, job_events.c.type, job_events.c.payload, job_events.c.at)
         .where(job_events.c.job_id == job_id, job_events.c.seq > after)
         .order_by(job_events.c.seq)
-        .limit(limit)
+        .limit(EVENT_PAGE)
     )
     events = [JobEvent.model_validate(row) for row in rows]
     last = events[-1].seq if events else after

@@ -40,7 +40,7 @@ def running(*owner: ColumnElement[str]) -> ColumnElement[int]:
     return held.scalar_subquery() + flown.scalar_subquery()
 
 
-def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]:
+def owners_in_turn(session: Session) -> list[str]:
     """Owners with waiting work in the order of their turns."""
     queued = _owners(jobs.c.owner, QUEUED, "waiting")
     flying = _owners(job_chunks.c.owner, job_chunks.c.status == OPEN, "flying")
@@ -51,7 +51,7 @@ def owners_in_turn(session: Session, limit: int = OWNERS_LOOKED_AT) -> list[str]
             .outerjoin(owners, owners.c.owner == waiting.c.owner)
             .where(waiting.c.owner.is_not(None))
             .order_by(running(waiting.c.owner), func.coalesce(owners.c.served_at, 0.0), waiting.c.owner)
-            .limit(limit)
+            .limit(OWNERS_LOOKED_AT)
         )
     )
 

@@ -21,7 +21,7 @@ from app.models import repository as models
 from app.models.extraction import extracted_model
 from app.trajectories import repository as trajectories
 from morphdata.aircraft import Aircraft
-from morphdata.drives import unmeasured_sides
+from morphdata.drive_keys import unmeasured_sides
 from morphdata.execution import Request
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.identify import SamplesRequest, total_rows_faults

@@ -8,11 +8,11 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from morphdata.measurement import ANGLE_COLUMNS
 from morphdata.samplefiles.csv_table import write_table
 
 Document = dict[str, Any]
 
-ANGLES = ("phi_rad", "theta_rad", "psi_rad")
 SWEEPS = ("sweep_left", "sweep_right")  # drives of documents that do not name them
 MODELS = ("measured", "rigid", "initial", "identified")
 LONGEST_STEM = (
@@ -72,7 +72,10 @@ def curve_table(sample: Document) -> bytes:
     """Write one sample's time histories; see `curve_tables`."""
     columns = {name: sample[name] for name in ("time_s", *drive_columns(sample))}
     columns |= {
-        f"{model}_{angle}": sample[model][angle] for model in MODELS if sample.get(model) for angle in ANGLES
+        f"{model}_{angle}": sample[model][angle]
+        for model in MODELS
+        if sample.get(model)
+        for angle in ANGLE_COLUMNS
     }
     return _table(columns, CURVE_DIGITS)
 
@@ -102,7 +105,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
         f"{name}_in_{model}_{angle}": flown[angle]
         for model, flights in curves["flights"].items()
         for name, flown in flights.items()
-        for angle in ANGLES
+        for angle in ANGLE_COLUMNS
     }
     optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
     return {

@@ -47,8 +47,9 @@ from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges, link_masses
 from morphcore.models.soft_joints import chain_obstacle
-from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trim import StartMode, Trim, trim
 from morphdata.export import ModelFile
 

@@ -77,11 +77,6 @@ class Aircraft(Shown):
             for place, hinge in enumerate(surface.hinges)
         )
 
-    @property
-    def flexible_surfaces(self) -> tuple[Surface, ...]:
-        """The surfaces that bend."""
-        return tuple(s for s in self.surfaces if s.flexible)
-
 
 @dataclass(frozen=True)
 class Start:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.identify.column_checks import MIN_MOTION_RAD
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.validity import ResultWarning
+from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.drive_histories import smoothed_samples
 from morphcore.identify.evidence import Linear, linear_model, log_evidence
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
@@ -128,12 +129,15 @@ class AutoIdentification:
         self.search = search or SearchSettings()
         self._clock = clock
 
+        bandwidth_hz = None if measurement is None else measurement.drive_bandwidth_hz
+        smoothed = smoothed_samples(aircraft, samples, bandwidth_hz)
+
         def run(links: int) -> Identification:
             settings = model.model_copy(update={"links_per_wing": links})
             return Identification(
                 aircraft,
                 flight,
-                samples,
+                smoothed,
                 settings,
                 self._settings(links),
                 measurement=measurement,

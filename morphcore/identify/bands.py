@@ -18,7 +18,6 @@ from scipy.special import ndtri
 from morphcore.frames import wrap_angle
 from morphcore.identify.belief import Belief
 from morphcore.identify.cost import SampleCase, fly_attitudes, sample_cases, shared_trims
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.search.least_squares import PROBE
 from morphcore.shown import Shown
@@ -26,6 +25,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import check_stop, say
 from morphcore.threads import one_blas_thread
+from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.result import IdentifyResult

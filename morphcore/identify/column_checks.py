@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.simulate.trajectory import ANGLES, Trajectory
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.validity import ResultWarning
+from morphdata.measurement import ANGLES
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ always; other channels count in proportion to their noise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import euler_from_quaternion, euler_rates, quaternion_from_euler
@@ -25,9 +25,10 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatc
 from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
-from morphcore.simulate.plan import STEP_S, FlightPlan, flight_plan, time_grid
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import choose_step
+from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time
@@ -211,6 +212,22 @@ def fly_readings(
     return readings(flown, batch, plan, found, rows, setup.channels, model)
 
 
+def reading_derivatives(
+    model: ChainModel, batch: ParameterBatch, flights: Iterable[tuple[SampleCase, Trim]], probe: ArrayLike
+) -> Array:
+    """Derivatives (k, c, n) of a sample's readings by differences of flights of one parameter set.
+
+    flights : the undisturbed one, and n with one thing each changed by its probe. probe : (n,) or one for
+    all. Where a flight diverged, the derivative is zero.
+    """
+    flown = [
+        fly_readings(model, batch, case, found).at(case.sample.time_s[None, :])[0][0]
+        for case, found in flights
+    ]
+    columns = np.stack([each - flown[0] for each in flown[1:]], axis=-1) / probe
+    return np.where(np.isfinite(columns), columns, 0.0)
+
+
 def moved_start(state: Array, alpha: Array, psi: float, change: Sequence[float]) -> Array:
     """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`."""
     moved = state.copy()
@@ -229,11 +246,9 @@ def reduced_errors(
     return reduced(case.setup, case.sample.time_s, fly(model, batch, case, found, stop))
 
 
-def fly_measured(
-    model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim, stop: Stop | None = None
-) -> Array:
+def fly_measured(model: ChainModel, batch: ParameterBatch, case: SampleCase, found: Trim) -> Array:
     """Angles (p, k, 3) as the sample's sensors would have read them on the flights of parameter sets."""
-    return np.asarray(case.sample.euler + reduced_errors(model, batch, case, found, stop).error[..., :3])
+    return np.asarray(case.sample.euler + reduced_errors(model, batch, case, found).error[..., :3])
 
 
 def evaluate(

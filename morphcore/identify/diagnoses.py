@@ -25,8 +25,9 @@ from morphcore.identify.other_readings import (
     flown_guess,
 )
 from morphcore.identify.refit_checks import cut_off_warnings, late_warnings, measurement_warnings
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.validity import ResultWarning
+from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification

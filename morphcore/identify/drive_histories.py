@@ -14,6 +14,7 @@ smoothing spline of that bandwidth takes its place. Histories without noise stay
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,8 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.identify.measurement import DIFFERENCE, divided_differences, white_noise
-from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.hinge_schedules import moved_flight
+from morphcore.simulate.trajectory import Trajectory, require_flight
+from morphdata.faults import refuse
+from morphdata.identify import samples_faults
 
 Array = NDArray[np.float64]
 Bandwidth = float | Literal["auto"]
@@ -60,6 +65,25 @@ class DriveHistory:
     angle_rad: Array
     noise_rad: float = 0.0
     start_error_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class SmoothedSamples:
+    """Samples whose drives an aircraft can follow.
+
+    Attributes
+    ----------
+    given : tuple of Trajectory
+        With the drives as measured.
+    smooth : tuple of Trajectory
+        With drives as flights follow them.
+    histories : tuple of dict of str to DriveHistory
+        Of each sample, by drive.
+    """
+
+    given: tuple[Trajectory, ...]
+    smooth: tuple[Trajectory, ...]
+    histories: tuple[dict[str, DriveHistory], ...]
 
 
 def smooth_history(time_s: Array, angle_rad: Array, bandwidth_hz: Bandwidth = "auto") -> DriveHistory:
@@ -103,6 +127,26 @@ def smoothed_drives(
     if all(each.angle_rad is sample.drives[name] for name, each in found.items()):
         return sample, found
     return replace(sample, drives={name: each.angle_rad for name, each in found.items()}), found
+
+
+def smoothed_samples(
+    aircraft: Aircraft, samples: Sequence[Trajectory], bandwidth_hz: Bandwidth | None = None
+) -> SmoothedSamples:
+    """Check samples, and smooth their drives, as of `smooth_history`.
+
+    Raises
+    ------
+    InvalidInput
+        No sample to train on, two samples of one name, or one that the aircraft cannot follow.
+    """
+    refuse(samples_faults(samples))
+    for number, sample in enumerate(samples):
+        require_flight(sample, f"/samples/{number}")
+    given = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
+    found = [smoothed_drives(sample, bandwidth_hz) for sample in given]
+    return SmoothedSamples(
+        tuple(given), tuple(sample for sample, _ in found), tuple(histories for _, histories in found)
+    )
 
 
 def _without_jitter(angle_rad: Array) -> Array:

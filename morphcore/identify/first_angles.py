@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.cost import SampleCase, fly_readings, sample_schedules
+from morphcore.identify.cost import SampleCase, reading_derivatives, sample_schedules
 from morphcore.identify.drive_histories import DriveHistory
 from morphcore.identify.measurement import Measured, angle_noise
 from morphcore.identify.nuisance import PRIOR_RAD
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim
 
@@ -28,14 +29,14 @@ PROBE_RAD = 1e-5  # of an angle: the flights' derivative is good to a thousandth
 STILL_ROWS = 3  # of the flight at rest that is trimmed
 
 
-def with_first_angles(
+def first_angle_columns(
     model: ChainModel,
     batch: ParameterBatch,
     case: SampleCase,
     histories: Mapping[str, DriveHistory],
     start: StartMode,
-) -> Measured:
-    """The readings of a sample, with derivatives by the first angle of each of its noisy drives.
+) -> Array:
+    """Derivatives (k, c, n) of a sample's readings by the first angle of each of its n noisy drives.
 
     Parameters
     ----------
@@ -46,22 +47,24 @@ def with_first_angles(
     histories : mapping of str to DriveHistory
         Of the sample's drives.
     start : {"trim", "given"}
-        With a given start nothing is trimmed but the joints.
+        With a given start nothing is trimmed but the joints, and no angle counts.
     """
-    setup = case.setup
-    noisy = {name: each.start_error_rad for name, each in histories.items() if each.start_error_rad}
+    noisy = _start_errors(histories)
     if not noisy or start == "given":
+        return np.zeros((0, 0, 0))
+    flights = ((case, _trimmed(model, batch, case, name, start)) for name in (None, *noisy))
+    return reading_derivatives(model, batch, flights, PROBE_RAD)
+
+
+def with_first_angles(
+    setup: Measured, sample: Trajectory, histories: Mapping[str, DriveHistory], columns: Array
+) -> Measured:
+    """The readings of a sample, with the derivatives that `first_angle_columns` found."""
+    if not columns.size:
         return setup
-    base = replace(case, given=replace(setup, openness=replace(setup.openness, delay=False)))
-    flown = []
-    for name in (None, *noisy):
-        found = _trimmed(model, batch, case, name, start)
-        readings = fly_readings(model, batch, base, found)
-        flown.append(readings.at(case.sample.time_s[None, :])[0][0])
-    columns = np.stack([each - flown[0] for each in flown[1:]], axis=-1) / PROBE_RAD
-    columns = np.where(np.isfinite(columns), columns, 0.0)
+    noisy = _start_errors(histories)
     # an error of one standard deviation costs as much as the noise of one angle's row
-    unit = max(PRIOR_RAD, *angle_noise(case.sample).values())
+    unit = max(PRIOR_RAD, *angle_noise(sample).values())
     return replace(
         setup,
         angle_columns=columns,
@@ -69,6 +72,11 @@ def with_first_angles(
         angle_unit_rad=unit,
         angle_names=tuple(noisy),
     )
+
+
+def _start_errors(histories: Mapping[str, DriveHistory]) -> dict[str, float]:
+    """Standard errors of the first angles of noisy drives, rad."""
+    return {name: each.start_error_rad for name, each in histories.items() if each.start_error_rad}
 
 
 def _trimmed(

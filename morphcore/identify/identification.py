@@ -11,53 +11,39 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, costs, longest_step, residuals, sample_cases
-from morphcore.identify.drive_histories import smoothed_drives
-from morphcore.identify.evidence import ChosenPrior
-from morphcore.identify.first_angles import with_first_angles
+from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, sample_cases
+from morphcore.identify.descents import METHODS, PRIOR_RAD, descent
+from morphcore.identify.drive_histories import SmoothedSamples, smoothed_samples
+from morphcore.identify.first_angles import first_angle_columns, with_first_angles
 from morphcore.identify.free_corrections import determined_corrections
-from morphcore.identify.measurement import Openness, angle_noise, first_openness, measured
+from morphcore.identify.free_start import with_start
+from morphcore.identify.measurement import Openness, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
-from morphcore.identify.rounds import MAX_ROUNDS, Prepared, linearised, next_openness, with_start
+from morphcore.identify.rounds import Prepared, linearised, reviewed
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.search.checkpoint import pack, unpack
-from morphcore.search.hybrid import Hybrid, HybridState
-from morphcore.search.least_squares import LeastSquares, LeastSquaresState
-from morphcore.search.methods import Factory, method
+from morphcore.search.hybrid import HybridState
+from morphcore.search.least_squares import LeastSquaresState
+from morphcore.search.methods import method
 from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.solver import Batch, Box, Outcome
 from morphcore.search.step import Step
 from morphcore.simulate.compilation import compile_flights
-from morphcore.simulate.hinge_schedules import moved_flight
-from morphcore.simulate.plan import STEP_S
-from morphcore.simulate.trajectory import Trajectory, require_flight
+from morphcore.simulate.time_grid import STEP_S
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
-from morphdata.faults import refuse
-from morphdata.identify import EquivalentModel, samples_faults
+from morphdata.identify import EquivalentModel
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
 VERSION = "identification 6"  # of the checkpoint; another one is not read
-CANDIDATE_SPREAD = (
-    0.5  # standard deviation of the candidates around the physical guess, in search coordinates
-)
-# A weak prior, until the flights have chosen its weight: being off the physical guess by one unit costs as
-# much as one error of this size. It settles the directions that the samples do not determine.
-PRIOR_RAD = 3e-5
-# "hybrid" looks elsewhere where the descent from the physical guess leaves errors above 1 % of the motion
-# (rms, so squared here): it may have ended in a wrong valley. Where it does not, a screening and three times
-# the flights lowered J by five per cent at most (docs/performance_search.md).
-GOOD_FIT = 1e-4
-NOISE_MARGIN = 1.5  # by which a good fit may exceed the noise of the rows
-REVIEW = "measurement"  # as the history of a result calls a review of what is known about the measurement
-DESCENDING = ("hybrid", "least_squares")  # methods whose end is a descent that another one can follow
 
 
 class Identification:
@@ -71,7 +57,7 @@ class Identification:
         The aircraft as the numerics take it, `Aircraft.of` a document.
     flight : morphcore.geometry.aircraft.Flight
         The flight condition, `Flight.of` a document.
-    samples : sequence of Trajectory
+    samples : sequence of Trajectory or SmoothedSamples
         Sample flights, angles in rad; one at least has the role "train".
     model : EquivalentModel, optional
         The model whose parameters are searched.
@@ -94,7 +80,7 @@ class Identification:
         self,
         aircraft: Aircraft,
         flight: Flight,
-        samples: Sequence[Trajectory],
+        samples: Sequence[Trajectory] | SmoothedSamples,
         model: EquivalentModel | None = None,
         search: SearchSettings | None = None,
         *,
@@ -108,16 +94,13 @@ class Identification:
         self._step_s = self.settings.step_s
         self._round = 0
         self._plans: dict[tuple[bool, ...], tuple[SampleCase, ...]] = {}
+        self._angle_columns: dict[tuple[int, bool, tuple[float, ...]], Array] = {}
         self._cases: tuple[tuple[Openness, ...], tuple[SampleCase, ...]] | None = None
         self._linear: tuple[tuple[Openness, ...], Array, Array, Array] | None = None
-        refuse(samples_faults(samples))
-        for number, sample in enumerate(samples):
-            require_flight(sample, f"/samples/{number}")
-        samples = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
         self.measurement = measurement or Measurement()
-        smoothed = [smoothed_drives(sample, self.measurement.drive_bandwidth_hz) for sample in samples]
-        self.samples = tuple(sample for sample, _ in smoothed)
-        self.histories = tuple(histories for _, histories in smoothed)
+        if not isinstance(samples, SmoothedSamples):
+            samples = smoothed_samples(aircraft, samples, self.measurement.drive_bandwidth_hz)
+        self.samples, self.histories = samples.smooth, samples.histories
         self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)
         # of each sample, what is unknown about its measurement; the same in a round of the search
@@ -135,7 +118,7 @@ class Identification:
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         free: Sequence[str] | None = self.settings.aero_coefficients
         if free is None:
-            training = [sample for sample in samples if sample.role == "train"]
+            training = [sample for sample in samples.given if sample.role == "train"]
             free = determined_corrections(self.model.parameters, training)
         self._first_space: SearchSpace = search_space(
             self.model,
@@ -193,19 +176,22 @@ class Identification:
                 separate_wings=self.settings.separate_wings,
                 whole=whole,
             )
-        cases = []
-        for case, each, histories in zip(self._plans[whole], openness, self.histories, strict=True):
-            setup = measured(case.sample, self.measurement, each)
-            if each.start:
-                point = each.reference if each.reference.size else self.known[0]
-                with one_blas_thread():
-                    setup = with_start(self, case, setup, self.space.decode(point))
-            opened = replace(case, given=setup)
-            with one_blas_thread():
-                guess = self.space.decode(self.known[0])
-                setup = with_first_angles(self.model, guess, opened, histories, self.settings.start)
-            cases.append(replace(case, given=setup))
-        return tuple(cases)
+        numbered = enumerate(zip(self._plans[whole], openness, strict=True))
+        with one_blas_thread():
+            return tuple(self._opened_case(number, case, each) for number, (case, each) in numbered)
+
+    def _opened_case(self, number: int, case: SampleCase, openness: Openness) -> SampleCase:
+        """A sample with its readings; derivatives by the first angles are flown once for a start."""
+        sample, histories, start = case.sample, self.histories[number], self.settings.start
+        setup = measured(sample, self.measurement, openness)
+        if openness.start:
+            point = openness.reference if openness.reference.size else self.known[0]
+            setup = with_start(self.model, self.space.decode(point), replace(case, given=setup), start)
+        key = (number, openness.start, openness.start_value)
+        if key not in self._angle_columns:
+            guess, opened = self.space.decode(self.known[0]), replace(case, given=setup)
+            self._angle_columns[key] = first_angle_columns(self.model, guess, opened, histories, start)
+        return replace(case, given=with_first_angles(setup, sample, histories, self._angle_columns[key]))
 
     @property
     def training(self) -> tuple[SampleCase, ...]:
@@ -244,7 +230,7 @@ class Identification:
         """
         state = SearchState(self.search.max_seconds) if checkpoint is None else self.state(checkpoint)
         while not state.over:
-            state = self._entered(self._search.advance(state, stop))
+            state = self.entered(self._search.advance(state, stop))
             if state.over:
                 state = self._reviewed(state, stop)
             yield self._step(state)
@@ -279,63 +265,29 @@ class Identification:
         ------
         UnreadableCheckpoint : the bytes are damaged or of another version.
         """
-        return self._entered(unpack(checkpoint, VERSION, SearchState))
+        return self.entered(unpack(checkpoint, VERSION, SearchState))
 
-    def _entered(self, state: SearchState) -> SearchState:
-        """Return the state, after taking over what its flights go by."""
+    def entered(self, state: SearchState) -> SearchState:
+        """Return the state, after taking over what its flights go by: step, unknowns, bounds and prior."""
         if isinstance(state.prepared, Prepared):
             self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
             if self._round != state.prepared.round:
                 self.openness, self._round = state.prepared.openness, state.prepared.round
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         if isinstance(state.solver, LeastSquaresState | HybridState):
-            descent = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
-            self.space = self._first_space.widened(descent.box)
-            self.prior_weight = float(descent.best_weight.max())
+            own = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
+            self.space = self._first_space.widened(own.box)
+            self.prior_weight = float(own.best_weight.max())
         return state
 
     def _reviewed(self, state: SearchState, stop: Stop | None) -> SearchState:
         """Return the state of the next round, where the residuals call for one; else the same."""
-        up = state.budget_s is not None and state.wall_s >= state.budget_s
-        if self.search.method not in DESCENDING or self._round + 1 >= MAX_ROUNDS or up:
-            return state
-        if not (self.space.dimension and np.isfinite(state.best_cost)):
-            return state
         begin = self._clock()
         with one_blas_thread():
-            found = next_openness(self, state.best)
-            if found is None:
-                return state
-            freed = any(a.reason != b.reason for a, b in zip(found, self.openness, strict=True))
-            prepared = Prepared(self.step_s, found, self._round + 1)
-            self._entered(replace(state, prepared=prepared))
-            # with other unknowns the best model may lie in another valley
-            points = np.stack([state.best, *(self.known if freed else ())])
-            known = self.evaluate(Batch(points), stop)
-        leader = int(np.argmin(known.cost))
-        if known.cost[leader] > DIVERGED_ANGLE**2 > state.best_cost:
-            # flights begin so far off their trim that they diverge: the prediction did not hold
-            return self._entered(state)
-        flights = state.flights + points.shape[0] * self.flights_each
-        row = {
-            "generation": state.generation + 1,
-            "phase": REVIEW,
-            "particles": points.shape[0],
-            "flights": flights,
-            "best_cost": float(known.cost[leader]),
-        }
-        return replace(
-            state,
-            prepared=prepared,
-            solver=_descent(self, self.search).init(known, self.space.box),
-            best=points[leader],
-            best_cost=float(known.cost[leader]),
-            generation=state.generation + 1,
-            flights=flights,
-            wall_s=state.wall_s + self._clock() - begin,
-            history=(*state.history, row),
-            over=False,
-        )
+            found = reviewed(self, state, stop)
+        if found is None:
+            return self.entered(state)
+        return replace(found, wall_s=state.wall_s + self._clock() - begin)
 
     # steps whose flights others fly
 
@@ -346,7 +298,7 @@ class Identification:
     def task_costs(self, points: Array, stop: Stop | None = None) -> Array:
         """Costs (p,) of search points (p, d), rad^2: of any part of a task, whoever flies the rest."""
         # a step whose costs are all that it needs comes before any review of the residuals
-        self._entered(SearchState(prepared=Prepared(self.step_s, self._first_openness)))
+        self.entered(SearchState(prepared=Prepared(self.step_s, self._first_openness)))
         with one_blas_thread():
             return self.evaluate(Batch(points), stop).cost
 
@@ -412,19 +364,8 @@ class Identification:
     def _search(self) -> Search[Outcome]:
         """The search of the present round: after a review, a descent from what was found."""
         if self._round:
-            return Search(self, _descent(self, self.search), self._clock)
+            return Search(self, descent(self, self.search), self._clock)
         return Search(self, method(self.search.method, self, self.search, METHODS), self._clock)
-
-    def good_cost(self) -> float:
-        """Return J with which a descent has ended well, rad^2: a share of the motion, and the noise."""
-        total = 0.0
-        for case in self.training:
-            setup = case.setup
-            moved = setup.weight * (setup.values - setup.values[0])
-            noise = np.array(list(angle_noise(case.sample).values()))
-            total += GOOD_FIT * float(np.nansum(moved**2))
-            total += NOISE_MARGIN * case.sample.time_s.size * float(np.sum((setup.weight[:3] * noise) ** 2))
-        return total
 
     def _step(self, state: SearchState) -> Step:
         phase = str(state.history[-1]["phase"])
@@ -437,24 +378,3 @@ class Identification:
             message=f"{phase}: J = {state.best_cost:.3g} rad^2 after {state.flights} flights",
             checkpoint=pack(state, VERSION),
         )
-
-
-def _descent(run: Identification, settings: SearchSettings) -> LeastSquares:
-    first = np.full(run.space.dimension, run.prior_weight)
-    return LeastSquares(
-        run, settings.iterations, ChosenPrior(run.space.guess, first, run.shapes), run.space.limits
-    )
-
-
-def _hybrid(run: Identification, settings: SearchSettings) -> Hybrid:
-    return Hybrid(
-        _descent(run, settings),
-        candidates=settings.screen,
-        starts=settings.starts,
-        spread=CANDIDATE_SPREAD,
-        good_cost=run.good_cost(),
-        seed=settings.seed,
-    )
-
-
-METHODS: dict[str, Factory] = {"least_squares": _descent, "hybrid": _hybrid}

@@ -28,7 +28,7 @@ from morphcore.identify.cost import (
 from morphcore.search.least_squares import LeastSquares
 from morphcore.search.prior import FixedPrior
 from morphcore.search.solver import Batch, Box, Outcome
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.drives import SIDES
 

@@ -14,9 +14,10 @@ from morphcore.identify.aircraft_checks import WRONG_AIRCRAFT_HINT
 from morphcore.identify.column_checks import constant_runs
 from morphcore.identify.cost import SampleCase, costs, sample_cases
 from morphcore.identify.other_readings import TENFOLD, delayed, fitted_delays, refitted
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.validity import ResultWarning
+from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification

@@ -18,7 +18,7 @@ from morphcore.identify.cramer_rao import cramer_rao_percent
 from morphcore.identify.diagnoses import diagnoses
 from morphcore.identify.fit_warnings import fit_warnings, not_flyable
 from morphcore.identify.posterior import Posterior
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.identify.sample_measurement import fitted_nuisances, measurement_documents
 from morphcore.identify.uncertainty import Uncertainty, no_uncertainty, uncertainty
 from morphcore.identify.verdict import Verdict, verdict
@@ -28,6 +28,7 @@ from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
+from morphdata.measurement import ANGLES
 from morphdata.renamed import both_spellings, under_both_spellings
 
 if TYPE_CHECKING:
@@ -183,14 +184,7 @@ class IdentifyResult(Shown):
 def identify_result(run: Identification, state: SearchState, *, judged: bool = True) -> IdentifyResult:
     """Fly the best point so far against all samples; if ``judged``, with its uncertainty and cost too."""
     start, space = run.settings.start, run.space
-    rigid_model = run.chain(run.model.aircraft, run.model.flight, 1)
-    # a plan knows the lattice and the hinges, not the links: both models fly the same ones
-    rigid = _attitudes(rigid_model, physical_guess(rigid_model), run.cases, start)
-    both = _attitudes(run.model, space.decode(np.stack([space.guess, state.best])), run.cases, start)
-    best = space.decode(state.best)
-    fits = tuple(
-        SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
-    )
+    fits = _fits(run, state.best)
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
     certainty = noise = None
     belief = Belief()
@@ -202,39 +196,16 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         noise = fit_noise(run, state.best, residual, jacobian, motions, nuisances)
         certainty = uncertainty(space, state.best, residual, jacobian, noise)
         belief = belief_of(run, state.best, jacobian, noise)
-    held_out = [case for case in run.cases if case.sample.role == "held_out"]
-    longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
-
-    def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
-        return _flight_time(model, batch, run.cases[longest], start) if judged else None
-
     measurement = measurement_documents(run, nuisances, noise) if nuisances else {}
-    settings = run.search
-    at_bound = space.at_bound(state.best)
+    best, at_bound = space.decode(state.best), space.at_bound(state.best)
+    held_out = [case for case in run.cases if case.sample.role == "held_out"]
     return IdentifyResult(
         model=run.model,
         parameters=best,
         fits=fits,
         uncertainty=certainty,
-        search={
-            "aero_coefficients": both_spellings(space.free_aero),
-            "method": settings.method,
-            "seed": settings.seed,
-            "prior_rad": float(np.sqrt(run.prior_weight)),
-            "widened": both_spellings(run.widened()),
-            "flights": state.flights,
-            "generations": state.generation,
-            "wall_s": state.wall_s,
-            "best_cost": state.best_cost,
-            "finished": state.over,
-            "history": list(state.history),
-        },
-        cost={
-            "rigid_flight_s": flight_time(rigid_model, physical_guess(rigid_model)),
-            "equivalent_flight_s": flight_time(run.model, best),
-            "flexible_flight_s": None,
-            "flight_duration_s": run.samples[longest].duration_s,
-        },
+        search=_search_document(run, state),
+        cost=_flight_times(run, best, judged=judged),
         settings=run.settings.model_copy(
             update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
         ),
@@ -253,6 +224,55 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         belief=belief,
         bands=bands_of_cases(run.model, belief, held_out, start),
     )
+
+
+def _fits(run: Identification, best: Array) -> tuple[SampleFit, ...]:
+    """How the rigid model, the physical guess and a search point (d,) meet each sample."""
+    start, space = run.settings.start, run.space
+    rigid_model = _rigid(run)
+    # a plan knows the lattice and the hinges, not the links: both models fly the same ones
+    rigid = _attitudes(rigid_model, physical_guess(rigid_model), run.cases, start)
+    both = _attitudes(run.model, space.decode(np.stack([space.guess, best])), run.cases, start)
+    return tuple(
+        SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
+    )
+
+
+def _rigid(run: Identification) -> ChainModel:
+    return run.chain(run.model.aircraft, run.model.flight, 1)
+
+
+def _search_document(run: Identification, state: SearchState) -> dict[str, Any]:
+    """Method, effort and history of the search."""
+    return {
+        "aero_coefficients": both_spellings(run.space.free_aero),
+        "method": run.search.method,
+        "seed": run.search.seed,
+        "prior_rad": float(np.sqrt(run.prior_weight)),
+        "widened": both_spellings(run.widened()),
+        "flights": state.flights,
+        "generations": state.generation,
+        "wall_s": state.wall_s,
+        "best_cost": state.best_cost,
+        "finished": state.over,
+        "history": list(state.history),
+    }
+
+
+def _flight_times(run: Identification, best: ParameterBatch, *, judged: bool) -> dict[str, float | None]:
+    """Wall times of single flights of the longest sample, s; without them where nothing is judged."""
+    longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
+    rigid = _rigid(run)
+
+    def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
+        return _flight_time(model, batch, run.cases[longest], run.settings.start) if judged else None
+
+    return {
+        "rigid_flight_s": flight_time(rigid, physical_guess(rigid)),
+        "equivalent_flight_s": flight_time(run.model, best),
+        "flexible_flight_s": None,
+        "flight_duration_s": run.samples[longest].duration_s,
+    }
 
 
 def _attitudes(

@@ -16,12 +16,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.cost import SampleCase, fly_readings, reduced_errors, residuals, shared_trims
+from morphcore.identify.cost import (
+    DIVERGED_ANGLE,
+    SampleCase,
+    reduced_errors,
+    residuals,
+    shared_trims,
+)
+from morphcore.identify.descents import descent
+from morphcore.identify.free_start import free_parts
 from morphcore.identify.measurement import (
     FLOOR,
     MAD_TO_SIGMA,
-    START,
-    START_SPREAD,
     Measured,
     Openness,
     reference_rad,
@@ -30,6 +36,9 @@ from morphcore.identify.nuisance import linear_columns
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.search.checkpoint import stored
 from morphcore.search.least_squares import differences
+from morphcore.search.run import SearchState
+from morphcore.search.solver import Batch
+from morphcore.stopping import Stop
 from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
@@ -46,9 +55,8 @@ SHOWN_RMS_RAD = 3e-6  # residuals below it hide no bias and no delay
 # a start is nearly the same as a bias and a slow motion: it must explain much, and much must be unexplained
 START_GAIN, START_RMS_RAD = 30.0, 2e-3
 SETTLED = 0.1  # relative change of a sigma that calls for no further round
-START_PROBE = 1e-4  # of the spread of each part of the start
-# parts of the start that keep a symmetric flight symmetric: theta, q, u, w
-LONGITUDINAL = (1, 3, 5, 7)
+REVIEW = "measurement"  # as the history of a result calls a review of what is known about the measurement
+DESCENDING = ("hybrid", "least_squares")  # methods whose end is a descent that another one can follow
 
 
 @stored
@@ -71,32 +79,56 @@ class Prepared:
     round: int = 0
 
 
-def with_start(run: Identification, case: SampleCase, setup: Measured, batch: ParameterBatch) -> Measured:
-    """The readings of a sample whose start is free, with the derivatives by it for one parameter set."""
-    parts = LONGITUDINAL if case.plan.halved else tuple(range(len(START)))
-    spread = start_spread(run)[list(parts)]
-    change = np.array(setup.openness.start_value)
-    base = replace(setup, openness=replace(setup.openness, delay=False))
-    flown = []
-    for part in (None, *parts):
-        moved = change.copy()
-        if part is not None:
-            moved[part] += START_PROBE * start_spread(run)[part]
-        openness = replace(base.openness, start_value=tuple(float(v) for v in moved))
-        probed = replace(case, given=replace(base, openness=openness))
-        ((_, found),) = shared_trims(run.model, batch, (probed,), run.settings.start)
-        readings = fly_readings(run.model, batch, probed, found)
-        flown.append(readings.at(case.sample.time_s[None, :])[0][0])
-    columns = np.stack([(each - flown[0]) for each in flown[1:]], axis=-1) / (START_PROBE * spread)
-    columns = np.where(np.isfinite(columns), columns, 0.0)
-    return replace(setup, start_columns=columns, start_spread=spread)
+def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) -> SearchState | None:
+    """The state in which the next round begins, after a descent that has ended; None without another round.
 
-
-def start_spread(run: Identification) -> Array:
-    """Standard deviations of the parts of a start, SI units and rad."""
-    spread = np.array(START_SPREAD)
-    spread[5:] *= run.model.flight.airspeed_m_s
-    return spread
+    Parameters
+    ----------
+    run : Identification
+        It has entered the state of the next round where there is one.
+    state : SearchState
+        Of the end of a descent.
+    stop : callable, optional
+        As of `Identification.steps`.
+    """
+    number = state.prepared.round if isinstance(state.prepared, Prepared) else 0
+    up = state.budget_s is not None and state.wall_s >= state.budget_s
+    if run.search.method not in DESCENDING or number + 1 >= MAX_ROUNDS or up:
+        return None
+    if not (run.space.dimension and np.isfinite(state.best_cost)):
+        return None
+    found = next_openness(run, state.best)
+    if found is None:
+        return None
+    freed = any(a.reason != b.reason for a, b in zip(found, run.openness, strict=True))
+    prepared = Prepared(run.step_s, found, number + 1)
+    run.entered(replace(state, prepared=prepared))
+    # with other unknowns the best model may lie in another valley
+    points = np.stack([state.best, *(run.known if freed else ())])
+    known = run.evaluate(Batch(points), stop)
+    leader = int(np.argmin(known.cost))
+    if known.cost[leader] > DIVERGED_ANGLE**2 > state.best_cost:
+        # flights begin so far off their trim that they diverge: the prediction did not hold
+        return None
+    flights = state.flights + points.shape[0] * run.flights_each
+    row = {
+        "generation": state.generation + 1,
+        "phase": REVIEW,
+        "particles": points.shape[0],
+        "flights": flights,
+        "best_cost": float(known.cost[leader]),
+    }
+    return replace(
+        state,
+        prepared=prepared,
+        solver=descent(run, run.search).init(known, run.space.box),
+        best=points[leader],
+        best_cost=float(known.cost[leader]),
+        generation=state.generation + 1,
+        flights=flights,
+        history=(*state.history, row),
+        over=False,
+    )
 
 
 def next_openness(run: Identification, best: Array) -> tuple[Openness, ...] | None:
@@ -120,7 +152,7 @@ def _restarted(
         openness, left = before, reduced_errors(run.model, batch, case, trim)
         errors.append(left.error[0])
         if openness.start:
-            setup, parts = case.setup, LONGITUDINAL if case.plan.halved else tuple(range(len(START)))
+            setup, parts = case.setup, free_parts(case)
             first = int(setup.offset.sum())
             change = left.nuisance[0, first : first + len(parts)]
             value = np.array(openness.start_value)

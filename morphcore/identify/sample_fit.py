@@ -12,10 +12,9 @@ from morphcore.frames import wrap_angle
 from morphcore.identify.cost import SampleCase
 from morphcore.identify.statistics import ChannelStatistics, channel_statistics
 from morphcore.shown import Shown
+from morphdata.measurement import ANGLES
 
 Array = NDArray[np.float64]
-
-ANGLES = ("phi", "theta", "psi")
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from morphcore.identify.coloured import ColouredNoise, Record
 from morphcore.identify.cost import SampleCase, reduced_errors, shared_trims
+from morphcore.identify.free_start import free_parts
 from morphcore.identify.measurement import DELAY_SPREAD_S, HEADING, START, angle_noise
 from morphcore.identify.nuisance import PRIOR_RAD, linear_columns
-from morphcore.identify.rounds import LONGITUDINAL
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.search.least_squares import probes
 from morphcore.simulate.trim import Trim
@@ -69,8 +69,7 @@ def _nuisances(
     spread = np.concatenate([np.zeros(int(setup.offset.sum())), setup.start_spread, setup.angle_spread])
     names = [f"bias.{name}" for name, free in zip(setup.channels, setup.offset, strict=True) if free]
     if setup.start_columns.shape[2]:
-        parts = LONGITUDINAL if case.plan.halved else range(len(START))
-        names += [f"start.{START[part]}" for part in parts]
+        names += [f"start.{START[part]}" for part in free_parts(case)]
     names += [f"first_angle.{drive}" for drive in setup.angle_names]
     if setup.openness.delay:
         names.append("delay")

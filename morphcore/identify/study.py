@@ -14,6 +14,7 @@ from functools import cached_property
 
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.identify import flown_inputs
+from morphcore.identify.drive_histories import smoothed_samples
 from morphcore.identify.identification import Identification
 from morphcore.identify.settings import SearchSettings, search_settings
 from morphcore.identify.study_result import StudyResult, study_result
@@ -68,12 +69,14 @@ class Study:
         self.search = search or SearchSettings()
         self._clock = clock
         settings = StudiedModels() if model is None else model
+        bandwidth_hz = None if measurement is None else measurement.drive_bandwidth_hz
+        smoothed = smoothed_samples(aircraft, samples, bandwidth_hz)
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = tuple(
             Identification(
                 aircraft,
                 flight,
-                samples,
+                smoothed,
                 _of_links(settings, n),
                 self.search,
                 measurement=measurement,

@@ -20,7 +20,7 @@ import numpy as np
 from morphcore.identify.study_row import Role, StudyRow
 
 WORTH_OF_A_LINK = 2.0  # factor in the error
-# RMS of any attitude angle; the step of 10 ms holds attitude to within this (simulate/plan.py)
+# RMS of any attitude angle; the step of 10 ms holds attitude to within this (simulate/time_grid.py)
 RESOLUTION_RAD = 1e-4
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from morphcore.errors import NotFlyable
 from morphcore.identify.identification import Identification
 from morphcore.identify.result import IdentifyResult
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
+from morphdata.measurement import ANGLES
 
 Document = dict[str, Any]
 Role = Literal["train", "held_out"]
@@ -31,8 +31,8 @@ class StudyRow(Shown):
     flights held out, else over the fitted ones. flight_s : median wall time of one flight, s; None before it
     is measured. identify_s : wall time of the identification, s. flights : flown for it.
     unseen_directions : number of combinations of parameters that the samples cannot see. fit, model,
-    warnings, verdict : as in the identification's result; model is None where none flew the samples to fit.
-    finished : whether the search went to its end.
+    warnings, verdict, measurement : as in the identification's result; model is None where none flew the
+    samples to fit. finished : whether the search went to its end.
     """
 
     links_per_wing: int
@@ -50,6 +50,7 @@ class StudyRow(Shown):
     finished: bool
     warnings: list[Document] = field(default_factory=list)
     verdict: Document | None = None
+    measurement: Document = field(default_factory=dict)
 
     def J(self, role: Role) -> float | None:
         """J over the flights of a role, rad^2."""
@@ -129,6 +130,7 @@ def study_row(run: Identification, found: IdentifyResult) -> StudyRow:
         finished=document["search"]["finished"],
         warnings=document["warnings"],
         verdict=document["verdict"],
+        measurement=document["measurement"],
     )
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from morphcore.frames import wrap_angle
 from morphcore.identify.diagnoses import LATE_SHARE, WRONG_DATA
-from morphcore.identify.sample_fit import ANGLES, SampleFit
+from morphcore.identify.sample_fit import SampleFit
 from morphcore.validity import ResultWarning
+from morphdata.measurement import ANGLES
 
 Grade = Literal["good", "usable", "poor", "failed"]
 

@@ -19,8 +19,9 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constan
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
-from morphcore.simulate.plan import CommonPath, time_grid
+from morphcore.simulate.plan import CommonPath
 from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.stopping import Interrupted, Stop, one_at_a_time

@@ -27,7 +27,7 @@ from morphcore.optimise.verification import Verified, verification
 from morphcore.search.checkpoint import pack, unpack
 from morphcore.search.run import Clock, Search, SearchState
 from morphcore.search.step import Step
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trim import StartMode
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread

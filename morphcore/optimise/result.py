@@ -19,6 +19,7 @@ from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+from morphdata.measurement import ANGLE_COLUMNS
 from morphdata.optimize import Limits, Morph, Weights
 
 Array = NDArray[np.float64]
@@ -26,7 +27,6 @@ Document = dict[str, Any]
 
 SCHEDULES = ("constant", "rigid_optimum", "optimum")
 MODELS = ("rigid", "equivalent", "flexible")
-ANGLES = ("phi_rad", "theta_rad", "psi_rad")
 
 
 @dataclass(frozen=True, repr=False)
@@ -279,7 +279,7 @@ def _verified(euler: Array) -> ComparedFlight | None:
 
 
 def _attitude(flight: ComparedFlight) -> Document:
-    return {name: column.tolist() for name, column in zip(ANGLES, flight.departure.T, strict=True)}
+    return {name: column.tolist() for name, column in zip(ANGLE_COLUMNS, flight.departure.T, strict=True)}
 
 
 def _knots(drive: str, schedule: Spline) -> Document:

@@ -25,7 +25,7 @@ from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flight import ModelChoice, flight_steps
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.threads import one_blas_thread, thread_count, use_threads
 

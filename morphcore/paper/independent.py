@@ -16,7 +16,6 @@ import numpy as np
 
 from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flight import Simulation, flight_steps
@@ -24,6 +23,7 @@ from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphdata.aircraft import load_aircraft
 from morphdata.flight import load_flight
 from morphdata.lattice import CORE_LAWS, CoreLaw, Lattice, VortexCore
+from morphdata.measurement import ANGLES
 
 Document = dict[str, Any]
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import wrap_angle
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.optimise import ScheduleOptimisation
 from morphcore.optimise.settings import PAPER_PARTICLES, ScheduleSettings
@@ -39,6 +38,7 @@ from morphcore.paper.stages import Progress, Results, Work, part
 from morphcore.paper.truth import Resolution, flown_flexible
 from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.schedule import Spline
+from morphdata.measurement import ANGLES
 from morphdata.optimize import Limits, Morph, VerifyingModel
 
 Array = NDArray[np.float64]

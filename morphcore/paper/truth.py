@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from morphcore.frames import wrap_angle
-from morphcore.identify.sample_fit import ANGLES
 from morphcore.paper.scenario import PaperFlight, aircraft, flight, paper_flights
 from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Progress, Results, Work
 from morphcore.simulate.flight import Simulation, flight_steps
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.lattice import Lattice
+from morphdata.measurement import ANGLES
 from morphdata.samples import InlineSample
 
 Document = dict[str, Any]

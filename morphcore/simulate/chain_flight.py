@@ -14,9 +14,10 @@ from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
 from morphcore.models.kinematics import link_poses, tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.torque import torques_and_rates
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.stopping import Stop

@@ -10,20 +10,17 @@ from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.models.kernels.layout import OMEGA, POSITION, VELOCITY
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.plan import FlightPlan
-from morphcore.stopping import Stop
 from morphcore.validity import AirMotion, air_motion
 
 Array = NDArray[np.float64]
 
 
-def chain_motion(
-    model: ChainModel, plan: FlightPlan, constants: LaneConstants, state: Array, stop: Stop | None = None
-) -> AirMotion:
+def chain_motion(model: ChainModel, plan: FlightPlan, constants: LaneConstants, state: Array) -> AirMotion:
     """Motion through the air of the first particle of ``state``, while its flight stays finite.
 
     ``model`` is the model that the plan flies (`FlightPlan.flown`), as in `fly_batch`.
     """
-    chunks = fly_batch(model, plan, constants, state, record_rows=POSITION, stop=stop)
+    chunks = fly_batch(model, plan, constants, state, record_rows=POSITION)
     rows = np.concatenate([chunk.rows[..., 0] for chunk in chunks])
     sound = np.all(np.isfinite(rows), axis=1)
     count = rows.shape[0] if np.all(sound) else max(int(np.argmin(sound)), 1)

@@ -20,8 +20,9 @@ from morphcore.lanes import ALONE, TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.simulate.batch import fly_batch, state_rates
 from morphcore.simulate.kernels.batch import fly
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import time_grid
 from morphcore.stopping import say
 from morphcore.threads import usable_cores
 from morphdata import aircraft as documents

@@ -53,8 +53,8 @@ from morphcore.simulate.kernels.roots import (
     gather_roots,
     spread_to_roots,
 )
-from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.time_grid import TimeGrid
 
 Array = NDArray[np.float64]
 

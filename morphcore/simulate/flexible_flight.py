@@ -12,9 +12,9 @@ from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.kernels.flexible_step import RECORD
-from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop, check_stop
 from morphcore.threads import one_blas_thread

@@ -30,10 +30,10 @@ from morphcore.simulate.hinge_schedules import (
     hinge_schedules,
     require_ranges,
 )
-from morphcore.simulate.plan import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.record import FlightRecord, Part, recorded_trajectory
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
+from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop

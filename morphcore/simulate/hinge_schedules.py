@@ -12,7 +12,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
-from morphdata.drives import resolved, shown_names, unmeasured_sides
+from morphdata.drive_keys import resolved, shown_names, unmeasured_sides
 from morphdata.faults import Fault, refuse
 from morphdata.samples import columns_of_aircraft, no_drive
 
@@ -20,7 +20,7 @@ Schedules = Mapping[str, Schedule] | documents.Schedules | Trajectory
 Followed = dict[str, tuple[str, Schedule]]  # drive -> key of the history it follows, and the history
 
 
-def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = "/schedules") -> Followed:
+def followed_schedules(aircraft: Aircraft, schedules: Schedules) -> Followed:
     """Find the schedule of each drive.
 
     Parameters
@@ -39,7 +39,7 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = 
         A key names no drive of the aircraft, is ambiguous, or moves a drive that another key moves.
     """
     if isinstance(schedules, Trajectory):
-        return followed_flight(aircraft, schedules, pointer)
+        return followed_flight(aircraft, schedules, "/schedules")
     if isinstance(schedules, documents.Schedules):
         moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
         keys = schedules.keys_by_drive(aircraft.drives)
@@ -47,11 +47,11 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules, pointer: str = 
     if not isinstance(schedules, Mapping):
         raise InvalidInput(
             "the schedules do not name the drives they move",
-            pointer=pointer,
+            pointer="/schedules",
             hint=f"give them by drive: {shown_names(aircraft.drives) or 'the aircraft has none'}",
         )
     keys, faults = resolved(schedules, aircraft.drives)
-    refuse(fault.under(pointer) for fault in faults)
+    refuse(fault.under("/schedules") for fault in faults)
     return {name: (key, schedules[key]) for name, key in keys.items()}
 
 

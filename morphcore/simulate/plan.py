@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
@@ -17,91 +17,17 @@ from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.hinges import relative_motion
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_ROTATION, H_TWIST, HINGE_ROWS
 from morphcore.shown import Shown
-from morphcore.simulate.kernels.interpolate import blend
+from morphcore.simulate.operator_table import OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.time_grid import TimeGrid
 
 Array = NDArray[np.float64]
 
-# keeps attitude within 1e-4 rad of the converged solution on the reference aircraft (tests/simulate)
-STEP_S = 0.01
 NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
 ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: the flight rolls by less than that
 RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at the path's end
-
-
-@dataclass(frozen=True)
-class TimeGrid:
-    """Equal steps from ``start_s``; rows ``at`` of the grid are the output times (None: they differ)."""
-
-    start_s: float
-    step_s: float
-    steps: int
-    at: NDArray[np.int64] | None
-
-    @property
-    def times_s(self) -> Array:
-        """(steps + 1,) times."""
-        return np.asarray(self.start_s + self.step_s * np.arange(self.steps + 1), dtype=np.float64)
-
-    @property
-    def middles_s(self) -> Array:
-        """(steps,) times in the middles of the steps."""
-        return np.asarray(self.start_s + self.step_s * (np.arange(self.steps) + 0.5), dtype=np.float64)
-
-    @property
-    def halves_s(self) -> Array:
-        """(2 steps + 1,) times and middles in alternation."""
-        times = np.empty(2 * self.steps + 1)
-        times[::2], times[1::2] = self.times_s, self.middles_s
-        return times
-
-    def halved(self, times: int = 1) -> TimeGrid:
-        """The grid with all steps halved ``times`` times."""
-        parts = 2**times
-        at = None if self.at is None else self.at * parts
-        return TimeGrid(self.start_s, self.step_s / parts, self.steps * parts, at)
-
-
-def time_grid(output_s: ArrayLike, longest_step_s: float = STEP_S) -> TimeGrid:
-    """Make a grid that contains even output times; uneven ones need interpolation (``at`` is None)."""
-    times = np.asarray(output_s, dtype=np.float64)
-    spacing = (times[-1] - times[0]) / (times.size - 1)
-    if np.allclose(np.diff(times), spacing, rtol=1e-6, atol=1e-9):
-        substeps = int(np.ceil(spacing / longest_step_s - 1e-9))
-        steps = substeps * (times.size - 1)
-        return TimeGrid(float(times[0]), spacing / substeps, steps, np.arange(times.size) * substeps)
-    steps = int(np.ceil((times[-1] - times[0]) / longest_step_s - 1e-9))
-    return TimeGrid(float(times[0]), float(times[-1] - times[0]) / steps, steps, None)
-
-
-@dataclass(frozen=True, repr=False)
-class OperatorTable(Shown):
-    """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
-
-    matrices : (nodes, rows, columns); strips : (nodes, strips, 3); position : (steps + 1,) of each grid time
-    among the nodes, in node spacings.
-    """
-
-    matrices: Array
-    strips: Array
-    position: Array
-
-    def between(self, first: int, last: int) -> tuple[Array, Array]:
-        """Operators (k, rows, columns) and strips (k, strips, 3) at the grid times first..last - 1."""
-        nodes = self.matrices.shape[0]
-        position = self.position[first:last]
-        if nodes == 1:
-            base = np.zeros(position.size, dtype=np.int64)
-            weights = np.ones((position.size, 1))
-        else:
-            base = np.clip(np.floor(position).astype(np.int64) - 1, 0, nodes - 4)
-            s = position - base
-            # Lagrange's cubic through four neighbours
-            cubic = [np.prod([(s - j) / (i - j) for j in range(4) if j != i], axis=0) for i in range(4)]
-            weights = np.stack(cubic, axis=1)
-        return _blended(self.matrices, weights, base), _blended(self.strips, weights, base)
 
 
 @dataclass(frozen=True, repr=False)
@@ -207,12 +133,6 @@ class FlightPlan(Shown):
         hinges, still = self.hinges[:1].copy(), np.zeros_like(self.rates[:1])
         hinges[:, :, H_TWIST : H_TWIST + 6] = 0.0
         return replace(self, angles=self.angles[:1], rates=still, accelerations=still, hinges=hinges)
-
-
-def _blended(nodes: Array, weights: Array, base: NDArray[np.int64]) -> Array:
-    out = np.empty((base.size, *nodes.shape[1:]))
-    blend(weights, base, nodes.reshape(nodes.shape[0], -1), out.reshape(base.size, -1))
-    return out
 
 
 def flight_plan(

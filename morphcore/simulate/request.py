@@ -25,6 +25,7 @@ from morphcore.threads import use_threads
 from morphcore.validity import documents
 from morphdata.channels import document_name
 from morphdata.drives import SIDES
+from morphdata.measurement import ANGLES
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.simulate import DEFAULT_ELEMENTS, FlexibleModel, FlightModel, SimulateRequest
 
@@ -32,7 +33,6 @@ Array = NDArray[np.float64]
 Document = dict[str, Any]
 Clock = Callable[[], float]
 
-ANGLES = ("phi", "theta", "psi")
 VARIATION_STEP_S = 0.01  # spacing of the samples over which the variation is summed
 
 

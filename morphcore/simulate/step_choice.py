@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants, physical_guess
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.time_grid import TimeGrid, time_grid
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, check_stop, say
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
 from morphdata.drives import without_side
+from morphdata.measurement import ANGLES
 from morphdata.samplefiles.channel_columns import without_gaps
 from morphdata.samplefiles.declared import declared
 from morphdata.samplefiles.fault import said_of
@@ -22,8 +23,6 @@ from morphdata.samples import InlineSample
 
 Array = NDArray[np.float64]
 Role = Literal["train", "held_out"]
-
-ANGLES = ("phi", "theta", "psi")
 
 
 @dataclass(frozen=True, repr=False)

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from morphdata.aircraft import Surface
-from morphdata.drives import SIDES, Hinge, drive_name, resolved, shown_drives
+from morphdata.drive_keys import resolved
+from morphdata.drives import SIDES, Hinge, drive_name, shown_drives
 from morphdata.identifiable import corrections
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from morphdata.drives import BOTH, shown_names
+from morphdata.drive_keys import shown_names
+from morphdata.drives import BOTH
 from morphdata.faults import InvalidInput
 from morphdata.options import SCHEDULE
 from morphdata.schedules import load_schedules

@@ -25,8 +25,9 @@ from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import lag_from_stage, lag_to_stage
-from morphcore.simulate.plan import STEP_S, flight_plan
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import STEP_S
 from morphdata.lattice import Lattice
 from tests.aero.link_loads import edge_loads, lane_loads
 from tests.geometry.rehinged import rehinged

@@ -19,8 +19,8 @@ from tests.worker.spread.processes import Workers, spread
 MIN_KEPT = (
     0.85  # of a flight's computing time is left when it comes in chunks; 1.7 = 2 x 0.85 on two free cores
 )
-GENERATIONS = 2
-ROUNDS = 3  # interleaved
+GENERATIONS = 1  # after the first one
+ROUNDS = 2  # interleaved
 SAMPLES = ("train_rate_0.2", "train_rate_0.5", "train_rate_0.8")
 
 
@@ -44,61 +44,58 @@ class Run:
     rate_cpu: float
 
 
-def flown(workers: Workers, request: dict[str, Any], *names: str) -> Run:
-    """Run a request on workers of these names alone."""
+def start(workers: Workers, *names: str) -> None:
+    """Start workers, and have them do something: imports and pages come before any clock starts."""
     workers.start(*names)
     warm = identification("train_rate_0.8", links=3)
-    for job_id in [workers.add(warm) for _ in names]:  # imports and pages come before the clock starts
+    for job_id in [workers.add(warm) for _ in range(2)]:
         workers.wait(job_id, 600.0)
+
+
+def flown(workers: Workers, request: dict[str, Any]) -> Run:
+    """Run a request on all workers that there are."""
     begun_s = workers.cpu_s()
     job_id = workers.add(request)
     job = workers.wait(job_id, 1200.0)
     flights = (job.progress or {})["flights"]
-    run = Run(
+    return Run(
         workers.content(job_id),
         flights_per_s(workers, job_id),
         flights / (workers.cpu_s() - begun_s),
     )
-    for name in names:
-        workers.kill(name)
-    return run
 
 
 @pytest.mark.slow
-@pytest.mark.timed
 @pytest.mark.timeout(1800)
 @pytest.mark.skipif((psutil.cpu_count() or 1) < 2, reason="two workers need two cores")
 def test_two_workers_fly_almost_twice_as_fast(tmp_path: Path) -> None:
     """2,500 models of three links through the three flights of constant rate, SQLite, 16 chunks a generation.
 
-    The results of one worker, of two, and of the mode `single` are the same to the bit.
+    The results of one worker, of two, and of the mode `single` are the same to the bit. Chunks cost little
+    computing time; what that makes of the wall time on free cores is printed, and depends on who else is at
+    work here.
     """
     url = f"sqlite:///{tmp_path / 'jobs.sqlite3'}"
     upgrade(url)
     search = {"preset": "paper", "generations": GENERATIONS, "seed": 1}
     request = identification(*SAMPLES, links=3, search=search)
-    runs: dict[str, list[Run]] = {"single": [], "two": [], "one": []}
+    runs: dict[str, list[Run]] = {"single": [], "one": []}
     with Workers(Database(url)) as workers:
+        start(workers, "a")
         for _ in range(ROUNDS):
-            for kind, requested, names in (
-                ("single", request, ("a",)),
-                ("two", spread(request), ("a", "b")),
-                ("one", spread(request), ("a",)),
-            ):
-                runs[kind].append(flown(workers, requested, *names))
+            for kind, requested in (("single", request), ("one", spread(request))):
+                runs[kind].append(flown(workers, requested))
                 print(f"{kind:7s} {runs[kind][-1].rate:7.1f} flights/s", flush=True)
-    every = [run for of_kind in runs.values() for run in of_kind]
-    assert all(run.content == every[0].content for run in every)
-    single, two, one = (statistics.median(run.rate for run in runs[kind]) for kind in runs)
-    single_cpu, two_cpu, one_cpu = (statistics.median(run.rate_cpu for run in runs[kind]) for kind in runs)
-    ratios = [b.rate / a.rate for a, b in zip(runs["single"], runs["two"], strict=True)]
-    print(f"two workers: {two / single:.2f} x mode single, {two / one:.2f} x one worker with chunks")
-    print(f"round by round: {' '.join(f'{ratio:.2f}' for ratio in ratios)}")
+        start(workers, "b")
+        two = flown(workers, spread(request))
+    assert all(run.content == two.content for of_kind in runs.values() for run in of_kind)
+    single, one = (statistics.median(run.rate for run in runs[kind]) for kind in runs)
+    single_cpu, one_cpu = (statistics.median(run.rate_cpu for run in runs[kind]) for kind in runs)
     print(
-        f"flights per second of CPU time: {two_cpu / single_cpu:.2f} x mode single, "
+        f"two workers: {two.rate / single:.2f} x mode single, {two.rate / one:.2f} x one worker with chunks"
+    )
+    print(
+        f"flights per second of CPU time: {two.rate_cpu / single_cpu:.2f} x mode single, "
         f"{one_cpu / single_cpu:.3f} by one worker with chunks"
     )
-    best = max(run.rate for run in runs["two"]) / max(run.rate for run in runs["single"])
-    print(f"best against best: {best:.2f} x mode single")
-    # wall times are reported, not judged: they depend on other users of this machine
     assert one_cpu / single_cpu >= MIN_KEPT

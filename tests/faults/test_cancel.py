@@ -17,7 +17,7 @@ from tests.waiting import until
 
 EITHER = frozenset({"cancelled", "succeeded"})
 CANCELLED = frozenset({"cancelled"})
-CANCELS = 120
+CANCELS = 100
 CALLERS = 4
 EFFECTIVE_S = 2.0
 NOISE_S = 3.0  # what a busy machine adds to the slowest of a hundred

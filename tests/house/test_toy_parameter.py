@@ -76,8 +76,8 @@ def request(bounds, **search):
     return IdentifyRequest.parse(
         {**documents, "samples": [sample], "model": {**model, "bounds": bounds}, "search": search})
 
-def identified(asked):
-    run = identification_from_request(asked)
+def identified(request):
+    run = identification_from_request(request)
     *_, last = run.steps()
     return run.result(last.checkpoint).to_document()
 

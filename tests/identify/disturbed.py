@@ -16,7 +16,7 @@ from morphcore.identify.result import IdentifyResult
 from morphcore.identify.settings import search_settings
 from morphcore.models.equivalent import ParameterBatch, chain_model
 from morphdata.identify import EquivalentModel, IdentifySearch
-from morphdata.measurement import Measurement
+from morphdata.measurement import ANGLES, Measurement
 from tests.identify.flights import (
     chosen_rows,
     example,
@@ -28,7 +28,6 @@ from tests.identify.flights import (
 Array = NDArray[np.float64]
 
 LINKS = 2
-ANGLES = ("phi", "theta", "psi")
 CHANNELS = (
     "p",
     "q",

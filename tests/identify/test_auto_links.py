@@ -15,7 +15,7 @@ from morphcore.identify.parameters import search_space
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import chain_model
 from morphcore.search.step import Step
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphdata.identify import AUTO_LINKS, EXAMPLE_REQUEST, EquivalentModel, IdentifyRequest
 from morphdata.operations.identify import cost
 from tests.identify.flights import example, reference_aircraft, reference_flight, synthetic

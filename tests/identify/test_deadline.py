@@ -13,7 +13,7 @@ from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
 from morphcore.optimise import ScheduleOptimisation
 from morphcore.search.swarm import SwarmSettings
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Deadline, Interrupted, listening, say
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
@@ -109,7 +109,7 @@ def test_an_optimisation_without_time_ends() -> None:
 
 
 @pytest.mark.parametrize("begin", [hopeless, optimisation])
-def test_progress_is_told_before_the_first_step(begin: Callable[..., Any]) -> None:
+def test_progress_is_reported_before_the_first_step(begin: Callable[..., Any]) -> None:
     """Who listens hears what is prepared from the first moment, the choice of the time step among it."""
     heard: list[str] = []
     steps: Iterator[Any] = begin().steps(stop=lambda: bool(heard))

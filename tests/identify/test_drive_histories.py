@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from morphcore import Trajectory
 from morphcore.identify.cost import fly_attitudes, fly_readings, sample_cases, shared_trims
 from morphcore.identify.drive_histories import smooth_history, smoothed_drives
-from morphcore.identify.first_angles import with_first_angles
+from morphcore.identify.first_angles import first_angle_columns, with_first_angles
 from morphcore.identify.identification import Identification
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.simulate.schedule import ConstantRate, Quadratic, Spline
@@ -124,7 +124,8 @@ def test_first_angles_move_a_flight_as_their_columns_say() -> None:
     model = chain_model(reference_aircraft(), reference_flight(), 2)
     sample, histories = smoothed_drives(noisy(flown(example("asymmetric")), 2e-4, 5))
     (case,) = sample_cases(model, [sample])
-    setup = with_first_angles(model, truth(), case, histories, "trim")
+    columns = first_angle_columns(model, truth(), case, histories, "trim")
+    setup = with_first_angles(case.setup, sample, histories, columns)
     shift = 2e-4
     for number, drive in enumerate(sample.drives):
         moved_rows = sample.drives[drive].copy()

@@ -27,7 +27,7 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.search.checkpoint import UnreadableCheckpoint
 from morphcore.search.evolution import EvolutionSettings
 from morphcore.search.swarm import SwarmSettings
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.threads import thread_count
 from morphdata.identify import EquivalentModel, IdentifyRequest
 from tests.identification_request import identification

@@ -9,8 +9,8 @@ import pytest
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.identify import Identification, SearchSettings
 from morphcore.identify.study import Study
-from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.step_choice import CANDIDATES_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Interrupted
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened

@@ -6,8 +6,8 @@ import pytest
 
 from morphcore.identify.study_choice import recommend
 from morphcore.identify.study_row import StudyRow
+from morphdata.measurement import ANGLES
 
-ANGLES = ("phi", "theta", "psi")
 LARGE_RMS_RAD = 1e-2  # far above what the integration resolves
 
 

@@ -54,7 +54,7 @@ def test_a_cost_does_not_depend_on_its_part() -> None:
 
 
 @pytest.mark.parametrize("settings", [SWARM, EVOLUTION], ids=lambda settings: settings.method)
-def test_asked_and_told_is_the_search_itself(settings: SearchSettings) -> None:
+def test_tasks_flown_elsewhere_give_the_search_itself(settings: SearchSettings) -> None:
     """A search whose generations are flown in parts by other processes goes through the same states."""
     steps = list(search(settings).steps())
     run, others = search(settings), [search(settings) for _ in range(2)]  # processes with plans of their own

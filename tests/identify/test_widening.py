@@ -13,7 +13,7 @@ from morphcore.identify.parameters import search_space
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.search.least_squares import LeastSquares
 from morphcore.search.solver import Box
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphdata.identify import EquivalentModel
 from tests.identify.flights import reference_aircraft, reference_flight, shortened, synthetic

@@ -24,6 +24,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel
+from morphdata.measurement import ANGLES
 from tests.identify.flights import (
     EXAMPLES,
     example,
@@ -36,7 +37,6 @@ from tests.identify.flights import (
 Damage = Callable[[Trajectory], Trajectory]
 
 LATTICE = {"chordwise": 2, "spanwise": 6}
-ANGLES = ("phi", "theta", "psi")
 NOISE_RAD = 4e-4  # of attitudes, as of a good sensor
 FROZEN = slice(60, 90)  # rows
 

@@ -23,9 +23,14 @@ ROUNDS = 3  # the machine has other things to do at times: the best of so many i
 JOB_S = 1.0
 
 
-def best(rounds: int, measure: Callable[[], Times]) -> Times:
-    """The least disturbed of some measurements."""
-    return min((measure() for _ in range(rounds)), key=lambda times: times.p95_ms)
+def best(limit_ms: float, measure: Callable[[], Times]) -> Times:
+    """The least disturbed of some measurements; the first one that keeps the limit ends them."""
+    found = measure()
+    for _ in range(ROUNDS - 1):
+        if found.p95_ms < limit_ms:
+            break
+        found = min(found, measure(), key=lambda times: times.p95_ms)
+    return found
 
 
 def test_looking_at_jobs(rig: Rig, tell: Tell) -> None:
@@ -47,14 +52,16 @@ def test_looking_at_jobs(rig: Rig, tell: Tell) -> None:
             call = lambda: client.get("/jobs", params=filters).raise_for_status()  # noqa: E731
             return Times.of(timed(call) for _ in range(60))
 
-        shown = best(ROUNDS, status)
+        shown = best(STATUS_P95_MS, status)
         tell(f"GET /jobs/{{id}}, {QUEUED} queued: {shown}")
         lists = {
-            "GET /jobs": best(ROUNDS, page),
-            "GET /jobs?limit=200": best(ROUNDS, lambda: page(limit=200)),
-            "GET /jobs?status=failed": best(ROUNDS, lambda: page(status="failed")),
-            "GET /jobs?label=none": best(ROUNDS, lambda: page(label="none")),
-            "GET /jobs?created_before=": best(ROUNDS, lambda: page(created_before="2000-01-01T00:00:00Z")),
+            "GET /jobs": best(LIST_P95_MS, page),
+            "GET /jobs?limit=200": best(LIST_P95_MS, lambda: page(limit=200)),
+            "GET /jobs?status=failed": best(LIST_P95_MS, lambda: page(status="failed")),
+            "GET /jobs?label=none": best(LIST_P95_MS, lambda: page(label="none")),
+            "GET /jobs?created_before=": best(
+                LIST_P95_MS, lambda: page(created_before="2000-01-01T00:00:00Z")
+            ),
         }
         for name, times in lists.items():
             tell(f"{name}, {QUEUED} jobs: {times}")

@@ -13,8 +13,9 @@ from morphcore.frames import quaternion_from_euler
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.simulate.batch import initial_state
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import HingeMotion
+from morphcore.simulate.time_grid import TimeGrid
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.aircraft import load_aircraft
 from morphdata.flight import Flight as FlightDocument

@@ -17,7 +17,7 @@ from morphcore.models.equivalent import (
 )
 from morphcore.models.parameters import lag_weights
 from morphcore.simulate.batch import state_rates
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from tests.models.chains import (
     example_aircraft,
     example_flight,

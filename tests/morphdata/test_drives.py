@@ -9,7 +9,8 @@ import pytest
 
 from morphcore.errors import InvalidInput
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
-from morphdata.drives import Hinge, resolved
+from morphdata.drive_keys import resolved
+from morphdata.drives import Hinge
 
 
 def aircraft(**hinges: Any) -> Aircraft:

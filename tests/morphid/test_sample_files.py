@@ -42,7 +42,7 @@ def test_every_format_makes_the_same_request(examples: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("ending", ["csv", "json", "parquet", "mat"])
-def test_a_broken_file_is_told_in_a_sentence(tmp_path: Path, ending: str) -> None:
+def test_a_broken_file_is_reported_in_a_sentence(tmp_path: Path, ending: str) -> None:
     """The file is named, the exit code says invalid input, and there is a way out."""
     path = tmp_path / f"x.{ending}"
     path.write_bytes(np.random.default_rng(1).bytes(1000))
@@ -117,7 +117,7 @@ def test_odd_declarations_name_the_option(
     assert not request
 
 
-def test_a_service_is_told_what_is_declared(examples: Path) -> None:
+def test_a_service_receives_what_is_declared(examples: Path) -> None:
     """As parts of the form with the file."""
     seen: list[bytes] = []
 

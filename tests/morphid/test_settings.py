@@ -114,7 +114,7 @@ def test_serve_takes_option_then_variable_then_default(
     assert getattr(seen.pop(), name) == getattr(default, name)
 
 
-def test_what_serve_is_told_reaches_its_children(tmp_path: Path) -> None:
+def test_options_of_serve_reach_its_children(tmp_path: Path) -> None:
     """The API, the worker and the beat read variables: they get the ones that the options came to."""
     settings = settings_for(data_dir=tmp_path / "x", host="127.0.0.5", workers=7)
     reported = serving._environment(settings, 8123)

@@ -12,8 +12,9 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.kernels.layout import LINKS_C
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
-from morphcore.simulate.plan import STEP_S, common_path
+from morphcore.simulate.plan import common_path
 from morphcore.simulate.schedule import ConstantRate, Spline
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Interrupted
 from morphcore.threads import thread_count, use_threads
 from morphdata.optimize import Weights

@@ -25,8 +25,8 @@ from morphcore.errors import FlightDiverged, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.parameters import SHORTEST_LAG_S
-from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import StartMode
 from tests.oracles.chain_tree import chain_tree, link_bodies, link_ends, tree_hinges
 from tests.oracles.dynamics import Motion, bias, body_poses, body_twists, mass_matrix

@@ -21,8 +21,9 @@ from morphcore.models.equivalent import (
 )
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.flight import Simulation, flight_steps
-from morphcore.simulate.plan import FlightPlan, TimeGrid, flight_plan, time_grid
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.time_grid import TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from tests.models.chains import EXAMPLES, example_aircraft, example_flight

@@ -18,8 +18,8 @@ from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.flexible import flexible_model
 from morphcore.simulate.flexible import FlexibleFlight, hinge_path
 from morphcore.simulate.flexible_trim import trim_flexible
-from morphcore.simulate.plan import TimeGrid
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import trim
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from tests.aero.link_loads import edge_loads

@@ -9,8 +9,9 @@ from morphcore.frames import wrap_angle
 from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import lane_constants, physical_guess
 from morphcore.simulate.batch import BLOCKS_PER_GROUP, LONGEST_CHUNK, fly_batch
-from morphcore.simulate.plan import STEP_S, flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold, Tabulated
+from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.stopping import Interrupted
 from morphcore.threads import thread_count, use_threads
 from tests.models.chains import random_batch

@@ -16,8 +16,9 @@ from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import ParameterBatch, chain_model, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.simulate.flight import write_trajectory_csv
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold, Schedule, Tabulated
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphdata.aircraft import load_aircraft
 from morphdata.environment import Environment, Gust, Turbulence

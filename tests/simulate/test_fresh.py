@@ -9,8 +9,8 @@ import pytest
 
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trim import trim
 from morphdata.lattice import CORE_LAWS, Lattice, VortexCore
 from tests.models.chains import example_aircraft, example_flight, instant, random_batch
@@ -54,7 +54,7 @@ def test_frozen_lattice(links):
 @pytest.mark.parametrize("name", SAMPLES)
 def test_frozen_lattice_on_all_samples(name, links):
     """The same on all four samples and for more links."""
-    assert frozen_lattice_error(links, name, 0.005).max() < 0.5 * FROZEN_LATTICE_ERROR_RAD
+    assert frozen_lattice_error(links, name, 0.01).max() < 0.5 * FROZEN_LATTICE_ERROR_RAD
 
 
 def test_fresh_trim_is_an_equilibrium():

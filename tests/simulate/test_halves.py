@@ -16,8 +16,9 @@ from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import whole_joints
 from morphcore.paper.computation import benchmark_swarm
-from morphcore.simulate.plan import common_path, flight_plan, time_grid
+from morphcore.simulate.plan import common_path, flight_plan
 from morphcore.simulate.schedule import ConstantRate
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trim import trim
 from morphdata.environment import Environment, Gust
 from tests.models.chains import aircraft_of, example_aircraft, example_flight

@@ -15,8 +15,9 @@ from morphcore.models.kernels.layout import JOINTS
 from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.simulate.batch import state_rates
 from morphcore.simulate.flight import ModelChoice, Simulation
-from morphcore.simulate.plan import flight_plan, path_angles, time_grid
+from morphcore.simulate.plan import flight_plan, path_angles
 from morphcore.simulate.schedule import ConstantRate, Hold, Spline
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphdata.lattice import Lattice
 from tests.geometry.rehinged import rehinged

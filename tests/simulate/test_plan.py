@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_TWIST
-from morphcore.simulate.plan import STEP_S, common_path, flight_plan, time_grid
+from morphcore.simulate.plan import common_path, flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.simulate.time_grid import STEP_S, time_grid
 from tests.geometry.rehinged import fixed
 from tests.models.chains import Parabola, odd_aircraft, small_model
 from tests.simulate.flights import example_model, fly_trimmed, sample, sample_plan, sample_schedules

@@ -11,9 +11,9 @@ import pytest
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.models.equivalent import physical_guess
 from morphcore.models.parameters_document import parameters_document
-from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.request import attitude_variation, simulation_from_document
 from morphcore.simulate.schedule import ConstantRate
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Interrupted
 from morphdata.environment import Environment

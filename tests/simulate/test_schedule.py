@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from morphcore.errors import InvalidInput
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, HingeMotion, Hold, Quadratic, Spline, Tabulated
+from morphcore.simulate.time_grid import time_grid
 from tests.simulate.flights import example_model, fly_trimmed, sample, sample_schedules
 
 TIMES = np.linspace(0.0, 1.7, 35)

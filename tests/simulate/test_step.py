@@ -11,8 +11,8 @@ from morphcore.frames import quaternion_from_euler, wrap_angle
 from morphcore.models.equivalent import lane_constants, physical_guess
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import BEFORE, GAMMA, LAST
-from morphcore.simulate.plan import STEP_S
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.time_grid import STEP_S
 from tests.models.chains import (
     Swing,
     airless,

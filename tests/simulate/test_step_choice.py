@@ -7,9 +7,9 @@ import pytest
 
 from morphcore.frames import wrap_angle
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.plan import time_grid
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.step_choice import CANDIDATES_S, TOLERANCE_RAD, busiest_part, choose_step
+from morphcore.simulate.time_grid import time_grid
 from morphdata.environment import Environment, Gust, Turbulence
 from tests.models.chains import example_aircraft, example_flight
 from tests.simulate.flights import example_model, fly, fly_trimmed, plan_of, sample, sample_schedules

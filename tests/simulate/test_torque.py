@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from morphcore.models.equivalent import lane_constants, physical_guess
-from morphcore.simulate.plan import flight_plan, time_grid
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Spline
+from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from tests.models.chains import (
     airless,

@@ -12,7 +12,7 @@ from morphcore.lanes import TOGETHER
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.simulate.batch import state_rates
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trim import SLAB, trim, trimmed_state
 from morphdata.lattice import Lattice, VortexCore
 from tests.models.chains import (

@@ -20,7 +20,7 @@ from morphcore.paper.settings import PaperSettings
 from morphcore.paper.stages import Finished
 from morphcore.paper.truth import samples_of
 from morphcore.simulate.flight import write_trajectory_csv
-from morphcore.simulate.plan import STEP_S
+from morphcore.simulate.time_grid import STEP_S
 
 Document = dict[str, Any]
 

@@ -196,7 +196,7 @@ def test_bad_field_is_named(
     calls.assert_named(service, "/identify", changed(path, value), pointer or path, code, words)
 
 
-def test_several_faults_are_told_at_once(service: RunningService) -> None:
+def test_several_faults_are_reported_at_once(service: RunningService) -> None:
     """Independent faults are reported together, at most 20."""
     document = changed("/samples/0/time_s/40", 0.0)
     document["samples"][1]["theta_rad"][9] = 2.0

@@ -47,7 +47,7 @@ def ids(service: RunningService, **filters: Any) -> list[str]:
     return [job["id"] for job in answer.json()["jobs"]]
 
 
-def test_every_operation_can_be_told_how(any_service: RunningService, operation: Operation) -> None:
+def test_every_operation_takes_execution_settings(any_service: RunningService, operation: Operation) -> None:
     """Priority, label and attempts stand in the job; the worker's document says how it is to be run."""
     execution = {"priority": 7, "label": "wing 3, again", "max_attempts": 5}
     document = {**operation.request(), "execution": execution}

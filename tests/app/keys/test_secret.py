@@ -56,6 +56,6 @@ def test_a_secret_is_not_shown_by_accident() -> None:
     + [f"mid_4k7m2x9q_{52 * '0'}{tail}" for tail in ("0", "\n", " ", "\x00", "_")]
     + [f"mid_4k7m2x9q_{51 * '0'}é", f"mid_4k7m2x9_{52 * '0'}", f"xmid_4k7m2x9q_{52 * '0'}"],
 )
-def test_what_is_no_key_is_told_apart(text: str) -> None:
+def test_what_is_no_key_is_recognised(text: str) -> None:
     """Only the exact form is a key."""
     assert KeyText.parsed(text) is None

@@ -152,7 +152,7 @@ def test_each_request_leaves_a_line(service: RunningService, access: Written) ->
     assert "hush" not in access.text
 
 
-def test_a_client_that_goes_away_is_told_of(service: RunningService, access: Written) -> None:
+def test_a_client_that_goes_away_is_logged(service: RunningService, access: Written) -> None:
     """A client that did not wait for its answer leaves a line too."""
     job = service.client.post("/identify", json=_document()).json()["id"]
     with pytest.raises(httpx.ReadTimeout):

@@ -132,7 +132,7 @@ def test_off_imports_nothing(root: Path, process: str, tracing: set[str]) -> Non
     assert subprocess.run([sys.executable, "-c", program], cwd=root, check=False).returncode == 0
 
 
-def test_missing_packages_are_told_of(
+def test_missing_packages_are_reported(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Configured but not installed: the service runs without traces and says what to install."""

@@ -91,7 +91,9 @@ def test_what_does_not_move_the_aircraft_is_refused_at_the_sample(
     assert words in found["hint"]
 
 
-def test_a_column_that_cannot_be_read_is_told_and_harms_no_other_aircraft(service: RunningService) -> None:
+def test_a_column_that_cannot_be_read_is_reported_and_harms_no_other_aircraft(
+    service: RunningService,
+) -> None:
     """The flight says why; whoever does not fold is not concerned."""
     name, back = uploaded(service, flight(sweep=T, fold=[0, 0, "x", 0]))
     assert "not a finite number" in back["unreadable"]["fold"]

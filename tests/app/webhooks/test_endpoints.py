@@ -165,7 +165,7 @@ def test_a_jobs_end_arrives(development: RunningService) -> None:
         assert development.client.get(message.data.links.self).json()["status"] == "succeeded"
 
 
-def test_a_new_webhook_is_told_nothing_until_its_receiver_answers(development: RunningService) -> None:
+def test_a_new_webhook_receives_nothing_until_its_receiver_answers(development: RunningService) -> None:
     """The challenge is signed; ends before its answer are dropped, no test is sent, a new challenge helps."""
     with receiver() as there:
         there.answers_challenges = False
@@ -220,7 +220,7 @@ def test_a_test_message_arrives(development: RunningService) -> None:
         assert (shown["status"], shown["tries"], shown["response_status"]) == ("delivered", 1, 204)
 
 
-def test_disabled_webhooks_are_told_and_enabled(any_service: RunningService) -> None:
+def test_disabled_webhooks_show_why_and_can_be_enabled(any_service: RunningService) -> None:
     """Why a webhook is disabled can be read; no test is sent to it; enabled, it is challenged again."""
     from app.webhooks.deliveries import disable
 

@@ -41,7 +41,7 @@ def test_an_end_makes_one_delivery(database: Database) -> None:
         assert len(str(row.payload)) < 4000
 
 
-def test_ends_without_a_worker_are_told_too(database: Database) -> None:
+def test_ends_without_a_worker_are_posted_too(database: Database) -> None:
     """A queued job that is cancelled, a job whose workers all died, one given back while it was cancelled."""
     new_hook(database, NOBODY)
     cancelled, lost, released = (new_job(database) for _ in range(3))

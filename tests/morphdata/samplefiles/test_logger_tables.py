@@ -129,7 +129,7 @@ def test_other_titles_mean_other_columns(title: str) -> None:
         ("# " + TITLES + "\n", "no_rows", None, "rows"),
     ],
 )
-def test_what_cannot_be_told_is_refused(text: str, code: str, line: int | None, said: str) -> None:
+def test_what_is_ambiguous_is_refused(text: str, code: str, line: int | None, said: str) -> None:
     """Where two readings are possible or a unit is unknown, the sentence says what stands there."""
     with pytest.raises(FileFault) as caught:
         read(text)
