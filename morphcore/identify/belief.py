@@ -17,6 +17,7 @@ from morphcore.identify.posterior import Posterior, posterior
 from morphcore.identify.profile import Profile, profile, require_names
 from morphcore.identify.sample_measurement import Nuisances, fit_records
 from morphcore.search.solver import Batch
+from morphcore.shown import Shown
 from morphdata.renamed import under_both_spellings
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Belief:
+@dataclass(frozen=True, repr=False)
+class Belief(Shown):
     """What the samples say about the parameters, as far as it was requested.
 
     Attributes
