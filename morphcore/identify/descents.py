@@ -44,7 +44,7 @@ def hybrid(run: Identification, settings: SearchSettings) -> Hybrid:
         candidates=settings.screen,
         starts=settings.starts,
         spread=CANDIDATE_SPREAD,
-        good_cost=good_cost(run),
+        good_cost=lambda: good_cost(run),  # later: it needs the time step, which a deadline may end
         seed=settings.seed,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -46,8 +47,8 @@ class Hybrid(Solver[HybridState, Outcome]):
         Number flown around the best guess, from which ``starts`` of the second descent are chosen.
     spread : float
         Standard deviation of the candidates, in search coordinates.
-    good_cost : float
-        A higher cost suggests that the first descent ended in a wrong valley.
+    good_cost : callable
+        Gives a cost, when the first descent has ended; a higher one suggests that it ended in a wrong valley.
     seed : int
     """
 
@@ -58,7 +59,7 @@ class Hybrid(Solver[HybridState, Outcome]):
         candidates: int,
         starts: int,
         spread: float,
-        good_cost: float,
+        good_cost: Callable[[], float],
         seed: int,
     ) -> None:
         self._descent = descent
@@ -84,7 +85,7 @@ class Hybrid(Solver[HybridState, Outcome]):
             return replace(state, stage="second", descent=self._descent.init(starts, state.descent.box))
         descent = self._descent.tell(state.descent, outcome)
         best = min(state.best_cost, self._descent.best(descent, outcome)[1])
-        poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost
+        poor = state.stage == "first" and self._descent.done(descent) and best > self._good_cost()
         return replace(state, stage="screening" if poor else state.stage, descent=descent, best_cost=best)
 
     def done(self, state: HybridState) -> bool:

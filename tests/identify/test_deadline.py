@@ -15,7 +15,7 @@ from morphcore.optimise import ScheduleOptimisation
 from morphcore.search.swarm import SwarmSettings
 from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Deadline, Interrupted, listening, say
-from morphdata.identify import EquivalentModel
+from morphdata.identify import EquivalentModel, Method
 from tests.identify.flights import example, reference_aircraft, reference_flight, shortened
 from tests.identify.test_step import softened
 from tests.optimise.morphs import optimisation
@@ -26,10 +26,10 @@ NO_TIME = 1e-9
 GRACE_S = 20.0  # for what is always flown, and for a busy machine; hours would be asked for
 
 
-def hopeless(**settings: Any) -> Identification:
+def hopeless(method: Method = "pso", **settings: Any) -> Identification:
     """A search that would take hours, on wings that ask for a shorter step than the default."""
     swarm = SwarmSettings(particles=50_000, generations=1000)
-    search = SearchSettings(method="pso", swarm=swarm, **settings)
+    search = SearchSettings(method=method, swarm=swarm, **settings)
     return Identification(softened(0.25), reference_flight(), [FLIGHT], TWO, search)
 
 
@@ -42,9 +42,10 @@ def test_a_deadline_says_whose_stop_it_was() -> None:
     assert (requested(), requested.passed) == (True, False)
 
 
-def test_a_search_without_time_flies_the_guess_and_ends() -> None:
+@pytest.mark.parametrize("method", ["pso", "hybrid"])
+def test_a_search_without_time_flies_the_guess_and_ends(method: Method) -> None:
     """The step that nobody had the time to choose is the default, and the result says so."""
-    run = hopeless(max_seconds=NO_TIME)
+    run = hopeless(method, max_seconds=NO_TIME)
     begin = time.monotonic()
     steps = list(run.steps())
     assert time.monotonic() - begin < GRACE_S

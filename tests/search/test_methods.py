@@ -27,7 +27,9 @@ Make = Callable[[Formula], Solver[Any, Any]]
 
 def hybrid(problem: Formula, good_cost: float = 1e-9) -> Hybrid:
     """A small hybrid."""
-    return Hybrid(LeastSquares(problem, 6), candidates=8, starts=3, spread=0.2, good_cost=good_cost, seed=2)
+    return Hybrid(
+        LeastSquares(problem, 6), candidates=8, starts=3, spread=0.2, good_cost=lambda: good_cost, seed=2
+    )
 
 
 MAKERS: dict[str, Make] = {
