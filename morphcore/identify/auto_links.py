@@ -129,8 +129,7 @@ class AutoIdentification:
         self.search = search or SearchSettings()
         self._clock = clock
 
-        bandwidth_hz = None if measurement is None else measurement.drive_bandwidth_hz
-        smoothed = smoothed_samples(aircraft, samples, bandwidth_hz)
+        smoothed = smoothed_samples(aircraft, samples, measurement)
 
         def run(links: int) -> Identification:
             settings = model.model_copy(update={"links_per_wing": links})

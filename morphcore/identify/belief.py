@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.coloured import ANGLES, MIN_FLIGHTS, ColouredNoise
+from morphcore.identify.coloured import MIN_FLIGHTS, ColouredNoise
 from morphcore.identify.evidence import guess_spread, linear_model
 from morphcore.identify.likelihood import Likelihood
 from morphcore.identify.parameters import SearchSpace
@@ -18,12 +18,15 @@ from morphcore.identify.profile import Profile, profile, require_names
 from morphcore.identify.sample_measurement import Nuisances, fit_records
 from morphcore.search.solver import Batch
 from morphcore.shown import Shown
+from morphdata.measurement import ANGLES
 from morphdata.renamed import under_both_spellings
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
 
 Array = NDArray[np.float64]
+
+COUNT = len(ANGLES)  # first channels of every record
 
 
 @dataclass(frozen=True, repr=False)
@@ -47,7 +50,7 @@ class Belief(Shown):
     space: SearchSpace | None = field(default=None, repr=False)
     estimate: Array = field(default_factory=lambda: np.zeros(0))
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    noise_rad: Array = field(default_factory=lambda: np.zeros(ANGLES))
+    noise_rad: Array = field(default_factory=lambda: np.zeros(COUNT))
     posterior: Posterior | None = None
     profiles: tuple[Profile, ...] = ()
 
@@ -128,12 +131,12 @@ def belief_of(run: Identification, estimate: Array, jacobian: Array, noise: Colo
 
 def _noise(noise: ColouredNoise) -> Array:
     """(3,) rms of the residuals of the angles, with what chains miss where few flights show it, rad."""
-    total, rows = np.zeros(ANGLES), 0
+    total, rows = np.zeros(COUNT), 0
     for record in noise.records:
-        if record.residual.shape[1] < ANGLES:
+        if record.residual.shape[1] < COUNT:
             continue
-        hidden = record.discrepancy_rad[:ANGLES] if len(noise.records) < MIN_FLIGHTS else np.zeros(ANGLES)
+        hidden = record.discrepancy_rad[:COUNT] if len(noise.records) < MIN_FLIGHTS else np.zeros(COUNT)
         count = record.time_s.size
-        total += np.sum(record.residual[:, :ANGLES] ** 2, axis=0) + count * hidden**2
+        total += np.sum(record.residual[:, :COUNT] ** 2, axis=0) + count * hidden**2
         rows += count
     return np.asarray(np.sqrt(total / max(rows, 1)))

@@ -13,7 +13,6 @@ noise of a flight has a floor for it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -24,7 +23,6 @@ from morphcore.identify.noise_model import SMALLEST_RAD, Block, NoiseModel, bloc
 
 Array = NDArray[np.float64]
 
-ANGLES = 3  # channels of a row without further measurements: phi, theta, psi
 MIN_FLIGHTS = 3  # of a jackknife
 # errors that chains make on flights they were not fitted to, over the rms of what bending does to the
 # attitude: two links on the example flights, 2e-4 of 1.15e-2 rad. On seven other aircraft (span, stiffness,
@@ -102,33 +100,6 @@ class Record:
         floor = DISCREPANCY * np.broadcast_to(self.motion_rad, self.residual.shape[1:])
         shown = SHOWN * float(np.mean(self.residual**2))
         return np.asarray(np.sqrt(np.maximum(floor**2 - shown, 0.0)))
-
-
-def records(
-    times_s: Sequence[Array],
-    residual: Array,
-    jacobian: Array,
-    motions_rad: Sequence[float] | None = None,
-    channels: Sequence[int] | None = None,
-) -> tuple[Record, ...]:
-    """Cut residuals (m,) and Jacobian (m, d) of a whole fit into those of its samples.
-
-    channels : number of channels of each sample; None: the three angles.
-    """
-    motions = [0.0] * len(times_s) if motions_rad is None else motions_rad
-    widths = [ANGLES] * len(times_s) if channels is None else channels
-    ends = np.cumsum([width * time_s.size for width, time_s in zip(widths, times_s, strict=True)])
-    return tuple(
-        Record(time_s, own.reshape(-1, width), slope.reshape(time_s.size, width, -1), motion)
-        for time_s, width, own, slope, motion in zip(
-            times_s,
-            widths,
-            np.split(residual, ends[:-1]),
-            np.split(jacobian, ends[:-1]),
-            motions,
-            strict=True,
-        )
-    )
 
 
 @dataclass(frozen=True)

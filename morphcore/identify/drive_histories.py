@@ -28,6 +28,7 @@ from morphcore.simulate.hinge_schedules import moved_flight
 from morphcore.simulate.trajectory import Trajectory, require_flight
 from morphdata.faults import refuse
 from morphdata.identify import samples_faults
+from morphdata.measurement import Measurement
 
 Array = NDArray[np.float64]
 Bandwidth = float | Literal["auto"]
@@ -130,9 +131,9 @@ def smoothed_drives(
 
 
 def smoothed_samples(
-    aircraft: Aircraft, samples: Sequence[Trajectory], bandwidth_hz: Bandwidth | None = None
+    aircraft: Aircraft, samples: Sequence[Trajectory], measurement: Measurement | None = None
 ) -> SmoothedSamples:
-    """Check samples, and smooth their drives, as of `smooth_history`.
+    """Check samples, and smooth their drives with the bandwidth of their measurement.
 
     Raises
     ------
@@ -143,6 +144,7 @@ def smoothed_samples(
     for number, sample in enumerate(samples):
         require_flight(sample, f"/samples/{number}")
     given = [moved_flight(aircraft, sample, f"/samples/{n}") for n, sample in enumerate(samples)]
+    bandwidth_hz = None if measurement is None else measurement.drive_bandwidth_hz
     found = [smoothed_drives(sample, bandwidth_hz) for sample in given]
     return SmoothedSamples(
         tuple(given), tuple(sample for sample, _ in found), tuple(histories for _, histories in found)

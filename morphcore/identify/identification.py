@@ -99,7 +99,7 @@ class Identification:
         self._linear: tuple[tuple[Openness, ...], Array, Array, Array] | None = None
         self.measurement = measurement or Measurement()
         if not isinstance(samples, SmoothedSamples):
-            samples = smoothed_samples(aircraft, samples, self.measurement.drive_bandwidth_hz)
+            samples = smoothed_samples(aircraft, samples, measurement)
         self.samples, self.histories = samples.smooth, samples.histories
         self.uncertainty = uncertainty or UncertaintySettings()
         self._first_openness = first_openness(self.samples, self.measurement)

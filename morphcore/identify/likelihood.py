@@ -11,8 +11,8 @@ coloured noise the spread of a linear model is that of the sandwich formula, whe
 would promise more than least squares can keep. The second term, of what no linear change explains, only
 matters far from the estimate; v is the mean variance that the scores see.
 
-The physical guess adds a normal prior in search coordinates, of the spread that the fit found likeliest
-(`evidence`), and the box ends it.
+The physical guess adds a normal prior in search coordinates, of the spread that the flights say it has
+(`evidence.guess_spread`), and the box ends it.
 """
 
 from __future__ import annotations

@@ -143,7 +143,8 @@ def noise_models(blocks: Sequence[Block], prior: Array, lengths_s: Sequence[floa
 
 def _restricted_likelihood(blocks: Sequence[Block], prior: Array, shape: NoiseShape) -> tuple[float, Array]:
     """Logarithm of the restricted likelihood of a shape, and the scales (blocks,) of the noise, rad."""
-    places, grams, crosses, squares, determinant = _whitened(blocks, shape)
+    grams, crosses, squares, determinant = _whitened(blocks, shape)
+    places = [each.unknowns for each in blocks]
     sizes = np.array([each.time_s.size for each in blocks], dtype=np.float64)
     scales = np.maximum(squares / sizes, SMALLEST_RAD**2)
     width = prior.size
@@ -169,11 +170,9 @@ def _restricted_likelihood(blocks: Sequence[Block], prior: Array, shape: NoiseSh
     return float(likelihood), np.sqrt(scales)
 
 
-def _whitened(
-    blocks: Sequence[Block], shape: NoiseShape
-) -> tuple[list[NDArray[np.int64]], list[Array], list[Array], Array, float]:
-    """Places, normal matrices and right-hand sides of whitened blocks, their squares, log determinant."""
-    places, grams, crosses, squares = [], [], [], []
+def _whitened(blocks: Sequence[Block], shape: NoiseShape) -> tuple[list[Array], list[Array], Array, float]:
+    """Normal matrices and right-hand sides of whitened blocks, their squares, log determinant."""
+    grams, crosses, squares = [], [], []
     determinant = 0.0
     roots: dict[int, Array] = {}  # channels of a sample have their rows in common
     for each in blocks:
@@ -183,8 +182,7 @@ def _whitened(
         both = np.concatenate([each.residual[:, None], each.design], axis=1)
         rows = solve_triangular(root, both, lower=True)
         determinant += 2.0 * float(np.log(np.diag(root)).sum())
-        places.append(each.unknowns)
         grams.append(rows[:, 1:].T @ rows[:, 1:])
         crosses.append(rows[:, 1:].T @ rows[:, 0])
         squares.append(float(rows[:, 0] @ rows[:, 0]))
-    return places, grams, crosses, np.array(squares), determinant
+    return grams, crosses, np.array(squares), determinant

@@ -184,7 +184,8 @@ class IdentifyResult(Shown):
 def identify_result(run: Identification, state: SearchState, *, judged: bool = True) -> IdentifyResult:
     """Fly the best point so far against all samples; if ``judged``, with its uncertainty and cost too."""
     start, space = run.settings.start, run.space
-    fits = _fits(run, state.best)
+    rigid = run.chain(run.model.aircraft, run.model.flight, 1)
+    fits = _fits(run, rigid, state.best)
     flies = not any(fit.case.sample.role == "train" and fit.ending("identified") for fit in fits)
     certainty = noise = None
     belief = Belief()
@@ -205,7 +206,7 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         fits=fits,
         uncertainty=certainty,
         search=_search_document(run, state),
-        cost=_flight_times(run, best, judged=judged),
+        cost=_flight_times(run, rigid, best, judged=judged),
         settings=run.settings.model_copy(
             update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
         ),
@@ -226,20 +227,15 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
     )
 
 
-def _fits(run: Identification, best: Array) -> tuple[SampleFit, ...]:
+def _fits(run: Identification, rigid_model: ChainModel, best: Array) -> tuple[SampleFit, ...]:
     """How the rigid model, the physical guess and a search point (d,) meet each sample."""
     start, space = run.settings.start, run.space
-    rigid_model = _rigid(run)
     # a plan knows the lattice and the hinges, not the links: both models fly the same ones
     rigid = _attitudes(rigid_model, physical_guess(rigid_model), run.cases, start)
     both = _attitudes(run.model, space.decode(np.stack([space.guess, best])), run.cases, start)
     return tuple(
         SampleFit(case, r[0], pair[0], pair[1]) for case, r, pair in zip(run.cases, rigid, both, strict=True)
     )
-
-
-def _rigid(run: Identification) -> ChainModel:
-    return run.chain(run.model.aircraft, run.model.flight, 1)
 
 
 def _search_document(run: Identification, state: SearchState) -> dict[str, Any]:
@@ -259,10 +255,11 @@ def _search_document(run: Identification, state: SearchState) -> dict[str, Any]:
     }
 
 
-def _flight_times(run: Identification, best: ParameterBatch, *, judged: bool) -> dict[str, float | None]:
+def _flight_times(
+    run: Identification, rigid: ChainModel, best: ParameterBatch, *, judged: bool
+) -> dict[str, float | None]:
     """Wall times of single flights of the longest sample, s; without them where nothing is judged."""
     longest = max(range(len(run.cases)), key=lambda i: run.cases[i].plan.grid.steps)
-    rigid = _rigid(run)
 
     def flight_time(model: ChainModel, batch: ParameterBatch) -> float | None:
         return _flight_time(model, batch, run.cases[longest], run.settings.start) if judged else None

@@ -69,8 +69,7 @@ class Study:
         self.search = search or SearchSettings()
         self._clock = clock
         settings = StudiedModels() if model is None else model
-        bandwidth_hz = None if measurement is None else measurement.drive_bandwidth_hz
-        smoothed = smoothed_samples(aircraft, samples, bandwidth_hz)
+        smoothed = smoothed_samples(aircraft, samples, measurement)
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = tuple(
             Identification(

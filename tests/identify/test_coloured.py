@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from morphcore.identify.coloured import DISCREPANCY, ColouredNoise, Record, records
+from morphcore.identify.coloured import DISCREPANCY, ColouredNoise, Record
 from morphcore.identify.identification import Identification
 from morphcore.identify.parameters import Interval, search_space
 from morphcore.identify.settings import search_settings
@@ -27,6 +27,12 @@ NOISE_RAD = 2e-4
 ROWS = 120
 FITS = 200
 TIMES_S = 0.01 * np.arange(ROWS)
+
+
+def records(flights: int, residual: Array, jacobian: Array, motion_rad: float = 0.0) -> tuple[Record, ...]:
+    """Residuals (m,) and Jacobian (m, d) of a whole fit, cut into those of equally long flights."""
+    own, slope = residual.reshape(flights, ROWS, 3), jacobian.reshape(flights, ROWS, 3, -1)
+    return tuple(Record(TIMES_S, own[k], slope[k], motion_rad) for k in range(flights))
 
 
 def first_order(rng: np.random.Generator, shape: tuple[int, ...], correlation: float) -> Array:
@@ -120,11 +126,11 @@ def test_the_jackknife_is_that_of_refits() -> None:
     without = np.stack([fit([k for k in range(4) if k != out])[0] for out in range(4)])
     expected = 3.0 * np.cov(without.T, bias=True)
     D = np.concatenate([jacobian.reshape(-1, 4) for jacobian in each])
-    found = ColouredNoise(records([TIMES_S] * 4, left, D), PRIOR)
+    found = ColouredNoise(records(4, left, D), PRIOR)
     assert found.between_flights is not None
     np.testing.assert_allclose(found.between_flights, expected, rtol=1e-8)
     assert np.all(np.diag(found.covariance) >= np.diag(expected) * (1.0 - 1e-12))
-    two = ColouredNoise(records([TIMES_S] * 2, left[: 6 * ROWS], D[: 6 * ROWS]), PRIOR)
+    two = ColouredNoise(records(2, left[: 6 * ROWS], D[: 6 * ROWS]), PRIOR)
     assert two.between_flights is None
 
 
@@ -137,14 +143,14 @@ def test_one_flight_does_not_hide_what_chains_miss() -> None:
     jacobian = slopes(rng, 4)
     rows, left = jacobian.reshape(-1, 4), 1e-9 * rng.normal(size=3 * ROWS)
     spread = {
-        motion: np.sqrt(np.diag(ColouredNoise(records([TIMES_S], left, rows, [motion]), 0.0).covariance))
+        motion: np.sqrt(np.diag(ColouredNoise(records(1, left, rows, motion), 0.0).covariance))
         for motion in (0.0, 0.01, 0.02)
     }
     assert np.all(spread[0.01] > 1e3 * spread[0.0])
     np.testing.assert_allclose(spread[0.02], 2.0 * spread[0.01], rtol=1e-6)
     noisy = NOISE_RAD * rng.normal(size=3 * ROWS)
     with_floor, without = (
-        ColouredNoise(records([TIMES_S], noisy, rows, [motion]), 0.0).covariance
+        ColouredNoise(records(1, noisy, rows, motion), 0.0).covariance
         for motion in (NOISE_RAD / DISCREPANCY, 0.0)
     )
     np.testing.assert_array_equal(with_floor, without)
