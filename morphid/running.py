@@ -46,20 +46,20 @@ class Answer:
     error: Document | None = None
 
 
-def run(request: Request, url: str | None, api_key: str | None = None) -> Answer:
+def run(request: Request, url: str | None, api_key: str | None = None, *, files: bool) -> Answer:
     """Run the operation, at the service of this address or in this process; print errors on the way.
 
-    An error names the option at fault.
+    An error names the option at fault. ``files``: whether plots and curves are wanted; they take seconds.
     """
     if at_service_of_environment(url):
         stderr().print(f"at {url} (MORPHID_URL)", markup=False, soft_wrap=True)
     try:
         with meter() as bar:
             if url is None:
-                answer = run_here(request, bar)
+                answer = run_here(request, bar, files=files)
             else:
                 with Service(url, api_key) as service:
-                    answer = run_there(request, service, bar)
+                    answer = run_there(request, service, bar, files=files)
     except CommandError as error:
         error.given_by = error.given_by or request.option_at(error.pointer)
         raise
@@ -68,7 +68,7 @@ def run(request: Request, url: str | None, api_key: str | None = None) -> Answer
     return answer
 
 
-def run_here(request: Request, bar: Meter) -> Answer:
+def run_here(request: Request, bar: Meter, *, files: bool) -> Answer:
     """Run in this process; the first Ctrl-C ends it with the best result so far."""
     from worker import numerics
 
@@ -100,7 +100,7 @@ def run_here(request: Request, bar: Meter) -> Answer:
                 return Answer(exit=Exit.INTERRUPTED, result=partial, files=best.artifacts)
             if checkpoint is None:
                 raise CommandError(f"{request.operation} ended without a step")
-            outcome = work.outcome(checkpoint)
+            outcome = work.outcome(checkpoint, files=files)
         return Answer(exit=Exit.OK, result=outcome.document, files=outcome.artifacts)
     except MorphError as error:
         raise CommandError(
@@ -120,7 +120,7 @@ def require_valid(operation: str, body: Document) -> None:
         ) from None
 
 
-def run_there(request: Request, service: Service, bar: Meter) -> Answer:
+def run_there(request: Request, service: Service, bar: Meter, *, files: bool) -> Answer:
     """Run at a service: upload the samples, post the job, watch it; Ctrl-C cancels it."""
 
     def uploaded(path: Path, role: Role) -> Document:
@@ -145,7 +145,7 @@ def run_there(request: Request, service: Service, bar: Meter) -> Answer:
     return Answer(
         exit=Exit.INTERRUPTED if cancelled else exit_for(job["status"]),
         result=result,
-        files=service.artifacts(job["id"]),
+        files=service.artifacts(job["id"]) if files else {},
         error=job.get("error"),
     )
 

@@ -100,7 +100,8 @@ def command_of(operation: Operation[Any], own: Particulars) -> Callable[..., Non
         own.fill(request, values)
         for option in (option for option in others if option.flag not in own.fills):
             _fill_field(request, option, values[option.parameter.name])
-        answer = run(request, values["url"], values["api_key"])
+        files = values["plots"] is not None or values.get("out") is not None
+        answer = run(request, values["url"], values["api_key"], files=files)
         if values.get("out") is not None and answer.result is not None:
             own.save(answer, values["out"])
         hand_over(answer, own.show, json_out=values["json_out"], plots=values["plots"])

@@ -39,10 +39,10 @@ class FaultyWalk(Walk):
             ballast = b" " * (number * self.request.get("swells_bytes", 0))  # JSON may end in spaces
             yield operations.Step(step.progress, step.checkpoint + ballast)
 
-    def outcome(self, checkpoint: bytes) -> operations.Outcome:
+    def outcome(self, checkpoint: bytes, *, files: bool = True) -> operations.Outcome:
         """Give the place reached, after drawing plots for a while."""
         time.sleep(self.request.get("outcome_s", 0.0))
-        return super().outcome(checkpoint)
+        return super().outcome(checkpoint, files=files)
 
     best_so_far = Walk.outcome
 

@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from typer.testing import CliRunner
@@ -50,7 +50,7 @@ class PlayedWork:
         if stop():
             raise Interrupted
 
-    def outcome(self, _checkpoint: bytes) -> Outcome:
+    def outcome(self, _checkpoint: bytes, *, files: bool = True) -> Outcome:  # noqa: ARG002
         """Never reached."""
         raise AssertionError
 
@@ -94,6 +94,34 @@ def test_the_first_interrupt_gives_the_best_so_far(
     assert "best result so far" in ended.stderr
     assert (tmp_path / "plots" / "result.json").is_file()
     assert signal.getsignal(signal.SIGINT) is before
+
+
+class EndedWork(PlayedWork):
+    """Work of one step that notes whether its files were wanted."""
+
+    wanted: ClassVar[list[bool]] = []
+
+    def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
+        """Give one step."""
+        del checkpoint, stop
+        yield Step(progress={"fraction": 1.0, "phase": "polish"}, checkpoint=b"last")
+
+    def outcome(self, _checkpoint: bytes, *, files: bool = True) -> Outcome:
+        """Give the result."""
+        self.wanted.append(files)
+        return Outcome(self.best or {}, {"fit.svg": b"<svg/>"} if files else {})
+
+
+def test_plots_are_drawn_only_for_who_takes_them(examples: Path, tmp_path: Path, play_work: PlayWork) -> None:
+    """Drawing takes seconds: it is left out where no option takes the files."""
+    play_work(lambda request: EndedWork(request, {"fit": [], "model": MODEL}))
+    EndedWork.wanted.clear()
+    json_out = ["--json", str(tmp_path / "out.json")]
+    assert RUNNER.invoke(app, [*command(examples), *json_out]).exit_code == Exit.OK
+    plots = tmp_path / "plots"
+    assert RUNNER.invoke(app, [*command(examples), *json_out, "--plots", str(plots)]).exit_code == Exit.OK
+    assert EndedWork.wanted == [False, True]
+    assert (plots / "fit.svg").is_file()
 
 
 def test_an_interrupt_may_leave_nothing(examples: Path, tmp_path: Path, play_work: PlayWork) -> None:

@@ -49,8 +49,8 @@ class Work(Protocol):
     def steps(self, checkpoint: bytes | None, stop: Stop) -> Iterator[Step]:
         """Yield one step after another."""
 
-    def outcome(self, checkpoint: bytes) -> Outcome:
-        """Return the result at the last step's checkpoint, with all its files."""
+    def outcome(self, checkpoint: bytes, *, files: bool = True) -> Outcome:
+        """Return the result at the last step's checkpoint, with its files unless nobody wants them."""
 
     def best_so_far(self, checkpoint: bytes) -> Outcome | None:
         """Return the result at any checkpoint within a second; None if there is none before the end."""

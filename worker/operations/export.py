@@ -30,10 +30,16 @@ class ExportWork:
         message = f"{self._export.format.file} written"
         yield Step({"fraction": 1.0, "phase": "export", "message": message}, NO_CHECKPOINT)
 
-    def outcome(self, checkpoint: bytes) -> Outcome:  # noqa: ARG002 - the file is in the export
-        """Return the file and its description."""
+    def outcome(
+        self,
+        checkpoint: bytes,  # noqa: ARG002 - the file is in the export
+        *,
+        files: bool = True,
+    ) -> Outcome:
+        """Return the description of the file, and the file if wanted."""
         document = self._export.to_document()
-        return Outcome(document, {**result_file(document), self._export.format.file: self._export.data()})
+        written = {self._export.format.file: self._export.data()} if files else {}
+        return Outcome(document, {**result_file(document), **written})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
         """Return None: half a file is not a result."""

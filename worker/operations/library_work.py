@@ -46,12 +46,13 @@ class SearchWork:
             for step in self._run.steps(stop=stop):
                 yield shown(step, BEGUN_AGAIN)
 
-    def outcome(self, checkpoint: bytes) -> Outcome:
-        """Return the result with its plots and tables; can stop between two flights or plots."""
+    def outcome(self, checkpoint: bytes, *, files: bool = True) -> Outcome:
+        """Return the result, with its plots and tables if wanted; can stop between two flights or plots."""
         with stoppable(self._stop):
             result = self._run.result(checkpoint)
             document = result.to_document()
-            return Outcome(document, {**result_file(document), **self._files(result, document)})
+            drawn = self._files(result, document) if files else {}
+            return Outcome(document, {**result_file(document), **drawn})
 
     def best_so_far(self, checkpoint: bytes) -> Outcome:
         """Return the best result so far, without plots: drawing them takes seconds."""

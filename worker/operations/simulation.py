@@ -29,12 +29,17 @@ class SimulationWork:
             progress = {"fraction": step.fraction, "phase": "flight", "message": f"{step.message}{again}"}
             yield Step(progress, NO_CHECKPOINT)
 
-    def outcome(self, checkpoint: bytes) -> Outcome:  # noqa: ARG002 - the flight is in the run
-        """Return the flight with its table and its plot."""
+    def outcome(
+        self,
+        checkpoint: bytes,  # noqa: ARG002 - the flight is in the run
+        *,
+        files: bool = True,
+    ) -> Outcome:
+        """Return the flight, with its table and its plot if wanted."""
         result = self._run.result()
         document = result.to_document()
-        files = {"flight.csv": _table(result.trajectory), **flight_plots(document)}
-        return Outcome(document, {**result_file(document), **files})
+        written = {"flight.csv": _table(result.trajectory), **flight_plots(document)} if files else {}
+        return Outcome(document, {**result_file(document), **written})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above
         """Return None: half a flight is not a result."""
