@@ -55,6 +55,11 @@ class Flight(Document):
         default=None, description='Mach number, "auto" from speed and altitude, null for incompressible flow.'
     )
     wind_n_m_s: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Velocity of the air, earth axes (NED).")
+    apparent_mass: bool = Field(
+        default=False,
+        description="Whether wings accelerate air with them: pi rho b^2 per length for a semichord b. It "
+        "matters for light wings; leave it out where the source of the samples leaves it out.",
+    )
     start: Start | None = Field(default=None, description='Needed for `model.start = "given"`.')
 
     @property

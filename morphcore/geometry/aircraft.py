@@ -98,6 +98,7 @@ class Flight(Shown):
     wind_N: Array
     mach: float | None
     start: Start | None
+    apparent_mass: bool = False
 
     @classmethod
     def of(cls, document: FlightDocument) -> Flight:
@@ -113,6 +114,7 @@ class Flight(Shown):
             start=None
             if start is None
             else Start(start.alpha_rad, _vector(start.force_b_n), _vector(start.moment_b_n_m)),
+            apparent_mass=document.apparent_mass,
         )
 
     @property

@@ -23,7 +23,7 @@ from morphcore.models.kernels.layout import (
     joint_rows_of_scratch,
     state_rows,
 )
-from morphcore.models.links import beam_division
+from morphcore.models.links import beam_division, link_edges
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
@@ -431,6 +431,8 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
         values = model.on_surface(batch, number)
         for parameter in model.parameters:
             parameter.apply(laid, values[parameter.name])
+        if model.flight.apparent_mass:
+            laid.add_apparent_mass(link_edges(values["division"], surface.span_m), model.flight)
         every.append(laid)
     rows = np.concatenate(
         [

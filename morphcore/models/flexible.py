@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.apparent_mass import apparent_inertia, spatial
 from morphcore.aero.kernels.loads import JONES_B1, JONES_B2
 from morphcore.aero.moving_lattice import Riders
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
@@ -39,7 +40,8 @@ class FlexibleModel:
 
     roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
     their root node, in W, m. riders : the lattice on sections; element, fraction : (k,) where these are
-    (element -1 - i is node i itself).
+    (element -1 - i is node i itself). apparent : (n, 6, 6) apparent mass of the air at the nodes, kg and m;
+    (0, 6, 6) if the flight has none.
     """
 
     aircraft: Aircraft
@@ -52,6 +54,7 @@ class FlexibleModel:
     riders: Riders
     element: IntArray
     fraction: Array
+    apparent: Array
 
 
 def flexible_model(
@@ -73,7 +76,7 @@ def flexible_model(
     rest, sections, damping = [], [], []
     bodies, inertia = [0], [fuselage_inertia(aircraft.fuselage)]
     roots, tips, rest_W = [], [], [np.zeros((1, 3))]
-    riders, places = [], []
+    riders, places, apparent = [], [], [np.zeros((1, 6, 6))]
     node = 1
     for surface, part in zip(aircraft.surfaces, parts.lattices, strict=True):
         count = elements if surface.flexible else 0
@@ -93,6 +96,8 @@ def flexible_model(
             bodies.append(node)
             inertia.append(rigid_surface_inertia(surface))
         node += count + 1
+        if flight.apparent_mass:
+            apparent.append(_apparent_at(surface, flight, stations))
     beams = make_beams(
         np.array(ends).reshape(-1, 2), rest, sections, damping, bodies=bodies, inertia=inertia, nodes=node
     )
@@ -107,7 +112,17 @@ def flexible_model(
         riders=_joined(riders),
         element=np.concatenate([element for element, _ in places]),
         fraction=np.concatenate([fraction for _, fraction in places]),
+        apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],
     )
+
+
+def _apparent_at(surface: Surface, flight: Flight, stations: Array) -> Array:
+    """Apparent mass (nodes, 6, 6) of a surface at its nodes (distances from the root, m).
+
+    Each node carries the air of the half elements beside it; a rigid surface's root that of the whole.
+    """
+    edges = np.concatenate([[0.0], 0.5 * (stations[1:] + stations[:-1]), [surface.span_m]])
+    return spatial(apparent_inertia(surface, flight.air_density_kg_m3, edges[:-1], edges[1:], stations))
 
 
 def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:

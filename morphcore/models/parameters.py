@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.apparent_mass import apparent_inertia
 from morphcore.aero.kernels.loads import (
     JONES_B1,
     JONES_B2,
@@ -38,7 +39,7 @@ from morphcore.models.links import (
     strip_overlap,
 )
 from morphcore.models.transforms import Linear, Log, Shares, Transform
-from morphcore.multibody.kernels.articulated import L_MASS, L_OFFSET
+from morphcore.multibody.kernels.articulated import L_APPARENT, L_MASS, L_OFFSET
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -118,6 +119,13 @@ class SurfaceRows:
     damping: Array
     overlap: Array
     touched: IntArray
+
+    def add_apparent_mass(self, edges: Array, flight: Flight) -> None:
+        """Write the apparent inertia of links with these ends (p, n + 1), m."""
+        start, end = edges[:, :-1], edges[:, 1:]
+        found = apparent_inertia(self.surface, flight.air_density_kg_m3, start, end, start)
+        rows, columns = np.triu_indices(3)
+        self.links[:, :, L_APPARENT : L_APPARENT + 6] = found[..., rows, columns]
 
 
 @dataclass(frozen=True)

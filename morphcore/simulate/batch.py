@@ -38,7 +38,7 @@ class Chunk:
 
 
 def shared_numbers(model: ChainModel) -> Array:
-    """Density, gravity and the fuselage's spatial inertia (21 elements) for the kernels."""
+    """Density, gravity, the fuselage's spatial inertia (21), whether there is apparent mass; for kernels."""
     fuselage = model.aircraft.fuselage
     x, y, z = fuselage.centre_of_mass_B
     m = fuselage.mass_kg
@@ -51,6 +51,7 @@ def shared_numbers(model: ChainModel) -> Array:
             inertia[upper],
             (m * cross).ravel(),
             (m * np.eye(3))[upper],
+            [float(model.flight.apparent_mass)],
         ]
     )
 

@@ -33,6 +33,7 @@ from morphcore.multibody.beam import (
     reduce_right,
 )
 from morphcore.multibody.hinges import hinge_screws, relative_motion
+from morphcore.multibody.kernels.beam import apparent_forces
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
     INVERSE_WANTED,
@@ -61,6 +62,7 @@ Array = NDArray[np.float64]
 # s; holds attitude within 1e-5 rad of the converged solution on the example flights, a tenth of what the
 # best equivalent models are off (tests/simulate/test_flexible.py)
 FLEXIBLE_STEP_S = 0.001
+STILL_AIR = np.zeros(3)
 SPECTRAL_RADIUS = 0.6  # at infinite frequency: stretching waves die out in about ten steps
 START_TOLERANCE = 1e-9  # relative, of the accelerations at the start
 
@@ -164,9 +166,16 @@ class FlexibleFlight:
             path.acceleration[row], poses.R, poses.x, V, A, self._v,
         )  # fmt: skip
 
-    def structure(self, poses: NodePoses, V: Array, A: Array) -> Array:
-        """Forces (n, 6) that structure, inertia and weight require at the nodes."""
-        return node_forces(self.model.beams, self.work, poses, V, A, self.gravity_N)
+    def structure(self, poses: NodePoses, V: Array, A: Array, wind_N: Array = STILL_AIR) -> Array:
+        """Forces (n, 6) that structure, inertia, apparent mass and weight require at the nodes."""
+        out = node_forces(self.model.beams, self.work, poses, V, A, self.gravity_N)
+        apparent_forces(self.model.apparent, poses.R, V, A, wind_N, self.work.v, out)
+        return out
+
+    def factor(self, of_rate: float = 0.0, of_pose: float = 0.0) -> None:
+        """Factor the iteration matrix of the twist rates at the strains of the last `structure`."""
+        apparent = self.model.apparent
+        factor(self.model.beams, self.work, 1.0, of_rate, of_pose, apparent if apparent.size else None)
 
     def place_lattice(self, poses: NodePoses, wind_N: Array, V: Array) -> None:
         """Put sections and lattice on the deformed wings, at the strains of the last `structure`."""
@@ -189,6 +198,7 @@ class FlexibleFlight:
             mass=beams.mass,
             bodies=beams.bodies,
             inertia=beams.inertia,
+            apparent=model.apparent,
             gauss=GAUSS,
             gauss_series=GAUSS_SERIES,
             roots=model.roots,
@@ -351,8 +361,7 @@ class FlexibleRun:
 
     def _form_matrix(self) -> None:
         """Factor the iteration matrix at the strains of the last `structure`."""
-        flight, rule = self._flight, self._rule
-        factor(flight.model.beams, flight.work, 1.0, rule.of_rate, rule.of_pose)
+        self._flight.factor(self._rule.of_rate, self._rule.of_pose)
         self._formed = self.row
 
     def _renew_inverse(self) -> bool:
@@ -399,7 +408,7 @@ def set_in_motion(
     circulation = state.circulation
     for iteration in range(MAX_ITERATIONS):
         flight.follow(poses, V, A, path, 0)
-        demands = flight.structure(poses, V, A)
+        demands = flight.structure(poses, V, A, wind_N)
         if iteration == 0:
             flight.place_lattice(poses, wind_N, V)
         twists = flight.sections.twists(V)
@@ -407,7 +416,7 @@ def set_in_motion(
         circulation = flight.lattice.circulation(twists, wind_B)
         flight.subtract_air(acting_circulation(circulation, state.lag), twists, wind_B, demands)
         demands[0] -= flight.thrust
-        factor(model.beams, flight.work, 1.0, 0.0, 0.0)
+        flight.factor()
         change = flight.solve(-demands, path, 0)
         A += change
         if np.abs(change).max() < START_TOLERANCE * max(1.0, float(np.abs(A).max())):

@@ -162,7 +162,7 @@ def trim_flexible(
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             x = _newton(balance)
-        residual = float(np.abs(balance.imbalance(x)).max())
+        residual = float(np.abs(balance.imbalance(x)).max(initial=0.0))
     except (BeamTurnedTooFar, ValueError):
         raise TrimNotFound(residual=float("inf"), iterations=MAX_ITERATIONS) from None
     if not residual < ACCEPTED:
@@ -177,6 +177,8 @@ def trim_flexible(
 
 def _newton(balance: _Balance) -> Array:
     """Where Newton's method ends, converged or not."""
+    if not balance.unknowns:  # a rigid aircraft from a given start
+        return np.zeros(0)
     try:
         return np.asarray(
             newton_krylov(

@@ -18,6 +18,7 @@ from morphcore.aero.kernels.loads import (
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
+    APPARENT,
     DENSITY,
     FUSELAGE,
     GRAVITY,
@@ -32,6 +33,7 @@ from morphcore.models.kernels.layout import (
     S_TWIST,
     S_WIND,
     constant_rows,
+    gravity_rows_of_scratch,
     joint_rows_of_scratch,
     link_rows_of_scratch,
     state_rows,
@@ -40,6 +42,7 @@ from morphcore.multibody.kernels.articulated import (
     LINK_ROWS,
     accumulate,
     accumulate_pair,
+    add_apparent,
     add_bias,
     add_link,
     solve_base,
@@ -50,8 +53,14 @@ from morphcore.multibody.kernels.gimbal import (
     eliminate_gimbal,
     gimbal_acceleration,
     gimbal_twist,
+    vector_through_gimbal,
 )
-from morphcore.multibody.kernels.hinge import carry_through_hinge, hinge_acceleration, hinge_twist
+from morphcore.multibody.kernels.hinge import (
+    carry_through_hinge,
+    hinge_acceleration,
+    hinge_twist,
+    vector_through_hinge,
+)
 
 
 @kernel
@@ -204,9 +213,28 @@ def accelerations(
                 scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
             )  # fmt: skip
 
+    if shared[APPARENT] != 0.0:
+        gravity_of_links(lanes, surfaces, hinges, scratch, links, coordinates)
     articulate(
         lanes, surfaces, shared, hinges, constants, scratch, links, coordinates,
     )  # fmt: skip
+
+
+@kernel
+def gravity_of_links(lanes, surfaces, hinges, scratch, links, coordinates):
+    """Fill in gravity in the axes of all links, which their apparent mass needs."""
+    w_gravity = gravity_rows_of_scratch(links)
+    _, _, _, w_joint, _ = joint_rows_of_scratch(links, coordinates)
+    joint = w_joint
+    for s in range(surfaces.shape[0]):
+        for k in range(surfaces[s, LINKS]):
+            row = w_gravity + 3 * (surfaces[s, LINK0] + k)
+            own = scratch[row : row + 3]
+            if k == 0:
+                vector_through_hinge(lanes, hinges[s], scratch[S_GRAVITY : S_GRAVITY + 3], own)
+            else:
+                vector_through_gimbal(lanes, scratch[joint : joint + JOINT_ROWS], scratch[row - 3 : row], own)
+                joint += JOINT_ROWS
 
 
 @kernel
@@ -236,6 +264,9 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
                 inertia,
                 carried,
             )
+            if shared[APPARENT] != 0.0:
+                row = gravity_rows_of_scratch(links) + 3 * link
+                add_apparent(lanes, rows, scratch[row : row + 3], inertia, carried)
             if k == 0:
                 add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
                 carry_through_hinge(lanes, hinges[s], inertia, carried)

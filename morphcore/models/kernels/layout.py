@@ -17,6 +17,7 @@ S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
 S_INERTIA, S_CARRIED, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 79, 82, 85
 # indices of the shared numbers
 DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
+APPARENT = 23  # whether the links have apparent mass: not zero
 
 
 @inlined
@@ -41,9 +42,15 @@ def link_rows_of_scratch(links: int) -> tuple[int, int, int, int, int]:
 
 
 @inlined
+def gravity_rows_of_scratch(links: int) -> int:
+    """First scratch row of gravity in the axes of the links, three rows each."""
+    return S_FREE + 27 * links
+
+
+@inlined
 def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int, int]:
     """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the scratch's end."""
-    first = S_FREE + 27 * links
+    first = S_FREE + 30 * links
     gimbals = first + 3 * coordinates
     return (
         first,

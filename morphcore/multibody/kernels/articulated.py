@@ -18,9 +18,10 @@ from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
 # rows of a link's constants: its mass properties (mass, m x, m y, Ixx, Iyy, Izz, Ixy) and the offset of its
-# joint along y; then the aerodynamic rows, named in aero/kernels/loads.py
-L_MASS, L_OFFSET = 0, 7
-LINK_ROWS = 16
+# joint along y; then the aerodynamic rows, named in aero/kernels/loads.py; then its apparent inertia on
+# (omega_x, omega_y, v_z): 00 01 02 11 12 22
+L_MASS, L_OFFSET, L_APPARENT = 0, 7, 16
+LINK_ROWS = 22
 
 
 @inlined
@@ -181,6 +182,31 @@ def add_link(lanes, link, twist, wrench, inertia, force):
         force[3, l] += wy * gz - wz * gy - wrench[3, l]
         force[4, l] += wz * gx - wx * gz - wrench[4, l]
         force[5, l] += wx * gy - wy * gx - wrench[5, l]
+
+
+@kernel
+def add_apparent(lanes, link, gravity, inertia, force):
+    """Add a link's apparent inertia, which has no weight: accelerations here are relative to free fall.
+
+    ``gravity`` (3 rows) in link axes.
+    """
+    if not_in_lanes(link, lanes) or not_in_lanes(gravity, lanes):
+        return
+    if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
+        return
+    for l in range(len(lanes)):
+        xx, xy, xz = link[L_APPARENT, l], link[L_APPARENT + 1, l], link[L_APPARENT + 2, l]
+        yy, yz, zz = link[L_APPARENT + 3, l], link[L_APPARENT + 4, l], link[L_APPARENT + 5, l]
+        inertia[0, l] += xx
+        inertia[1, l] += xy
+        inertia[3, l] += yy
+        inertia[8, l] += xz
+        inertia[11, l] += yz
+        inertia[20, l] += zz
+        fall = gravity[2, l]
+        force[0, l] += xz * fall
+        force[1, l] += yz * fall
+        force[5, l] += zz * fall
 
 
 @kernel

@@ -198,6 +198,26 @@ def body_forces(nodes, inertia, R, V, A, gravity_N, v, out):
 
 
 @entry_kernel
+def apparent_forces(apparent, R, V, A, wind_N, v, out):
+    """Add to out (n, 6) the forces that apparent mass (n or 0, 6, 6) at the nodes requires.
+
+    It follows the rate of the twist relative to the air, in node axes: A + omega x wind. v (2, 6) is scratch.
+    """
+    for n in range(apparent.shape[0]):
+        for i in range(3):
+            v[0, i] = R[n, 0, i] * wind_N[0] + R[n, 1, i] * wind_N[1] + R[n, 2, i] * wind_N[2]
+        wx, wy, wz = v[0, 0], v[0, 1], v[0, 2]
+        for i in range(6):
+            v[0, i] = A[n, i]
+        v[0, 3] += V[n, 1] * wz - V[n, 2] * wy
+        v[0, 4] += V[n, 2] * wx - V[n, 0] * wz
+        v[0, 5] += V[n, 0] * wy - V[n, 1] * wx
+        multiply(apparent[n], v[0], v[1])
+        for i in range(6):
+            out[n, i] += v[1, i]
+
+
+@entry_kernel
 def place_sections(ends, fractions, series, elements, strains, R, x, v, poses, R_out, x_out, blocks):
     """Poses of sections for given strains, and the maps between their twists and the nodes'.
 

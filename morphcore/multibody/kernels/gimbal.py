@@ -73,6 +73,18 @@ def gimbal_twist(lanes, twist_parent, link, q, v, joint, twist):
 
 
 @kernel
+def vector_through_gimbal(lanes, joint, parent, own):
+    """A vector (3 rows) in the parent's axes, in the link's."""
+    if not_in_lanes(joint, lanes) or not_in_lanes(parent, lanes) or not_in_lanes(own, lanes):
+        return
+    for l in range(len(lanes)):
+        x, y, z = parent[0, l], parent[1, l], parent[2, l]
+        own[0, l] = joint[0, l] * x + joint[3, l] * y + joint[6, l] * z
+        own[1, l] = joint[1, l] * x + joint[4, l] * y + joint[7, l] * z
+        own[2, l] = joint[2, l] * x + joint[5, l] * y + joint[8, l] * z
+
+
+@kernel
 def eliminate_gimbal(lanes, tau, added, joint, inertia, force):
     """Articulate inertia and bias force through a gimbal: I - U D^-1 U^T and p + U D^-1 u.
 

@@ -53,6 +53,21 @@ def hinge_twist(lanes, twist_base, hinge, acceleration, twist, bias):
 
 
 @kernel
+def vector_through_hinge(lanes, hinge, base, own):
+    """A vector (3 rows) in B, in the axes of a surface's first link."""
+    if not_in_lanes(base, lanes) or not_in_lanes(own, lanes):
+        return
+    r00, r01, r02 = hinge[0], hinge[1], hinge[2]
+    r10, r11, r12 = hinge[3], hinge[4], hinge[5]
+    r20, r21, r22 = hinge[6], hinge[7], hinge[8]
+    for l in range(len(lanes)):
+        x, y, z = base[0, l], base[1, l], base[2, l]
+        own[0, l] = r00 * x + r10 * y + r20 * z
+        own[1, l] = r01 * x + r11 * y + r21 * z
+        own[2, l] = r02 * x + r12 * y + r22 * z
+
+
+@kernel
 def carry_through_hinge(lanes, hinge, inertia, force):
     """Transform a surface's accumulated inertia and force, in place, to B at the fuselage reference point."""
     if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):

@@ -24,6 +24,7 @@ from morphcore.aero.kernels.lattice_place import refine
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.jit import entry_kernel, inlined
 from morphcore.multibody.kernels.beam import (
+    apparent_forces,
     beam_forces,
     body_forces,
     condense,
@@ -76,6 +77,7 @@ class Structure(NamedTuple):
     mass: Array
     bodies: IntArray
     inertia: Array
+    apparent: Array
     gauss: Array
     gauss_series: Array
     roots: IntArray
@@ -347,6 +349,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
             structure.v,
             right,
         )
+        apparent_forces(structure.apparent, trial.R, trial.V, trial.A, path.wind_N[row], structure.v, right)
         for i in range(3):
             wind_B[i] = 0.0
             for j in range(3):

@@ -5,14 +5,16 @@ from __future__ import annotations
 from morphcore.jit import entry_kernel
 from morphcore.models.kernels.chain import clear
 from morphcore.models.kernels.layout import (
+    APPARENT,
     LINKS_C,
     S_CARRIED,
     S_INERTIA,
     VELOCITY,
+    gravity_rows_of_scratch,
     joint_rows_of_scratch,
     link_rows_of_scratch,
 )
-from morphcore.multibody.kernels.articulated import LINK_ROWS, add_bias, add_link
+from morphcore.multibody.kernels.articulated import LINK_ROWS, add_apparent, add_bias, add_link
 from morphcore.multibody.kernels.gimbal import JOINT_ROWS, carry_through_gimbal
 from morphcore.simulate.kernels.step import instant_rates
 
@@ -71,6 +73,9 @@ def torques(
                     inertia,
                     force,
                 )
+                if shared[APPARENT] != 0.0:
+                    row = gravity_rows_of_scratch(links) + 3 * link
+                    add_apparent(lanes, rows, scratch[row : row + 3], inertia, force)
                 add_bias(
                     lanes, inertia, scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6], force
                 )
