@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.apparent_mass import share_of_mass
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.overlap import overlapping_surfaces
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 
 # The lift of a thin airfoil is no longer linear by then; a lattice does not model stall.
 LARGEST_ALPHA_RAD = np.radians(15.0)
+LARGEST_APPARENT_SHARE = 0.1  # of a wing's mass: it then lowers the frequency of flapping by 5 per cent
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
@@ -114,6 +116,24 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
             )
         )
     return found
+
+
+def light_wing_warnings(aircraft: Aircraft, flight: Flight) -> list[ResultWarning]:
+    """Wings so light that the apparent mass of the air matters, in a flight that leaves it out."""
+    if flight.apparent_mass:
+        return []
+    density = flight.air_density_kg_m3
+    share, name = max((share_of_mass(surface, density), surface.name) for surface in aircraft.surfaces)
+    if share <= LARGEST_APPARENT_SHARE:
+        return []
+    return [
+        ResultWarning(
+            "apparent_mass_left_out",
+            f"the air that {name!r} moves with it has {100.0 * share:.0f} per cent of its mass",
+            "it is left out: set flight.apparent_mass to true, unless the source of the samples omits it too",
+            "/flight/apparent_mass",
+        )
+    ]
 
 
 def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:

@@ -15,6 +15,7 @@ from morphcore.validity import (
     air_motion,
     air_warnings,
     error_warning,
+    light_wing_warnings,
     steep_warning,
 )
 from morphdata.lattice import Lattice
@@ -54,6 +55,15 @@ def test_mach_beyond_three_tenths(mach: float, warned: bool) -> None:  # noqa: F
     assert codes(air_warnings(fast, [])) == ["compressible"] * warned
     assert air_warnings(replace(fast, mach=mach), []) == []
     assert air_warnings(replace(fast, mach=0.0), []) == []
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.099, False), (0.101, True)])
+def test_apparent_mass_left_out(share: float, warned: bool) -> None:  # noqa: FBT001
+    """Wings of 0.3 m chord and 15 kg/m in air of so much density; none where the flight has it."""
+    density = share * 15.0 / (np.pi * 0.15**2)
+    flight = replace(SLOW, air_density_kg_m3=density)
+    assert codes(light_wing_warnings(example_aircraft(), flight)) == ["apparent_mass_left_out"] * warned
+    assert light_wing_warnings(example_aircraft(), replace(flight, apparent_mass=True)) == []
 
 
 def test_incidence_by_hand() -> None:

@@ -18,7 +18,8 @@ from 0 here (in MATLAB files from 1).
 ``links``
     ``surface_index`` (l,); ``length_m`` (l,); ``origin_m`` (l, 3) from the origin of the link before, in its
     axes (of a first link from the reference point, in B); ``mass_kg`` (l,); ``centre_of_mass_m`` (l, 3) and
-    ``inertia_kg_m2`` (l, 3, 3) about it, in link axes.
+    ``inertia_kg_m2`` (l, 3, 3) about it, in link axes; ``apparent_inertia`` (l, 3, 3) of the air on the rates
+    of (omega_x, omega_y, v_z) at the origin, kg m^2, kg m and kg; zero if the flight leaves it out.
 ``joints``
     ``inboard_link_index``, ``outboard_link_index`` (j,): three revolutes in turn, flap about x, torsion about
     y, edgewise about z, at the outboard link's origin; ``stiffness_nm_rad``, ``damping_nms_rad`` (j, 3).
@@ -41,6 +42,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.apparent_mass import apparent_inertia
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.geometry.surface import Surface
@@ -136,7 +138,8 @@ def _surfaces(chain: ChainModel) -> Table:
 
 
 def _links(chain: ChainModel, batch: ParameterBatch) -> Table:
-    lengths, origins, rows = [], [], []
+    lengths, origins, rows, apparent = [], [], [], []
+    density = chain.flight.air_density_kg_m3 if chain.flight.apparent_mass else 0.0
     for number, surface in enumerate(chain.aircraft.surfaces):
         edges = link_edges(chain.on_surface(batch, number)["division"], surface.span_m)
         length = np.diff(edges, axis=1)[0]
@@ -146,6 +149,7 @@ def _links(chain: ChainModel, batch: ParameterBatch) -> Table:
         lengths.append(length)
         origins.append(origin)
         rows.append(link_masses(surface, edges)[0])
+        apparent.append(apparent_inertia(surface, density, edges[0, :-1], edges[0, 1:], edges[0, :-1]))
     mass, mx, my, xx, yy, zz, xy = np.concatenate(rows).T
     centre = np.stack([mx, my, np.zeros_like(mass)], axis=1) / mass[:, None]
     about_origin = np.zeros((mass.size, 3, 3))
@@ -160,6 +164,7 @@ def _links(chain: ChainModel, batch: ParameterBatch) -> Table:
         "mass_kg": mass,
         "centre_of_mass_m": centre,
         "inertia_kg_m2": about_origin - mass[:, None, None] * steiner,
+        "apparent_inertia": np.concatenate(apparent),
     }
 
 

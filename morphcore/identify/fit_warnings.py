@@ -23,6 +23,7 @@ from morphcore.validity import (
     ResultWarning,
     air_warnings,
     error_warning,
+    light_wing_warnings,
     overlap_warnings,
     steep_warning,
 )
@@ -90,6 +91,7 @@ def fit_warnings(
     found += _of_samples(fits, explained=any(warning.code in WRONG_DATA for warning in diagnosed))
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
+    found += light_wing_warnings(aircraft, run.model.flight)
     found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft) for fit in fits]))
     return tuple(found)
 

@@ -12,7 +12,13 @@ from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.state import OptimisationState
 from morphcore.simulate.plan import path_angles
 from morphcore.simulate.schedule import Schedule
-from morphcore.validity import ResultWarning, air_warnings, documents, overlap_warnings
+from morphcore.validity import (
+    ResultWarning,
+    air_warnings,
+    documents,
+    light_wing_warnings,
+    overlap_warnings,
+)
 
 SHAPES = 9  # angles between the path's ends at which overlaps are checked
 Flights = Mapping[str, Mapping[str, ComparedFlight | None]]
@@ -31,6 +37,7 @@ def schedule_warnings(
     if optimum is not None and flown is not None and flown.variation is not None:
         motion = case.flights("equivalent").motion(optimum)
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
+    found += light_wing_warnings(case.aircraft, case.flight)
     path = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)
     found += overlap_warnings(case.aircraft, path_angles(case.aircraft, case.drives, path))
     verified: list[dict[str, Any]] = []

@@ -37,7 +37,14 @@ from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
-from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
+from morphcore.validity import (
+    ResultWarning,
+    air_motion,
+    air_warnings,
+    light_wing_warnings,
+    overlap_warnings,
+    steep_warning,
+)
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
@@ -261,6 +268,7 @@ def _warnings(
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
+        *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
     )
 
