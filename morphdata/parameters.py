@@ -15,7 +15,7 @@ from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
 from morphdata.options import MODEL, Option
 from morphdata.refusals import escaped
 
-MAX_LINKS = 8
+MAX_LINKS = 16
 MAX_WINGS = 16
 AXES = 3  # flap, torsion, edgewise
 SUM_TOLERANCE = 1e-6  # tolerance of the division: documents may be rounded for printing

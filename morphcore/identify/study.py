@@ -1,6 +1,6 @@
 """The study over the number of links per wing: what each costs, what it gains, which to take.
 
-Equivalent models of 1 to 8 links are identified from the same samples, one after the other, and flown alone
+Equivalent models of 1 to 16 links are identified from the same samples, one after the other, and flown alone
 for their cost (the paper's Table 1; 1 is the rigid model with its aerodynamic corrections identified). Like
 an identification it is an iterator of steps with a complete state each.
 """

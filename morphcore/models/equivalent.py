@@ -266,7 +266,7 @@ class ChainModel(Shown):
 def chain_model(
     aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
-    """Build the equivalent model with 1 to 8 links on each flexible surface; 1 is the rigid model.
+    """Build the equivalent model with 1 to 16 links on each flexible surface; 1 is the rigid model.
 
     Raises
     ------

@@ -99,7 +99,7 @@ def test_numbers_of_links_and_elements_are_whole() -> None:
     assert type(chain_model(aircraft, flight, np.int8(2), lattice).links) is int
     assert flexible_model(aircraft, flight, elements=2.0, lattice=lattice) is not None  # type: ignore[arg-type]
     for make, hint in (
-        (lambda: chain_model(aircraft, flight, 9, lattice), "it must be at most 8"),
+        (lambda: chain_model(aircraft, flight, 17, lattice), "it must be at most 16"),
         (lambda: chain_model(aircraft, flight, 0, lattice), "it must be at least 1"),
         (lambda: flexible_model(aircraft, flight, elements=0, lattice=lattice), "it must be at least 1"),
         (lambda: flexible_model(aircraft, flight, elements=1.5, lattice=lattice), "give a whole number"),  # type: ignore[arg-type]

@@ -270,7 +270,7 @@ def test_paper_preset_is_the_papers_swarm() -> None:
     [
         ({"samples": []}, "/samples"),
         ({"samples": "train"}, "/samples"),
-        ({"model": {"links_per_wing": 9}}, "/model/links_per_wing"),
+        ({"model": {"links_per_wing": 17}}, "/model/links_per_wing"),
         ({"model": {"link_count": 3}}, "/model/link_count"),
         ({"model": {"lattice": {"chordwise": 0}}}, "/model/lattice/chordwise"),
         ({"model": {"lattice": {"core": {"law": "soft"}}}}, "/model/lattice/core/law"),

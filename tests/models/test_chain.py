@@ -70,7 +70,7 @@ def drag_wrenches(model, batch, particle, tree, motion, density):
     return wrench
 
 
-@pytest.mark.parametrize("links", range(1, 9))
+@pytest.mark.parametrize("links", [*range(1, 9), 16])
 def test_articulated_pass_is_the_dense_solution(links):
     """Accelerations of odd aircraft in full motion are those of M a = -h to 1e-10.
 

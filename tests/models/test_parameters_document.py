@@ -60,7 +60,7 @@ def test_a_whole_result_is_understood() -> None:
     ("change", "pointer"),
     [
         ({"links_per_wing": None}, "/model/links_per_wing"),
-        ({"links_per_wing": 9}, "/model/links_per_wing"),
+        ({"links_per_wing": 17}, "/model/links_per_wing"),
         ({"links_per_wing": 3}, "/model/division"),
         ({"division": [0.4, 0.7]}, "/model/division"),
         ({"division": [-0.4, 1.4]}, "/model/division/0"),

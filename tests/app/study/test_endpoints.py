@@ -45,7 +45,7 @@ def test_cost_is_that_of_all_identifications(service: RunningService) -> None:
     ("path", "value", "pointer", "code", "words"),
     [
         ("/model/links_per_wing", [2, 3, 2], "/model/links_per_wing/2", "name_not_unique", "once"),
-        ("/model/links_per_wing", [2, 9], "/model/links_per_wing/1", "less_than_equal", "at most 8"),
+        ("/model/links_per_wing", [2, 17], "/model/links_per_wing/1", "less_than_equal", "at most 16"),
         ("/model/links_per_wing", [0], "/model/links_per_wing/0", "greater_than_equal", "at least 1"),
         ("/model/links_per_wing", [], "/model/links_per_wing", "too_short", "more"),
         ("/model/links_per_wing", 3, "/model/links_per_wing", "list_type", "list"),
