@@ -1,7 +1,7 @@
 """Beams described by their strains: poses from the roots outward, and the loads conjugate to the strains.
 
 The logarithms ``d`` of the elements' relative poses are the coordinates, H_b = H_a exp(d) along each chain. A
-change of one of them moves everything outboard as one rigid body and stretches nothing else: unlike increments
+change of one moves all that is outboard as one rigid body and stretches nothing else: unlike increments
 of the nodes' poses, steps in bending do not excite the stretch, which is thousands of times stiffer.
 """
 
@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.multibody.beam import Beams, NodePoses
+from morphcore.multibody.beam import Beams, BeamTurnedTooFar, NodePoses
+from morphcore.multibody.kernels.se3 import LARGEST_ANGLE
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -38,7 +39,16 @@ class StrainPoses:
         self._tips = tips[first]
 
     def place(self, d: Array, poses: NodePoses) -> None:
-        """Put the nodes (n), those of the roots excepted, where the logarithms d (e, 6) say; in place."""
+        """Put the nodes (n), those of the roots excepted, where the logarithms d (e, 6) say; in place.
+
+        Raises
+        ------
+        BeamTurnedTooFar : an element turns by more than 1.5 rad.
+        """
+        turned = (d[:, :3] ** 2).sum(axis=1)
+        if not (turned < LARGEST_ANGLE**2).all():
+            element = int(np.argmax(turned))
+            raise BeamTurnedTooFar(f"element {element} is bent too far", hint="use more elements")
         count = self.beams.elements
         step = NodePoses(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
         step.move(np.ascontiguousarray(d))

@@ -22,12 +22,15 @@ INNER = 1e-3  # relative residual at which a linear solve ends
 MAX_DIRECTIONS = 60  # of one linear solve
 QUICK = 0.3  # a step without new products must reduce the residual to this share
 SHRINK = 0.5  # of a step that does not reduce the residual
-MAX_SHRINKS = 5
+MAX_SHRINKS = 4
 MAX_NEWTON = 12  # linear solves of one root
 
-FIRST_SHARE = 0.25  # first step of a continuation
-SMALLEST_SHARE = 1.0 / 256.0
+FIRST_SHARE = 1e-3  # of a continuation: gives the curve's direction
+FIRST_LENGTH = 0.25  # of its next step, along the curve
+LONGEST = 0.5
+SMALLEST = 1e-4
 EASY = 3  # linear solves of a root after which the next step is twice as long
+MAX_ROOTS = 100  # of one continuation
 
 
 @dataclass
@@ -43,6 +46,19 @@ class Root:
     solves: int
     arrived: bool
     straight: bool
+
+
+@dataclass(frozen=True)
+class Rules:
+    """When to stop, and how far to step.
+
+    tolerance : of the largest residual. accepted : the same, where rounding leaves more than the tolerance.
+    longest : share of a step of the unknowns that may be taken at once, at most 1.
+    """
+
+    tolerance: float
+    accepted: float
+    longest: Callable[[Array], float]
 
 
 @dataclass
@@ -62,8 +78,8 @@ class _Linear:
                 along = float(q @ rest)
                 row[k] += along
                 rest -= along * q
-        size = float(np.sqrt(rest @ rest))
-        if not size > 1e-10 * float(np.sqrt(w @ w)):
+        size = _norm(rest)
+        if not size > 1e-10 * _norm(w):
             return False
         row[-1] = size
         self.V.append(v)
@@ -85,19 +101,6 @@ class _Linear:
         return np.asarray(y @ V - (r + y @ W))
 
 
-@dataclass(frozen=True)
-class Rules:
-    """When to stop, and how far to step.
-
-    tolerance : of the largest residual. accepted : the same, where rounding leaves more than the tolerance.
-    longest : share of a step of the unknowns that may be taken at once, at most 1.
-    """
-
-    tolerance: float
-    accepted: float
-    longest: Callable[[Array], float]
-
-
 def find_root(residual: Residual, x: Array, rules: Rules) -> Root:
     """Newton's method from ``x``; ``residual`` (n,) of n unknowns is not finite where it has no meaning."""
     r = residual(x)
@@ -108,28 +111,24 @@ def find_root(residual: Residual, x: Array, rules: Rules) -> Root:
         whole = rules.longest(step)
         share, before = whole, _norm(r)
         for _ in range(MAX_SHRINKS + 1):
-            moved, found = _tried(residual, x + share * step)
-            if found is not None and _norm(found) < (1.0 - 0.1 * share) * before:
+            moved = x + share * step
+            found = residual(moved)
+            if _norm(found) < (1.0 - 0.1 * share) * before:  # false if it is not finite
                 break
             share *= SHRINK
         else:
-            return Root(x, size, solves, size < rules.accepted, straight and size < rules.accepted)
+            break
         straight &= share == 1.0
-        if share < whole or whole < 1.0:
+        if share < 1.0:
             x, r = moved, found
-            continue
-        x, r = _follow(residual, linear, (x, moved), (r, found), rules.tolerance)
-    return Root(x, size, solves, size < rules.accepted, straight and size < rules.accepted)
+        else:
+            x, r = _follow(residual, linear, (x, moved), (r, found), rules)
+    arrived = size < rules.accepted
+    return Root(x, size, solves, arrived, straight and arrived)
 
 
 def _norm(r: Array) -> float:
     return float(np.sqrt(r @ r))
-
-
-def _tried(residual: Residual, x: Array) -> tuple[Array, Array | None]:
-    """A place and the residual there, if there is one."""
-    found = residual(x)
-    return x, found if np.isfinite(found).all() else None
 
 
 def _solve(residual: Residual, x: Array, r: Array) -> tuple[_Linear, Array]:
@@ -139,10 +138,8 @@ def _solve(residual: Residual, x: Array, r: Array) -> tuple[_Linear, Array]:
     v = -r / _norm(r)
     for _ in range(min(MAX_DIRECTIONS, r.size)):
         w = (residual(x + PROBE * v) - r) / PROBE
-        if not np.isfinite(w).all():
-            break
         basis.append(v)
-        if not linear.add(v, w):
+        if not np.isfinite(w).all() or not linear.add(v, w):
             break
         q = linear.Q[-1]
         left = left - float(q @ left) * q
@@ -159,56 +156,85 @@ def _solve(residual: Residual, x: Array, r: Array) -> tuple[_Linear, Array]:
 
 
 def _follow(
-    residual: Residual, linear: _Linear, x: tuple[Array, Array], r: tuple[Array, Array], tolerance: float
+    residual: Residual, linear: _Linear, x: tuple[Array, Array], r: tuple[Array, Array], rules: Rules
 ) -> tuple[Array, Array]:
     """Further steps with the products of the last solve, corrected by every change that they have brought."""
     (x0, x1), (r0, r1) = x, r
-    while float(np.abs(r1).max()) >= tolerance:
+    while float(np.abs(r1).max()) >= rules.tolerance:
         step = x1 - x0
         length = _norm(step)
         if not linear.add(step / length, (r1 - r0) / length):
             break
-        moved, found = _tried(residual, x1 + linear.step(r1))
-        if found is None or _norm(found) > QUICK * _norm(r1):
+        step = linear.step(r1)
+        if rules.longest(step) < 1.0:
             break
-        x0, r0, x1, r1 = x1, r1, moved, found
+        found = residual(x1 + step)
+        if not _norm(found) <= QUICK * _norm(r1):
+            break
+        x0, r0, x1, r1 = x1, r1, x1 + step, found
     return x1, r1
 
 
 @dataclass
 class Continued:
-    """Where a continuation ended: the root at the last ``share``, and the solves of all steps together.
+    """Where a continuation ended: the last root, its share, and the linear solves of all steps together.
 
-    missed : the iteration that did not arrive at the next share, if one stopped the continuation.
+    missed : largest residual that the iteration for the next root left, if that ended the continuation.
     """
 
     root: Root
     share: float
     solves: int
-    missed: Root | None
+    missed: float | None
 
 
-def continue_root(residual_at: Callable[[float], Residual], start: Array, rules: Rules) -> Continued:
+def continue_root(residual: Callable[[Array, float], Array], start: Array, rules: Rules) -> Continued:
     """Follow a root from share 0, where ``start`` is near it, to share 1, in steps as long as possible.
 
-    A step begins from the straight line through the last two roots. ``residual_at`` gives the equations of a
-    share. If the root of share 0 is not found, that is the end, at share 0.
+    The curve of roots is followed by its length, so that it may turn back on its way: the share is an unknown
+    like the others, and a step ends where the curve meets the plane across the straight line through the last
+    two roots. If the root of share 0 is not found, that is the end, at share 0.
+
+    Parameters
+    ----------
+    residual : (n,) of unknowns (n,) and the share.
     """
-    root = find_root(residual_at(0.0), start, rules)
+
+    def across(place: Array, line: Array) -> Residual:
+        return lambda z: np.append(residual(z[:-1], z[-1]), line @ (z - place))
+
+    extended = Rules(rules.tolerance, rules.accepted, lambda step: rules.longest(step[:-1]))
+    root = find_root(lambda x: residual(x, 0.0), start, rules)
     if not root.arrived:
-        return Continued(root, 0.0, root.solves, root)
-    share, solves, length = 0.0, root.solves, FIRST_SHARE
-    slope = np.zeros_like(start)
-    while share < 1.0:
-        target = min(1.0, share + length)
-        found = find_root(residual_at(target), root.x + (target - share) * slope, rules)
+        return Continued(root, 0.0, root.solves, root.size)
+    near = find_root(lambda x: residual(x, FIRST_SHARE), root.x, rules)
+    solves = root.solves + near.solves
+    if not near.arrived:
+        return Continued(root, 0.0, solves, near.size)
+    z, line = np.append(near.x, FIRST_SHARE), np.append(near.x - root.x, FIRST_SHARE)
+    root, line, length = near, line / _norm(line), FIRST_LENGTH
+    for _ in range(MAX_ROOTS):
+        ahead = z + length * line
+        last = ahead[-1] >= 1.0
+        if last:  # shares beyond 1 mean nothing: the root of 1 itself
+            begin = z + (1.0 - z[-1]) / line[-1] * line
+            found = find_root(lambda x: residual(x, 1.0), begin[:-1], rules)
+            moved = np.append(found.x, 1.0)
+        else:
+            found = find_root(across(ahead, line), ahead, extended)
+            moved = found.x
         solves += found.solves
-        if not found.arrived:
-            length = 0.5 * (target - share)
-            if length < SMALLEST_SHARE:
-                return Continued(root, share, solves, found)
+        step = moved - z
+        distance = _norm(step)
+        # a root far from the straight line may lie on another curve
+        if not found.arrived or distance > 2.0 * length or not -1e-3 < moved[-1] < 1.0 + 1e-12:
+            length *= 0.25
+            if length < SMALLEST:
+                return Continued(Root(z[:-1], root.size, root.solves, True, False), z[-1], solves, found.size)
             continue
-        slope = (found.x - root.x) / (target - share)
-        length = (target - share) * (2.0 if found.solves <= EASY else 1.0)
-        root, share = found, target
-    return Continued(root, 1.0, solves, None)
+        root = found
+        if last:
+            return Continued(found, 1.0, solves, None)
+        z, line = moved, step / distance
+        length = min(LONGEST, distance * (2.0 if found.solves <= EASY else 1.0))
+    return Continued(Root(z[:-1], root.size, root.solves, True, False), z[-1], solves, None)

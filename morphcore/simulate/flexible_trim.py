@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -192,10 +191,7 @@ def _equilibrium(balance: _Balance) -> Root:
     if root.straight:
         return root
 
-    def at(share: float) -> Callable[[Array], Array]:
-        return lambda x: balance.imbalance(x, share)
-
-    found = continue_root(at, begin, rules)
+    found = continue_root(balance.imbalance, begin, rules)
     if found.share < 1.0:
         raise TrimNotFound(residual=found.root.size, iterations=found.solves)
     return found.root
