@@ -21,6 +21,7 @@ PROBE = 1e-6  # length of a one-sided difference: balances truncation and roundi
 INNER = 1e-3  # relative residual at which a linear solve ends
 MAX_DIRECTIONS = 60  # of one linear solve
 QUICK = 0.3  # a step without new products must reduce the residual to this share
+STRAIGHT = 0.3  # a step that reduces the residual by less than this goes astray: another root may attract it
 SHRINK = 0.5  # of a step that does not reduce the residual
 MAX_SHRINKS = 4
 MAX_NEWTON = 12  # linear solves of one root
@@ -88,6 +89,11 @@ class _Linear:
         self.R.append(row)
         return True
 
+    def turned(self) -> bool:
+        """Whether an eigenvalue of J in the directions, orthonormal so far, is real and negative."""
+        values = np.linalg.eigvals(np.stack(self.V) @ np.stack(self.W).T)
+        return bool(np.any((np.abs(values.imag) < 1e-9 * np.abs(values)) & (values.real < 0.0)))
+
     def step(self, r: Array) -> Array:
         """The step that removes residual r: within the directions by their products, the rest as it is."""
         count = len(self.Q)
@@ -118,7 +124,7 @@ def find_root(residual: Residual, x: Array, rules: Rules) -> Root:
             share *= SHRINK
         else:
             break
-        straight &= share == 1.0
+        straight &= share == 1.0 and _norm(found) < STRAIGHT * before and not linear.turned()
         if share < 1.0:
             x, r = moved, found
         else:
