@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import NoConvergence, newton_krylov
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
-from morphcore.multibody.beam import (
-    BeamTurnedTooFar,
-    NodePoses,
-    carried,
-    expand_solution,
-    factor,
-    reduce_right,
-)
+from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried, node_forces
+from morphcore.multibody.strain_poses import StrainPoses
+from morphcore.simulate.continuation import Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.trim import StartMode
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-10  # rad and m, limit of the displacement that the remaining imbalance would cause
-ACCEPTED = 1e3 * TOLERANCE  # Krylov steps may stall in the last digits; this is far below what a flight shows
-MAX_ITERATIONS = 40
+TOLERANCE = 1e-11  # rad and m, of the strains' and the angle's remaining imbalance
+ACCEPTED = 1e-7  # rounding may leave more than the tolerance; this is far below what a flight shows
+LONGEST_TURN = 0.3  # rad of an element or of the angle of attack, in one step of Newton's method
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an angle
 
 
@@ -44,28 +38,44 @@ class FlexibleTrim:
 
 
 class _Balance:
-    """The equations of trim: scaled imbalance for displacements of all nodes and, in free trim, alpha."""
+    """The equations of trim: imbalance of all elements' strains and, in free trim, of lift and weight.
+
+    Unknowns are the changes of the elements' logarithms d (e, 6) from those at rest and the angle of attack.
+    An element is in balance if they are its flexibility times the loads on d.
+    """
 
     def __init__(self, flight: FlexibleFlight, path: HingePath, wind_N: Array, start: StartMode) -> None:
         self.flight, self.path, self.wind_N = flight, path, wind_N
         model = flight.model
         self.given = model.flight.start if start == "given" else None
-        self.free = np.setdiff1d(np.arange(model.beams.nodes), np.concatenate([[0], model.roots]))
-        surfaces = model.aircraft.surfaces
-        self.area = sum(surface.area_m2 for surface in surfaces)
+        self.area = sum(surface.area_m2 for surface in model.aircraft.surfaces)
         first = np.zeros((model.beams.nodes, 6))
-        self.rest = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
-        poses, V, A = self.rest.copy(), first, first.copy()
-        flight.follow(poses, V, A, path, 0)
-        for root, tip in zip(model.roots, model.tips, strict=True):
-            poses.R[root : tip + 1] = poses.R[root]
-            poses.x[root : tip + 1] = poses.x[root] + model.rest_W[root : tip + 1] @ poses.R[root].T
-        self.unbent = poses
+        self.unbent = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
+        flight.follow(self.unbent, first, first.copy(), path, 0)
+        self.chains = StrainPoses(model.beams, model.roots, model.tips)
+        # without stiffness the nodes' forces are those of inertia and weight alone: the strains' own do not
+        # cancel in the sums over whole wings
+        loose = np.zeros_like(model.beams.stiffness)
+        loose.setflags(write=False)
+        self.loose = replace(model.beams, stiffness=loose)
+        self.flexibility = np.linalg.inv(model.beams.stiffness)
 
     @property
     def unknowns(self) -> int:
         """Number of unknowns."""
-        return 6 * self.free.size + (1 if self.given is None else 0)
+        return self.flight.model.beams.rest.size + (1 if self.given is None else 0)
+
+    def loads(self, poses: NodePoses, V: Array, A: Array) -> Array:
+        """Forces (n, 6) that inertia and weight require at the nodes."""
+        flight = self.flight
+        return node_forces(self.loose, flight.work, poses, V, A, flight.gravity_N)
+
+    def longest(self, step: Array) -> float:
+        """Share of a step of the unknowns that may be taken at once."""
+        count = self.flight.model.beams.rest.size
+        turns = np.abs(step[:count].reshape(-1, 6)[:, :3]).max(initial=0.0)
+        turn = max(float(turns), float(np.abs(step[count:]).max(initial=0.0)))
+        return min(1.0, LONGEST_TURN / max(turn, 1e-300))
 
     def _inertia(self, poses: NodePoses, at_rest: Array) -> Array:
         """Spatial inertia (6, 6) of the whole aircraft in this shape about the reference point.
@@ -74,7 +84,7 @@ class _Balance:
         """
         zero, columns = np.zeros_like(at_rest), []
         for unit_B in np.eye(6):
-            demands = self.flight.structure(poses, zero, self._rigid(poses, unit_B))
+            demands = self.loads(poses, zero, self._rigid(poses, unit_B))
             columns.append(self.total(poses, demands - at_rest))
         return np.stack(columns, axis=1)
 
@@ -91,21 +101,19 @@ class _Balance:
         return np.concatenate([moment.sum(axis=0), force.sum(axis=0)])
 
     def state(self, x: Array) -> tuple[FlexibleState, Array]:
-        """The state for given unknowns, and the nodal forces it requires in addition to the constant ones."""
-        flight, count = self.flight, 6 * self.free.size
+        """The state for given unknowns, and the nodal forces that it requires besides the strains'."""
+        flight, count = self.flight, self.flight.model.beams.rest.size
         alpha = self.given.alpha_rad if self.given is not None else float(x[count])
         airspeed = flight.model.flight.airspeed_m_s
         R_NB = rotation_from_quaternion(quaternion_from_euler(0.0, alpha, 0.0))
         V_B = np.zeros(6)
         V_B[3:] = airspeed * np.array([np.cos(alpha), 0.0, np.sin(alpha)]) + self.wind_N @ R_NB
-        increments = np.zeros((self.unbent.x.shape[0], 6))
-        increments[self.free] = x[:count].reshape(-1, 6)
         poses = self.unbent.copy()
-        poses.move(increments)
+        self.chains.place(flight.model.beams.rest + x[:count].reshape(-1, 6), poses)
         poses.R, poses.x = np.ascontiguousarray(R_NB @ poses.R), poses.x @ R_NB.T
         V = self._rigid(poses, V_B)
         A = np.zeros_like(V)
-        demands = flight.structure(poses, V, A)
+        demands = self.loads(poses, V, A)
         flight.place_lattice(poses, self.wind_N, V)
         twists = flight.sections.twists(V)
         wind_B = self.wind_N @ R_NB
@@ -113,29 +121,34 @@ class _Balance:
         flight.subtract_air(circulation, twists, wind_B, demands)
         if self.given is not None:
             # the wings move with the fuselage as one: its acceleration follows from the sum of all forces
-            at_rest = flight.structure(poses, np.zeros_like(V), A)
+            at_rest = self.loads(poses, np.zeros_like(V), A)
             thrust = np.concatenate([self.given.moment_B, self.given.force_B])
             defect = thrust - self.total(poses, demands)
             A = self._rigid(poses, np.asarray(np.linalg.solve(self._inertia(poses, at_rest), defect)))
-            demands += flight.structure(poses, V, A) - flight.structure(poses, V, np.zeros_like(V))
+            demands += self.loads(poses, V, A) - self.loads(poses, V, np.zeros_like(V))
         lag = np.stack([circulation, circulation])
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands
 
-    def imbalance(self, x: Array) -> Array:
-        """Displacements that would remove the imbalance and, in free trim, the lift deficit as an angle."""
-        flight, model = self.flight, self.flight.model
-        state, demands = self.state(x)
-        total = self.total(state.poses, demands)
-        factor(model.beams, flight.work, 0.0, 0.0, 1.0)
-        reduce_right(model.beams, flight.work, demands)
-        demands[model.roots] = 0.0
-        expand_solution(model.beams, flight.work, demands)
-        bent = demands[self.free].ravel()
+    def imbalance(self, x: Array, share: float = 1.0) -> Array:
+        """Imbalance (n,) of the unknowns x (n,), rad and m, with ``share`` of the wings' flexibility.
+
+        Not finite where an element is bent beyond the range of its logarithm.
+        """
+        model = self.flight.model
+        try:
+            state, demands = self.state(x)
+        except BeamTurnedTooFar:
+            return np.full(x.size, np.nan)
+        count = model.beams.rest.size
+        change = x[:count].reshape(-1, 6)
+        required = self.chains.conjugate(model.beams.rest + change, state.poses, demands)
+        strained = change + share * (self.flexibility @ required[..., None])[..., 0]
         if self.given is not None:
-            return np.asarray(bent)
-        alpha = x[-1]
+            return strained.ravel()
+        alpha = x[count]
+        total = self.total(state.poses, demands)
         normal = -np.sin(alpha) * total[3] + np.cos(alpha) * total[5]
-        return np.append(bent, normal / (model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE))
+        return np.append(strained, normal / (model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE))
 
 
 def trim_flexible(
@@ -143,10 +156,11 @@ def trim_flexible(
 ) -> FlexibleTrim:
     """Equilibrium at the path's first hinge angles, as `simulate.trim.trim` defines it.
 
-    Unknowns are the poses of all free nodes and the angle of attack; thrust along the flight path, side force
-    and moment follow. With ``start="given"`` they are the flight's, the unknowns are the nodes, and the wings
-    share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with Krylov
-    steps (`scipy.optimize.newton_krylov`), on the imbalance divided by the structure's stiffness.
+    Unknowns are the strains of all elements and the angle of attack; thrust along the flight path, side force
+    and moment follow. With ``start="given"`` they are the flight's, the unknowns are the strains, and the
+    wings share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with
+    Krylov steps (`simulate.continuation`) from unbent wings; if it does not arrive straight away, the
+    equilibrium is followed from rigid wings to the wings' own stiffness.
 
     Raises
     ------
@@ -159,35 +173,25 @@ def trim_flexible(
             hint='give alpha_rad, force_b_n and moment_b_n_m, or use start = "trim"',
         )
     balance = _Balance(flight, path, wind_N, start)
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            x = _newton(balance)
-        residual = float(np.abs(balance.imbalance(x)).max(initial=0.0))
-    except (BeamTurnedTooFar, ValueError):
-        raise TrimNotFound(residual=float("inf"), iterations=MAX_ITERATIONS) from None
-    if not residual < ACCEPTED:
-        raise TrimNotFound(residual=residual, iterations=MAX_ITERATIONS)
-    state, demands = balance.state(x)
+    with np.errstate(over="ignore", invalid="ignore"):
+        root = _equilibrium(balance)
+    state, demands = balance.state(root.x)
     given = balance.given
     if given is not None:
-        return FlexibleTrim(given.alpha_rad, given.force_B, given.moment_B, state, residual)
+        return FlexibleTrim(given.alpha_rad, given.force_B, given.moment_B, state, root.size)
     total = balance.total(state.poses, demands)
-    return FlexibleTrim(float(x[-1]), total[3:].copy(), total[:3].copy(), state, residual)
+    return FlexibleTrim(float(root.x[-1]), total[3:].copy(), total[:3].copy(), state, root.size)
 
 
-def _newton(balance: _Balance) -> Array:
-    """Where Newton's method ends, converged or not."""
-    if not balance.unknowns:  # a rigid aircraft from a given start
-        return np.zeros(0)
-    try:
-        return np.asarray(
-            newton_krylov(
-                balance.imbalance,  # type: ignore[arg-type]
-                np.zeros(balance.unknowns),
-                f_tol=TOLERANCE,
-                maxiter=MAX_ITERATIONS,
-                method="lgmres",
-            )
-        )
-    except NoConvergence as stalled:
-        return np.asarray(stalled.args[0])
+def _equilibrium(balance: _Balance) -> Root:
+    """The equilibrium on the branch that begins with rigid wings."""
+    begin = np.zeros(balance.unknowns)
+    rules = Rules(TOLERANCE, ACCEPTED, balance.longest)
+    root = find_root(balance.imbalance, begin, rules)
+    if root.straight:
+        return root
+
+    found = continue_root(balance.imbalance, begin, rules)
+    if found.share < 1.0:
+        raise TrimNotFound(residual=found.root.size, iterations=found.solves)
+    return found.root
