@@ -56,6 +56,12 @@ class Flight(Document):
     )
     wind_n_m_s: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Velocity of the air, earth axes (NED).")
     start: Start | None = Field(default=None, description='Needed for `model.start = "given"`.')
+    trim_drive: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,49}$")] | None = Field(
+        default=None,
+        description="A drive (`incidence_left`), or a word for both sides (`incidence`), whose angle balances "
+        "the pitching moment in trim. It holds that angle; a history given for it counts from its first value "
+        "as an increment. Default: a constant moment balances. Not used from a given start.",
+    )
 
     @property
     def mach_number(self) -> float | None:

@@ -67,7 +67,7 @@ def reference_trim(chain: ChainModel, batch: ParameterBatch, start: StartMode) -
         There is no such flight.
     """
     held = [Hold(hinge.angle_rad) for hinge in chain.aircraft.hinges]
-    plan = flight_plan(chain, held, time_grid(STEP_S * np.arange(3)))
+    plan = flight_plan(chain, held, time_grid(STEP_S * np.arange(3)), start=start)
     with naming_obstacles(lambda: chain_obstacle(chain, batch)):
         return trim(chain, batch, plan, start=start).require()
 

@@ -89,7 +89,10 @@ class Start:
 
 @dataclass(frozen=True, repr=False)
 class Flight(Shown):
-    """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s."""
+    """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s.
+
+    ``trim_drive`` names the drives that balance the pitching moment in trim.
+    """
 
     airspeed_m_s: float
     air_density_kg_m3: float
@@ -98,6 +101,7 @@ class Flight(Shown):
     wind_N: Array
     mach: float | None
     start: Start | None
+    trim_drive: str | None = None
 
     @classmethod
     def of(cls, document: FlightDocument) -> Flight:
@@ -113,6 +117,7 @@ class Flight(Shown):
             start=None
             if start is None
             else Start(start.alpha_rad, _vector(start.force_b_n), _vector(start.moment_b_n_m)),
+            trim_drive=document.trim_drive,
         )
 
     @property

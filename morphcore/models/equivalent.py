@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +129,19 @@ class ChainModel(Shown):
         own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
         images = tuple(every[k] for k in self.mirror.image)
         return _chain_model(own, self.flight, self.links_per_wing, self.lattice.settings, images)
+
+    @cached_property
+    def rigid(self) -> ChainModel:
+        """The rigid model of the same aircraft (or half of one) in the same flight."""
+        if self.links_per_wing == 1:
+            return self
+        lattice = self.lattice
+        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images)
+
+    @cached_property
+    def starts(self) -> dict[bytes, Any]:
+        """Starts that were found for the lattice, by first hinge angles: see simulate/wake.py."""
+        return {}
 
     @property
     def links(self) -> int:
