@@ -22,7 +22,7 @@ from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
+from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
@@ -292,6 +292,7 @@ class OptimizeRequest(Request):
     def faults(self) -> Iterator[Fault]:
         """Check aircraft, model and morph together, and the size of the search."""
         yield from start_faults(self.flight, flown_with(self.model).start)
+        yield from trim_drive_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
         yield from self._hinge_faults()

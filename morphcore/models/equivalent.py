@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,8 +138,8 @@ class ChainModel(Shown):
         return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images)
 
     @cached_property
-    def starts(self) -> dict[bytes, Any]:
-        """Starts that were found for the lattice, by first hinge angles: see simulate/wake.py."""
+    def starts(self) -> dict[bytes, tuple[float, float | None]]:
+        """Angle of attack and trim drive, rad, that were found by first angles: see simulate/wake.py."""
         return {}
 
     @property

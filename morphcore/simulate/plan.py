@@ -21,7 +21,14 @@ from morphcore.simulate.operator_table import OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.time_grid import STEP_S, TimeGrid
 from morphcore.simulate.trim import StartMode
-from morphcore.simulate.wake import NominalStart, nominal_start, refuse_moved_trim, trimmed_angles, wake_direction
+from morphcore.simulate.wake import (
+    NominalStart,
+    nominal_start,
+    refuse_moved_trim,
+    trim_columns,
+    trimmed_schedules,
+    wake_direction,
+)
 
 Array = NDArray[np.float64]
 
@@ -159,10 +166,10 @@ def flight_plan(
     parameters.
     """
     times = grid.halves_s
-    motion = _motion(schedules, times)
     if wake_alpha is None:
-        begin = nominal_start(model, motion.angles[0], start, _instant)
-        motion, wake_alpha = _trimmed(model, motion, begin), begin.alpha
+        begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
+        schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
+    motion = _motion(schedules, times)
     if may_halve and air_velocity_N is None:
         model, motion = _halved(model, motion)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
@@ -193,21 +200,14 @@ def _motion(schedules: Sequence[Schedule], times: Array) -> _Motion:
 
 
 def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart:
-    """The start (`wake.nominal_start`) of a plan whose first hinge angles are (h,), rad."""
+    """The start (`wake.nominal_start`) of a plan whose schedules begin at angles (h,), rad."""
     return nominal_start(model, angles, start, _instant)
 
 
 def _instant(model: ChainModel, angles: Array, wake_alpha: float) -> FlightPlan:
-    """A plan of one short step with the hinges held at angles (h,), rad."""
+    """A plan of one short step with everything held at angles (h,), rad."""
     held = [Hold(float(angle)) for angle in angles]
-    return flight_plan(
-        model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha
-    )
-
-
-def _trimmed(model: ChainModel, motion: _Motion, begin: NominalStart) -> _Motion:
-    """The motion with the trim drive at the angle found, where its history begins."""
-    return replace(motion, angles=trimmed_angles(model.aircraft, model.flight, motion.angles, begin))
+    return flight_plan(model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha)
 
 
 @dataclass(frozen=True)
@@ -258,8 +258,8 @@ class CommonPath:
         table = OperatorTable(self.matrices, self.strips, position)
         flown = self.flown(model)
         schedules = path_schedules(flown.aircraft, self.drives, schedule)
-        motions = _trimmed(flown, _motion(schedules, grid.halves_s), self.begin)
-        return _plan(flown, grid, motions, table)
+        schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
+        return _plan(flown, grid, _motion(schedules, grid.halves_s), table)
 
 
 def common_path(
@@ -290,9 +290,12 @@ def common_path(
     begin = NominalStart(wake_alpha) if wake_alpha is not None else None
     if begin is None:
         refuse_moved_trim(model, [_moves(hinge, chosen) for hinge in model.aircraft.hinges], start)
-        first = path_angles(model.aircraft, chosen, np.array([low_rad if initial_rad is None else initial_rad]))
+        first = path_angles(
+            model.aircraft, chosen, np.array([low_rad if initial_rad is None else initial_rad])
+        )
         begin = start_at(model, first[0], start)
-        motion = _trimmed(model, motion, begin)
+        if begin.drive_rad is not None:
+            angles[:, trim_columns(model.aircraft, model.flight.trim_drive)] = begin.drive_rad
     if may_halve:
         model, motion = _halved(model, motion)
     mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha)

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
-from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, physical_guess
+from morphcore.models.flexible import FlexibleModel
+from morphcore.simulate.schedule import HingeMotion, Schedule
 from morphcore.simulate.trim import StartMode, trim
 from morphdata.drives import Drive, without_side
 
@@ -28,7 +30,9 @@ Array = NDArray[np.float64]
 # a plan of one instant for hinge angles (h,), rad, and the angle of attack of its wake, rad
 Instant = Callable[[ChainModel, Array, float], "FlightPlan"]
 
-TOLERANCE_RAD = 1e-7  # limit of the last step, which leaves a thousandth of it: the trim hardly feels the wake
+TOLERANCE_RAD = (
+    1e-7  # limit of the last step, which leaves a thousandth of it: the trim hardly feels the wake
+)
 MAX_ROUNDS = 12  # three are enough up to 20 degrees
 PROBE_RAD = 1e-3  # of the drive, for the first slope of its moment
 MIN_AUTHORITY = 1e-6  # 1/rad, slope of the moment's coefficient: below it the drive moves no lifting surface
@@ -61,8 +65,10 @@ def trim_drives(aircraft: Aircraft, name: str | None) -> tuple[Drive, ...]:
     if name is None:
         return ()
     drives = aircraft.drives
-    found = (drives[name],) if name in drives else tuple(
-        drive for drive in drives.values() if without_side(drive.name) == name
+    found = (
+        (drives[name],)
+        if name in drives
+        else tuple(drive for drive in drives.values() if without_side(drive.name) == name)
     )
     if not found:
         raise InvalidInput(
@@ -74,30 +80,50 @@ def trim_drives(aircraft: Aircraft, name: str | None) -> tuple[Drive, ...]:
 
 
 def trim_columns(aircraft: Aircraft, name: str | None) -> NDArray[np.int64]:
-    """Indices of the hinges of the trim drive among all hinges of the aircraft."""
-    found = [k for k, hinge in enumerate(aircraft.hinges) if name in (hinge.drive, without_side(hinge.drive))]
+    """Numbers of the schedules of the trim drive among those of the aircraft."""
+    found = [k for k, part in enumerate(aircraft.hinges) if name in (part.drive, without_side(part.drive))]
     return np.array(found, dtype=np.int64)
 
 
-def trimmed_angles(aircraft: Aircraft, flight: Flight, angles: Array, begin: NominalStart) -> Array:
-    """Histories (k, h) of all hinges, rad, with those of the trim drive shifted to begin where it was found.
+@dataclass(frozen=True)
+class Shifted:
+    """A schedule with a constant angle added, rad."""
+
+    schedule: Schedule
+    added_rad: float
+
+    def motion(self, time_s: ArrayLike) -> HingeMotion:
+        """The motion at the given times, s."""
+        own = self.schedule.motion(time_s)
+        return HingeMotion(own.angle + self.added_rad, own.rate, own.acceleration)
+
+
+def trimmed_schedules(
+    model: ChainModel | FlexibleModel, schedules: Sequence[Schedule], times_s: Array, begin: NominalStart
+) -> list[Schedule]:
+    """Schedules of which those of the trim drive are shifted to begin at the angle found.
+
+    Parameters
+    ----------
+    times_s : (k,) of the flight, from its start.
 
     Raises
     ------
     InvalidInput
-        Its history leads it out of its range from there.
+        A history leads the trim drive out of its range from there.
     """
+    out = list(schedules)
     if begin.drive_rad is None:
-        return angles
-    out = angles.copy()
-    for column in trim_columns(aircraft, flight.trim_drive):
-        hinge, moved = aircraft.hinges[column], out[:, column]
-        moved += begin.drive_rad - moved[0]
-        outside = hinge.beyond_range(moved)
+        return out
+    for column in trim_columns(model.aircraft, model.flight.trim_drive):
+        part, own = model.aircraft.hinges[column], schedules[column]
+        out[column] = Shifted(own, begin.drive_rad - float(own.motion(times_s[:1]).angle[0]))
+        angle = out[column].motion(times_s).angle
+        outside = part.beyond_range(angle)
         if outside.size:
             raise InvalidInput(
-                f"the trim drive {hinge.drive} is at {begin.drive_rad:.4g} rad in trim, and its history leads "
-                f"it to {moved[outside[0]]:.4g} rad, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                f"the trim drive {part.drive} is at {begin.drive_rad:.4g} rad in trim, and its history leads "
+                f"it to {angle[outside[0]]:.4g} rad, beyond its range {part.min_rad:g}..{part.max_rad:g} rad",
                 pointer="/flight/trim_drive",
                 hint="a history of the trim drive counts from its first value: reduce it, or widen the range",
             )
@@ -107,7 +133,7 @@ def trimmed_angles(aircraft: Aircraft, flight: Flight, angles: Array, begin: Nom
 def refuse_moved_trim(model: ChainModel, moves: Sequence[bool], start: StartMode) -> None:
     """Refuse a lattice along a path on which the trim drive moves: its angles depend on the trim.
 
-    moves : whether each hinge is moved by the path.
+    moves : whether the path moves what each schedule is for.
 
     Raises
     ------
@@ -126,7 +152,7 @@ def refuse_moved_trim(model: ChainModel, moves: Sequence[bool], start: StartMode
 
 
 def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: Instant) -> NominalStart:
-    """Find the start at hinge angles (h,), rad: those of the trim drive are replaced by the one found.
+    """Find the start at the first angles (h,), rad, of all schedules, those of the trim drive being free.
 
     With ``start="given"`` the angle of attack is the flight's, and no drive is moved. The result is kept with
     the model.
@@ -147,8 +173,9 @@ def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: I
     first[columns] = 0.0  # the start does not depend on where the trim drive was before
     key = first.tobytes()
     if key not in model.starts:
-        model.starts[key] = _found(model, first, columns, instant)
-    return model.starts[key]
+        found = _found(model, first, columns, instant)
+        model.starts[key] = found.alpha, found.drive_rad
+    return NominalStart(*model.starts[key])
 
 
 def _found(model: ChainModel, angles: Array, columns: NDArray[np.int64], instant: Instant) -> NominalStart:
@@ -204,8 +231,9 @@ def trim_range(drives: Sequence[Drive]) -> tuple[float, float]:
 def no_authority(name: str | None, angle_rad: float, moment: float) -> InvalidInput:
     """The error of a trim drive that cannot balance the pitching moment: at an angle some is left, N m."""
     return InvalidInput(
-        f"the drive {name!r} cannot balance the pitching moment: at {angle_rad:.4g} rad {moment:.4g} N m are left",
+        f"the drive {name!r} cannot balance the pitching moment: at {angle_rad:.4g} rad {moment:.4g} N m are "
+        "left",
         pointer="/flight/trim_drive",
-        hint="its authority is too small: widen the range of its hinges, move the centre of mass, enlarge the "
-        "surface or its arm, or omit trim_drive to trim by a constant moment",
+        hint="its authority is too small: widen the range of its hinges, move the centre of mass, enlarge "
+        "the surface or its arm, or omit trim_drive to trim by a constant moment",
     )
