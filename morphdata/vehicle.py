@@ -43,6 +43,26 @@ def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
         )
 
 
+def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -> Iterator[Fault]:
+    """Check that no morph moves the drive with which its flights are trimmed.
+
+    Parameters
+    ----------
+    start : str or None
+        Requested start of the flight; a given one is not trimmed.
+    moved : sequence of str
+        Names of the drives that the morph moves.
+    """
+    both = [name for name in moved if flight.trim_drive in (name, without_side(name))]
+    if both and start != "given":
+        yield Fault(
+            "morph_of_trim_drive",
+            f"The morph moves {both[0]!r}, with which the flight is trimmed.",
+            "/flight/trim_drive",
+            "Trim with another drive, or omit trim_drive.",
+        )
+
+
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:
     """Check that there is a wing that is both hinged and flexible."""
     if not any(surface.flexible and surface.all_hinges for surface in aircraft.surfaces):
