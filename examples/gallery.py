@@ -54,7 +54,7 @@ def fly(folder: Path) -> None:
             )
             write_trajectory_csv(flown.trajectory, folder / f"{name}.csv")
             for warning in flown.warnings:
-                print(f"  {folder.name}, {name}: {warning.message}")  # noqa: T201
+                print(f"  {folder.name}, {name}: {warning.message}")
     draw(Aircraft.of(aircraft), Flight.of(flight), folder / "picture.svg")
 
 

@@ -28,6 +28,8 @@ LARGEST_APPARENT_SHARE = 0.1  # of a wing's mass: it then lowers the frequency o
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
+INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the incidence
+LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
@@ -174,6 +176,31 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
             if beyond
             else "roll and yaw cannot be distinguished there: do not interpret or fit them near that time",
             pointer,
+        )
+    ]
+
+
+def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[ResultWarning]:
+    """A pitching moment (3,), N m, that only a constant moment balances although a drive could.
+
+    Only drives of incidence count: those whose hinges turn about y of B.
+    """
+    if flight.trim_drive is not None:
+        return []
+    able = {hinge.drive: None for hinge in aircraft.hinges if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
+    area = sum(surface.area_m2 for surface in aircraft.surfaces)
+    chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
+    coefficient = moment_B[1] / (flight.dynamic_pressure_pa * area * chord)
+    if not able or abs(coefficient) < LARGEST_TRIM_MOMENT:
+        return []
+    return [
+        ResultWarning(
+            "constant_trim_moment",
+            f"a constant moment of {moment_B[1]:.4g} N m, which no control supplies, holds the aircraft in "
+            "trim",
+            f"let a drive balance it: set flight.trim_drive (the aircraft has {', '.join(able)}). A constant "
+            "moment does not change with speed, and so spoils slow motions such as the phugoid",
+            "/flight",
         )
     ]
 

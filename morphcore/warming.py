@@ -45,7 +45,7 @@ def warm_up_further() -> None:
     aircraft, flight = tiny_aircraft()
     sample = _tiny_sample()
     model = chain_model(aircraft, flight, 2, SMALL)
-    held = flight_plan(model, [Hold()] * len(aircraft.hinges), time_grid(sample.time_s))
+    held = flight_plan(model, [Hold()] * len(aircraft.hinges), time_grid(sample.time_s), wake_alpha=0.0)
     states = np.zeros((held.grid.steps + 1, model.state_rows))
     states[:, 0] = 1.0  # an attitude needs a unit quaternion
     hinge_torques(model, held, lane_constants(model, physical_guess(model), held.grid.step_s), states)

@@ -61,6 +61,12 @@ class Flight(Document):
         "matters for light wings; leave it out where the source of the samples leaves it out.",
     )
     start: Start | None = Field(default=None, description='Needed for `model.start = "given"`.')
+    trim_drive: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,49}$")] | None = Field(
+        default=None,
+        description="A drive (`incidence_left`), or a word for both sides (`incidence`), whose angle "
+        "balances the pitching moment in trim. It holds that angle; a history given for it counts from its "
+        "first value as an increment. Default: a constant moment balances. Not used from a given start.",
+    )
 
     @property
     def mach_number(self) -> float | None:

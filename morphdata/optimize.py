@@ -22,7 +22,13 @@ from morphdata.options import LIMITS, MODEL, MORPH, SEARCH, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, flown_with
 from morphdata.search import SwarmSearch
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    moved_trim_faults,
+    start_faults,
+    trim_drive_faults,
+)
 from morphdata.warnings import Warnings
 
 LONGEST_MORPH_S = 100.0
@@ -292,6 +298,7 @@ class OptimizeRequest(Request):
     def faults(self) -> Iterator[Fault]:
         """Check aircraft, model and morph together, and the size of the search."""
         yield from start_faults(self.flight, flown_with(self.model).start)
+        yield from trim_drive_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
         yield from self._hinge_faults()
@@ -316,6 +323,7 @@ class OptimizeRequest(Request):
         except InvalidInput as error:
             yield from error.faults
             return
+        yield from moved_trim_faults(self.flight, flown_with(self.model).start, moved)
         for name in ("initial_rad", "final_rad"):
             angle, at = getattr(self.morph, name), f"/morph/{name}"
             yield from islice(filter(None, (drives[each].fault(angle, at) for each in moved)), 1)

@@ -20,7 +20,7 @@ from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults
+from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
 from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
@@ -115,6 +115,7 @@ class SimulateRequest(Request):
     def faults(self) -> Iterator[Fault]:
         """Check that the flight can start, its drives stay in range, and its length is permitted."""
         yield from start_faults(self.flight, flown_with(self.model).start)
+        yield from trim_drive_faults(self.aircraft, self.flight)
         yield from self.schedules.drive_faults(self.aircraft.drives)
         if not MIN_ROWS <= self.rows <= MAX_ROWS:
             yield Fault(
@@ -162,6 +163,9 @@ class TrimState(Result):
     alpha_rad: float
     force_b_n: list[float]
     moment_b_n_m: list[float]
+    drives_rad: dict[str, float] | None = Field(
+        default=None, description="Angles found for the flight's `trim_drive`; absent without one."
+    )
 
 
 class SimulatedTrajectory(Result):

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
+from morphdata.drives import without_side
 from morphdata.faults import Fault
 from morphdata.flight import Flight
 from morphdata.parameters import Parameters
@@ -27,6 +28,38 @@ def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
             'model.start is "given", but the flight has no start.',
             "/flight/start",
             'Give alpha_rad, force_b_n and moment_b_n_m, or use model.start = "trim".',
+        )
+
+
+def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
+    """Check that the aircraft has the drives that the flight is to be trimmed with."""
+    name, drives = flight.trim_drive, aircraft.drives
+    if name is not None and name not in drives and name not in map(without_side, drives):
+        yield Fault(
+            "no_such_drive",
+            f"The aircraft has no drive {name!r} to trim with.",
+            "/flight/trim_drive",
+            f"Its drives are {', '.join(drives)}." if drives else "It has no drives: omit trim_drive.",
+        )
+
+
+def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -> Iterator[Fault]:
+    """Check that no morph moves the drive with which its flights are trimmed.
+
+    Parameters
+    ----------
+    start : str or None
+        Requested start of the flight; a given one is not trimmed.
+    moved : sequence of str
+        Names of the drives that the morph moves.
+    """
+    both = [name for name in moved if flight.trim_drive in (name, without_side(name))]
+    if both and start != "given":
+        yield Fault(
+            "morph_of_trim_drive",
+            f"The morph moves {both[0]!r}, with which the flight is trimmed.",
+            "/flight/trim_drive",
+            "Trim with another drive, or omit trim_drive.",
         )
 
 

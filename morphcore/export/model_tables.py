@@ -49,7 +49,7 @@ from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges, link_masses
 from morphcore.models.soft_joints import chain_obstacle
-from morphcore.simulate.plan import flight_plan
+from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trim import StartMode, Trim, trim
@@ -68,10 +68,14 @@ def reference_trim(chain: ChainModel, batch: ParameterBatch, start: StartMode) -
     TrimNotFound
         There is no such flight.
     """
-    held = [Hold(hinge.angle_rad) for hinge in chain.aircraft.hinges]
-    plan = flight_plan(chain, held, time_grid(STEP_S * np.arange(3)))
+    plan = _reference_plan(chain, start)
     with naming_obstacles(lambda: chain_obstacle(chain, batch)):
         return trim(chain, batch, plan, start=start).require()
+
+
+def _reference_plan(chain: ChainModel, start: StartMode) -> FlightPlan:
+    held = [Hold(hinge.angle_rad) for hinge in chain.aircraft.hinges]
+    return flight_plan(chain, held, time_grid(STEP_S * np.arange(3)), start=start)
 
 
 def model_tables(file: ModelFile, chain: ChainModel, batch: ParameterBatch, found: Trim) -> Tables:
@@ -92,7 +96,7 @@ def model_tables(file: ModelFile, chain: ChainModel, batch: ParameterBatch, foun
             "centre_of_mass_m": np.array(chain.aircraft.fuselage.centre_of_mass_B),
             "inertia_kg_m2": np.array(chain.aircraft.fuselage.inertia_B),
         },
-        "trim": _trim(chain, found),
+        "trim": _trim(chain, found, _reference_plan(chain, file.model.start or "trim").angles[0]),
     }
 
 
@@ -193,7 +197,7 @@ def _hinges(aircraft: Aircraft) -> Table:
     }
 
 
-def _trim(chain: ChainModel, found: Trim) -> Table:
+def _trim(chain: ChainModel, found: Trim, angles: Array) -> Table:
     flight = chain.flight
     return {
         "airspeed_m_s": np.array(flight.airspeed_m_s),
@@ -203,5 +207,5 @@ def _trim(chain: ChainModel, found: Trim) -> Table:
         "force_n": found.force_B[0],
         "moment_nm": found.moment_B[0],
         "joint_rad": found.q_joint[0].reshape(-1, 3),
-        "hinge_rad": np.array([hinge.angle_rad for hinge in chain.aircraft.hinges]),
+        "hinge_rad": angles.copy(),
     }

@@ -89,7 +89,10 @@ class Start:
 
 @dataclass(frozen=True, repr=False)
 class Flight(Shown):
-    """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s."""
+    """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s.
+
+    ``trim_drive`` names the drives that balance the pitching moment in trim.
+    """
 
     airspeed_m_s: float
     air_density_kg_m3: float
@@ -99,6 +102,7 @@ class Flight(Shown):
     mach: float | None
     start: Start | None
     apparent_mass: bool = False
+    trim_drive: str | None = None
 
     @classmethod
     def of(cls, document: FlightDocument) -> Flight:
@@ -115,6 +119,7 @@ class Flight(Shown):
             if start is None
             else Start(start.alpha_rad, _vector(start.force_b_n), _vector(start.moment_b_n_m)),
             apparent_mass=document.apparent_mass,
+            trim_drive=document.trim_drive,
         )
 
     @property

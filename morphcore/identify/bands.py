@@ -109,7 +109,9 @@ def predict_bands(
     if belief.space is None:
         return ()
     step_s = () if settings.step_s is None else (settings.step_s,)
-    cases = sample_cases(result.model, samples, *step_s, separate_wings=settings.separate_wings)
+    cases = sample_cases(
+        result.model, samples, *step_s, separate_wings=settings.separate_wings, start=settings.start
+    )
     return bands_of_cases(result.model, belief, cases, settings.start, draws=draws, seed=seed)
 
 

@@ -111,6 +111,7 @@ def sample_cases(
     *,
     separate_wings: bool = False,
     whole: Sequence[bool] = (),
+    start: StartMode = "trim",
 ) -> tuple[SampleCase, ...]:
     """Plans for all samples, for models whose wings share their parameters or have ``separate_wings``.
 
@@ -124,6 +125,7 @@ def sample_cases(
                 sample_schedules(model.aircraft, sample, f"{pointer}/{i}"),
                 time_grid(sample.time_s, longest_step_s),
                 may_halve=not (separate_wings or any(whole[i : i + 1])),
+                start=start,
             ),
         )
         for i, sample in enumerate(samples)

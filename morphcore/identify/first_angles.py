@@ -91,5 +91,5 @@ def _trimmed(
     still: Trajectory = replace(sample, time_s=time_s, drives=drives, unreadable={})
     schedules = sample_schedules(model.aircraft, still, "")
     flown = case.plan.flown(model)
-    plan = flight_plan(model, schedules, time_grid(time_s), may_halve=case.plan.halved)
+    plan = flight_plan(model, schedules, time_grid(time_s), may_halve=case.plan.halved, start=start)
     return trim(flown, batch, plan, start=start)

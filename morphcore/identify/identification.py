@@ -175,6 +175,7 @@ class Identification:
                 self.step_s,
                 separate_wings=self.settings.separate_wings,
                 whole=whole,
+                start=self.settings.start,
             )
         numbered = enumerate(zip(self._plans[whole], openness, strict=True))
         with one_blas_thread():

@@ -208,7 +208,13 @@ def flown_guess(run: Identification, sample: Trajectory, step_s: float | None = 
     """Attitudes (k, 3) of the physical guess along a sample; None where it cannot fly it."""
     step_s = run.step_s if step_s is None else step_s
     try:
-        cases = sample_cases(run.model, [sample], step_s, separate_wings=run.settings.separate_wings)
+        cases = sample_cases(
+            run.model,
+            [sample],
+            step_s,
+            separate_wings=run.settings.separate_wings,
+            start=run.settings.start,
+        )
         batch = run.space.decode(run.space.guess[None, :])
         ((case, found),) = shared_trims(run.model, batch, cases, run.settings.start)
         flown = fly_attitudes(run.model, batch, case, found)[0]

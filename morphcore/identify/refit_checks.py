@@ -159,6 +159,7 @@ def _continued(
             [replace(sample, drives=drives)],
             run.step_s,
             separate_wings=run.settings.separate_wings,
+            start=run.settings.start,
         )
     except InvalidInput:  # beyond the range of a hinge, where no drive went
         return None

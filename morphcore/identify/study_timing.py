@@ -97,11 +97,13 @@ def flight_timing(
     first = next(flown for flown in models if flown is not None)[0]
     flight = timed_flight(first.aircraft, samples)
     # a plan knows the lattice and the hinges, not the links: all models of one step fly the same one
-    cases = {step_s: sample_cases(first, [flight], step_s)[0] for step_s in dict.fromkeys(steps_s)}
+    cases = {
+        step_s: sample_cases(first, [flight], step_s, start=start)[0] for step_s in dict.fromkeys(steps_s)
+    }
     timing = FlightTiming(tuple(cases[step_s] for step_s in steps_s), tuple(models), start, clock, 0.0)
     timing.round()
     begin = clock()
-    sample_cases(first, [flight], steps_s[0])
+    sample_cases(first, [flight], steps_s[0], start=start)
     return replace(timing, plan_s=clock() - begin)
 
 

@@ -129,6 +129,19 @@ class ChainModel(Shown):
         images = tuple(every[k] for k in self.mirror.image)
         return _chain_model(own, self.flight, self.links_per_wing, self.lattice.settings, images)
 
+    @cached_property
+    def rigid(self) -> ChainModel:
+        """The rigid model of the same aircraft (or half of one) in the same flight."""
+        if self.links_per_wing == 1:
+            return self
+        lattice = self.lattice
+        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images)
+
+    @cached_property
+    def starts(self) -> dict[bytes, tuple[float, float | None]]:
+        """Angle of attack and trim drive, rad, that were found by first angles: see simulate/wake.py."""
+        return {}
+
     @property
     def links(self) -> int:
         """Number of links of all surfaces."""

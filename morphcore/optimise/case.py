@@ -78,7 +78,10 @@ class MorphCase:
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
         ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
-        return common_path(self.chain("rigid")[0], *ends, drives=self.drives, may_halve=self.is_even)
+        return common_path(
+            self.chain("rigid")[0], *ends, drives=self.drives, may_halve=self.is_even, start=self.start,
+            initial_rad=morph.initial_rad,
+        )  # fmt: skip
 
     @property
     def drives(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, t
 from morphcore.models.kernels.layout import JOINTS, state_rows
 from morphcore.simulate.kernels.batch import fly, rates_of_blocks
 from morphcore.simulate.kernels.step import SLOPES
-from morphcore.simulate.plan import FlightPlan
 from morphcore.stopping import Stop, check_stop
 from morphcore.threads import in_threads, thread_count
+
+if TYPE_CHECKING:
+    from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
 

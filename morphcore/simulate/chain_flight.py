@@ -46,7 +46,9 @@ def chain_flight(
     at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
     `flight.simulate`.
     """
-    plan = flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch))
+    plan = flight_plan(
+        model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch), start=start
+    )
     flown = plan.flown(model)
     found = trim(flown, batch, plan, start=start).require()
     constants = lane_constants(flown, batch, grid.step_s)

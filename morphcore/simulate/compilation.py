@@ -60,7 +60,9 @@ def fly_tiny(particles: int = ALONE) -> None:
     """Fly a small model ``particles`` times at once, which compiles or loads the kernels for that width."""
     aircraft, flight = tiny_aircraft()
     model = chain_model(aircraft, flight, 2, SMALL)
-    plan = flight_plan(model, [Hold()] * len(aircraft.hinges), time_grid(np.linspace(0.0, 0.03, 4)))
+    plan = flight_plan(
+        model, [Hold()] * len(aircraft.hinges), time_grid(np.linspace(0.0, 0.03, 4)), wake_alpha=0.0
+    )
     batch = physical_guess(model).select(np.zeros(particles, dtype=np.int64))
     constants = lane_constants(model, batch, plan.grid.step_s)
     state = np.zeros((particles, model.state_rows))

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
-from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, hinge_path, set_in_motion
-from morphcore.simulate.flexible_trim import trim_flexible
+from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, set_in_motion
+from morphcore.simulate.flexible_start import start_flexible
 from morphcore.simulate.kernels.flexible_step import RECORD
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
@@ -46,10 +46,9 @@ def flexible_flight(
     wind_N = (
         np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
     )
-    path = hinge_path(model, schedules, grid)
     flight = FlexibleFlight(model)
     with one_blas_thread():
-        trim = trim_flexible(flight, path, wind_N[0], start=start)
+        path, trim = start_flexible(flight, schedules, grid, wind_N[0], start)
     flight.thrust = np.concatenate([trim.moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
     run = FlexibleRun(flight, path, grid, wind_N, begin)

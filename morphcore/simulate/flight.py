@@ -36,6 +36,7 @@ from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
+from morphcore.simulate.wake import trim_columns
 from morphcore.stopping import Stop
 from morphcore.validity import (
     ResultWarning,
@@ -44,6 +45,7 @@ from morphcore.validity import (
     light_wing_warnings,
     overlap_warnings,
     steep_warning,
+    trim_warnings,
 )
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
@@ -77,6 +79,8 @@ class Simulation(Shown):
         Where the flight left the method's range of validity.
     start_tips_z : mapping of str to float
         By side, the tip of its first hinged surface at the start, m below its root.
+    trim_drives : mapping of str to float
+        Angles, rad, of the flight's trim drive at the start; empty without one.
     """
 
     trajectory: Trajectory
@@ -84,13 +88,15 @@ class Simulation(Shown):
     step_s: float
     warnings: tuple[ResultWarning, ...] = ()
     start_tips_z: Mapping[str, float] = field(default_factory=dict)
+    trim_drives: Mapping[str, float] = field(default_factory=dict)
 
     def summary(self) -> Summary:
         """The start of the flight, and the range of its attitude."""
         flown = self.trajectory
         return Summary(
             f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
-            {"angle of attack at the start, rad": self.trim.alpha},
+            {"angle of attack at the start, rad": self.trim.alpha}
+            | {f"{name} in trim, rad": np.array([angle]) for name, angle in self.trim_drives.items()},
             ("", "from", "to"),
             [
                 [f"{name}, rad", values.min(), values.max()]
@@ -251,8 +257,11 @@ def flight_steps(  # noqa: PLR0913 - as above
                 columns = channel_columns(wanted, record, aircraft, flight)
                 trajectory = recorded_trajectory(aircraft, times, record, columns)
                 warnings = _warnings(aircraft, flight, times, record, smooth)
+                drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
+                if start == "trim":
+                    warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0]))
                 tips = _start_tips(aircraft, record)
-                yield FlightStep(1.0, Simulation(trajectory, record.trim, longest_s, warnings, tips))
+                yield FlightStep(1.0, Simulation(trajectory, record.trim, longest_s, warnings, tips, drives))
 
 
 def _warnings(
@@ -282,6 +291,12 @@ def _is_one_of(channels: Mapping[str, Array], title: str) -> bool:
 def _cell(value: float) -> str:
     """Nine digits, or nothing for a gap of a measured channel."""
     return "" if math.isnan(value) else f"{value:.9g}"
+
+
+def _trim_angles(aircraft: Aircraft, flight: Flight, record: FlightRecord) -> dict[str, float]:
+    """Angles of the trim drive at the start, rad, by name."""
+    columns = trim_columns(aircraft, flight.trim_drive)
+    return {aircraft.hinges[k].drive: float(record.angles[0, k]) for k in columns}
 
 
 def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:

@@ -19,7 +19,16 @@ from morphcore.multibody.kernels.hinge import H_ORIGIN, H_ROTATION, H_TWIST, HIN
 from morphcore.shown import Shown
 from morphcore.simulate.operator_table import OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
-from morphcore.simulate.time_grid import TimeGrid
+from morphcore.simulate.time_grid import STEP_S, TimeGrid
+from morphcore.simulate.trim import StartMode
+from morphcore.simulate.wake import (
+    NominalStart,
+    nominal_start,
+    refuse_moved_trim,
+    trim_columns,
+    trimmed_schedules,
+    wake_direction,
+)
 
 Array = NDArray[np.float64]
 
@@ -143,19 +152,28 @@ def flight_plan(
     air_velocity_N: Callable[[Array], Array] | None = None,
     node_spacing_rad: float = NODE_SPACING_RAD,
     may_halve: bool = False,
+    start: StartMode = "trim",
+    wake_alpha: float | None = None,
 ) -> FlightPlan:
     """Prepare a flight: one schedule for each of the aircraft's hinges.
+
+    The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad; None: that of the start
+    at the first hinge angles (`wake.nominal_start`), where also the trim drive is. With ``wake_alpha`` or
+    ``start="given"`` all drives follow their schedules.
 
     With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
     plan is for half of it: ``plan.flown(model)`` is the model to fly, provided that both wings have the same
     parameters.
     """
     times = grid.halves_s
+    if wake_alpha is None:
+        begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
+        schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
     motion = _motion(schedules, times)
     if may_halve and air_velocity_N is None:
         model, motion = _halved(model, motion)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
-    table = _operator_table(model, motion.angles, node_spacing_rad)
+    table = _operator_table(model, motion.angles, node_spacing_rad, wake_alpha)
     return _plan(model, grid, motion, table, wind_N)
 
 
@@ -181,6 +199,17 @@ def _motion(schedules: Sequence[Schedule], times: Array) -> _Motion:
     return _Motion(*of_hinges)
 
 
+def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart:
+    """The start (`wake.nominal_start`) of a plan whose schedules begin at angles (h,), rad."""
+    return nominal_start(model, angles, start, _instant)
+
+
+def _instant(model: ChainModel, angles: Array, wake_alpha: float) -> FlightPlan:
+    """A plan of one short step with everything held at angles (h,), rad."""
+    held = [Hold(float(angle)) for angle in angles]
+    return flight_plan(model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha)
+
+
 @dataclass(frozen=True)
 class CommonPath:
     """Some drives of an aircraft at a common angle: the lattice over a range of it, for schedules within it.
@@ -190,7 +219,7 @@ class CommonPath:
 
     low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
     hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
-    as in ``FlightPlan``.
+    as in ``FlightPlan``. begin : the start for which the lattice was tabulated.
     """
 
     low_rad: float
@@ -199,6 +228,7 @@ class CommonPath:
     matrices: Array
     strips: Array
     halved: bool
+    begin: NominalStart
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies the plans: the given one, or one half of it."""
@@ -228,6 +258,7 @@ class CommonPath:
         table = OperatorTable(self.matrices, self.strips, position)
         flown = self.flown(model)
         schedules = path_schedules(flown.aircraft, self.drives, schedule)
+        schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
         return _plan(flown, grid, _motion(schedules, grid.halves_s), table)
 
 
@@ -239,19 +270,38 @@ def common_path(
     *,
     drives: Sequence[str] | None = None,
     may_halve: bool = False,
+    start: StartMode = "trim",
+    wake_alpha: float | None = None,
+    initial_rad: float | None = None,
 ) -> CommonPath:
     """Tabulate the lattice for some drives together between two angles, the others at their held angles.
 
-    drives : names; None: all. may_halve : as in ``flight_plan``.
+    drives : names; None: all. may_halve, start, wake_alpha : as in ``flight_plan``. initial_rad : the angle
+    at which flights begin; None: ``low_rad``.
+
+    Raises
+    ------
+    InvalidInput : the trim drive is among the path's drives.
     """
     chosen = None if drives is None else tuple(drives)
     path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
     angles = path_angles(model.aircraft, chosen, path)
     motion = _Motion(angles, np.zeros_like(angles), np.zeros_like(angles))
+    begin = NominalStart(wake_alpha) if wake_alpha is not None else None
+    if begin is None:
+        refuse_moved_trim(model, [_moves(hinge, chosen) for hinge in model.aircraft.hinges], start)
+        first = path_angles(
+            model.aircraft, chosen, np.array([low_rad if initial_rad is None else initial_rad])
+        )
+        begin = start_at(model, first[0], start)
+        if begin.drive_rad is not None:
+            angles[:, trim_columns(model.aircraft, model.flight.trim_drive)] = begin.drive_rad
     if may_halve:
         model, motion = _halved(model, motion)
-    mach = model.flight.mach or 0.0
-    operators = [lattice_operator(model.lattice, tuple(row), mach=mach) for row in motion.angles]
+    mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha)
+    operators = [
+        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake) for row in motion.angles
+    ]
     return CommonPath(
         low_rad,
         high_rad,
@@ -259,6 +309,7 @@ def common_path(
         np.stack([item.matrix for item in operators]),
         np.stack([item.strips for item in operators]),
         bool(model.lattice.images),
+        begin,
     )
 
 
@@ -363,15 +414,15 @@ def _nodes(length_rad: float, spacing_rad: float) -> int:
     return max(4, int(np.ceil(length_rad / spacing_rad)) + 1)
 
 
-def _operator_table(model: ChainModel, angles: Array, spacing: float) -> OperatorTable:
-    mach = model.flight.mach or 0.0
+def _operator_table(model: ChainModel, angles: Array, spacing: float, wake_alpha: float) -> OperatorTable:
+    mach, wake = model.flight.mach or 0.0, wake_direction(wake_alpha)
     moved = np.abs(np.diff(angles, axis=0))
     # a surface turns by no more than all its hinges together
     turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
     travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
 
     def operator(row: Array) -> LatticeOperator:
-        return lattice_operator(model.lattice, tuple(row), mach=mach)
+        return lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake)
 
     if travelled[-1] < 1e-9:
         operators = [operator(angles[0])]

@@ -66,6 +66,7 @@ class SimulationResult(Shown):
                 "alpha_rad": float(trim.alpha[0]),
                 "force_b_n": trim.force_B[0].tolist(),
                 "moment_b_n_m": trim.moment_B[0].tolist(),
+                **({"drives_rad": dict(self.simulation.trim_drives)} if self.simulation.trim_drives else {}),
                 "tip_z_m": {side: self.simulation.start_tips_z.get(side) for side in SIDES},
             },
             "trajectory": trajectory_document(flown),

@@ -74,7 +74,9 @@ def choose_step(
 
     def plan(schedules: Sequence[Schedule], grid: TimeGrid) -> FlightPlan:
         check_stop(stop)
-        return flight_plan(model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=may_halve)
+        return flight_plan(
+            model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=may_halve, start=start
+        )
 
     tried = [
         _Tried(model, batch, schedules, np.asarray(times, dtype=np.float64), candidates_s, start, plan, stop)

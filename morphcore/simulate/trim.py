@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from morphcore.models.kernels.layout import FORCE_C, JOINTS, OMEGA
 from morphcore.models.kinematics import link_poses
 from morphcore.shown import Shown
 from morphcore.simulate.batch import initial_state, state_rates
-from morphcore.simulate.plan import FlightPlan
+
+if TYPE_CHECKING:  # a plan is made for a trim (see wake.py)
+    from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
 StartMode = Literal["trim", "given"]

@@ -40,9 +40,9 @@ SINKING = (0.0, 0.0, 0.0, 150.0, 8.0, 9.0)  # uniform incidence, with sideslip
 
 
 def settled(model, batch, angles, twist_B):
-    """A plan with hinges at rest, and a state of that motion whose lag has settled."""
+    """A plan with hinges at rest and the wake along x of B, and a state of that motion, its lag settled."""
     angles = np.asarray(angles)
-    plan = instant(model, np.stack([angles, 0.0 * angles, 0.0 * angles], axis=1))
+    plan = instant(model, np.stack([angles, 0.0 * angles, 0.0 * angles], axis=1), wake_alpha=0.0)
     state = initial_state(
         quaternion=np.array([[1.0, 0.0, 0.0, 0.0]]),
         omega_B=np.array([twist_B[:3]]),

@@ -182,10 +182,12 @@ def random_state(rng: np.random.Generator, model: ChainModel, particles: int, *,
     return state
 
 
-def instant(model: ChainModel, hinges: ArrayLike, *, step_s: float = 0.005) -> FlightPlan:
+def instant(
+    model: ChainModel, hinges: ArrayLike, *, step_s: float = 0.005, wake_alpha: float | None = None
+) -> FlightPlan:
     """A plan of one step at whose start the hinges have given (angle, rate, acceleration), (h, 3)."""
     schedules = [Parabola(*row) for row in np.asarray(hinges, dtype=np.float64)]
-    return flight_plan(model, schedules, TimeGrid(0.0, step_s, 1, None))
+    return flight_plan(model, schedules, TimeGrid(0.0, step_s, 1, None), wake_alpha=wake_alpha)
 
 
 def random_hinges(rng: np.random.Generator, model: ChainModel) -> Array:

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_TWIST
-from morphcore.simulate.plan import common_path, flight_plan
+from morphcore.simulate.plan import common_path, flight_plan, start_at
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.time_grid import STEP_S, time_grid
+from morphcore.simulate.wake import wake_direction
 from tests.geometry.rehinged import fixed
 from tests.models.chains import Parabola, odd_aircraft, small_model
 from tests.simulate.flights import example_model, fly_trimmed, sample, sample_plan, sample_schedules
@@ -52,9 +53,10 @@ def table_error(model, schedules, duration_s):
     """Largest error of the interpolated operators, relative to the largest element of each kind of row."""
     plan = flight_plan(model, schedules, time_grid(np.linspace(0.0, duration_s, 41), duration_s / 40))
     worst = 0.0
+    wake = wake_direction(start_at(model, plan.angles[0], "trim").alpha)
     for row in range(plan.grid.steps + 1):
         matrices, strips = plan.table.between(row, row + 1)
-        exact = lattice_operator(model.lattice, plan.angles[row])
+        exact = lattice_operator(model.lattice, plan.angles[row], wake_direction_B=wake)
         worst = max(worst, float(np.abs(strips[0] - exact.strips).max()))
         for kind in range(5):
             found, right = matrices[0, kind:-4:5], exact.matrix[kind:-4:5]
@@ -157,7 +159,8 @@ def test_a_common_path_gives_the_plans_of_single_schedules():
     grid = time_grid(np.linspace(0.0, 2.0, 41))
     schedules = [ConstantRate(0.0, 1.0, 1.5), ConstantRate(1.0, 0.2, 1.0), Hold(0.4)]
     for schedule in schedules:
-        alone, shared = flight_plan(model, [schedule, schedule], grid), path.plan(model, schedule, grid)
+        alone = flight_plan(model, [schedule, schedule], grid, wake_alpha=path.begin.alpha)
+        shared = path.plan(model, schedule, grid)
         assert shared.table.matrices is path.matrices
         for name in ("angles", "rates", "accelerations", "hinges", "wind_N"):
             np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
