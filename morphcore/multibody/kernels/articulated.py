@@ -20,7 +20,7 @@ from morphcore.lanes import not_in_lanes
 # rows of a link's constants: its mass properties (mass, m x, m y, Ixx, Iyy, Izz, Ixy) and the offset of its
 # joint along y; then the aerodynamic rows, named in aero/kernels/loads.py
 L_MASS, L_OFFSET = 0, 7
-LINK_ROWS = 16
+LINK_ROWS = 22
 
 
 @inlined
