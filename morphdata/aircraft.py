@@ -195,6 +195,17 @@ class Surface(Document):
         description="Line of the sections' centres of mass aft of mid-chord, m; negative: forward of it.",
     )
     profile_drag: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
+    zero_lift_rad: Annotated[float, Field(ge=-0.35, le=0.35)] = Field(
+        default=0.0,
+        description="Zero-lift angle of attack of the sections, rad; negative for positive camber.",
+    )
+    cm0: Annotated[float, Field(ge=-0.5, le=0.5)] = Field(
+        default=0.0,
+        description="Moment coefficient of the sections about their aerodynamic centre, nose up positive.",
+    )
+    twist_rad: Annotated[float, Field(ge=-0.5, le=0.5)] = Field(
+        default=0.0, description="Twist of the tip against the root, rad, nose up positive; linear."
+    )
     hinge: Hinge | None = Field(default=None, description="A single hinge; use `hinges` for several.")
     hinges: Annotated[list[Hinge], Field(min_length=1, max_length=MAX_HINGES)] | None = Field(
         default=None,

@@ -28,7 +28,11 @@ class Identifiable:
     value : type, optional
         For an aerodynamic correction, its type in a model's ``aero`` object; None: not a correction.
     default : float, optional
-        Value of a correction that a document omits; None: required.
+        Value of a correction that a document omits; None: required, or `own_default`.
+    own_default : bool
+        Whether a document may omit it, which leaves it as the aircraft has it.
+    on_request : bool
+        Whether it is searched only where a request lists it or gives its bounds.
     value_description : str, optional
         Of a correction's value.
     """
@@ -40,6 +44,8 @@ class Identifiable:
     bounds_description: str | None = None
     value: Any = None
     default: float | None = None
+    own_default: bool = False
+    on_request: bool = False
     value_description: str | None = None
 
 
@@ -60,9 +66,32 @@ IDENTIFIABLE: list[Identifiable] = [
     ),
     Identifiable("profile_drag", 0.0, 2.0, value=Annotated[float, Field(ge=0.0, le=10.0)]),
     Identifiable("lag_s", 0.0, 10.0, positive=True, value=Annotated[float, Field(ge=0.0, le=100.0)]),
+    Identifiable(
+        "zero_lift_rad",
+        -0.35,
+        0.35,
+        value=Annotated[float, Field(ge=-0.35, le=0.35)],
+        own_default=True,
+        on_request=True,
+        value_description="Zero-lift angle of attack of the sections; left out: the aircraft's.",
+    ),
+    Identifiable(
+        "cm0",
+        -0.5,
+        0.5,
+        value=Annotated[float, Field(ge=-0.5, le=0.5)],
+        own_default=True,
+        on_request=True,
+        value_description="Moment coefficient of the sections, nose up positive; left out: the aircraft's.",
+    ),
 ]
 
 
 def corrections() -> tuple[str, ...]:
     """Return the names of the aerodynamic corrections."""
     return tuple(each.name for each in IDENTIFIABLE if each.value is not None)
+
+
+def on_request() -> tuple[str, ...]:
+    """Return the names of the corrections that are searched only where a request names them."""
+    return tuple(each.name for each in IDENTIFIABLE if each.on_request)

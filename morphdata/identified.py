@@ -61,6 +61,14 @@ class AeroCorrections(Result):
     )
     profile_drag: float
     lag_s: float
+    zero_lift_rad: float | None = Field(
+        default=None,
+        description="Zero-lift angle of attack of the sections; null in results of earlier versions.",
+    )
+    cm0: float | None = Field(
+        default=None,
+        description="Moment coefficient of the sections, nose up; null in results of earlier versions.",
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
@@ -46,9 +46,10 @@ else:  # type checkers cannot use fields from a list
         __doc__="Aerodynamic corrections of an equivalent model.",
         **{
             each.name: (
-                each.value,
+                each.value | None if each.own_default else each.value,
                 Field(
-                    default=... if each.default is None else each.default, description=each.value_description
+                    default=... if each.default is None and not each.own_default else each.default,
+                    description=each.value_description,
                 ),
             )
             for each in IDENTIFIABLE
@@ -64,6 +65,10 @@ class SurfaceParameters(Document):
     stiffness_nm_rad: Joints
     damping_nms_rad: Joints
     profile_drag: Annotated[float, Field(ge=0.0, le=10.0)]
+    zero_lift_rad: Annotated[float, Field(ge=-0.35, le=0.35)] | None = Field(
+        default=None, description="Left out: the aircraft's, which is for all surfaces or none."
+    )
+    cm0: Annotated[float, Field(ge=-0.5, le=0.5)] | None = Field(default=None, description="The same.")
 
 
 class MirroredParameters(Document):
@@ -122,6 +127,7 @@ class Parameters(Document):
         """Check that the lists match the number of links and the shares add up to the whole span."""
         yield from _structure_faults(self, self.links_per_wing)
         surfaces = self.surfaces or {}
+        yield from _own_default_faults(self.aero, surfaces)
         for name, own in surfaces.items():
             at = f"/surfaces/{escaped(name)}"
             if isinstance(own, SurfaceParameters):
@@ -133,6 +139,26 @@ class Parameters(Document):
                     f"{at}/mirror_of",
                     "Name a surface with its own parameters.",
                 )
+
+
+def _own_default_faults(aero: Document, surfaces: Mapping[str, Document]) -> Iterator[Fault]:
+    """Check that what a surface may leave to the aircraft is given for all surfaces, or for none."""
+    for each in IDENTIFIABLE:
+        if not (each.own_default and each.name in SurfaceParameters.model_fields):
+            continue
+        of = {
+            name: getattr(own, each.name)
+            for name, own in surfaces.items()
+            if isinstance(own, SurfaceParameters)
+        }
+        lacking = [name for name, value in of.items() if value is None]
+        if lacking and (len(lacking) < len(of) or getattr(aero, each.name) is not None):
+            yield Fault(
+                "missing",
+                f"{each.name} is given, but not for {lacking[0]!r}.",
+                f"/surfaces/{escaped(lacking[0])}/{each.name}",
+                f"Give {each.name} for each surface with its own parameters, or nowhere.",
+            )
 
 
 def _rows(division: list[float] | list[list[float]]) -> list[list[float]]:

@@ -29,8 +29,9 @@ class Riders:
 
     corner, control, drag : (c,), (r,), (t,) the section that carries each ring corner, control point and
     strip's drag. corner_arm, control_arm, drag_arm : (.., 3) their positions in section axes, m. drag_area :
-    (t,)
-    profile drag coefficient times area, m^2. lag_time : (2, r) both time constants of Jones' function, s.
+    (t,) profile drag coefficient times area, m^2. moment_area : (t,) cm0 times the integral of the chord
+    squared, m^3. slope : (r,) of the mean line, nose up (twist less zero-lift angle). lag_time : (2, r) both
+    time constants of Jones' function, s.
     """
 
     sections: int
@@ -41,6 +42,8 @@ class Riders:
     drag: IntArray
     drag_arm: Array
     drag_area: Array
+    moment_area: Array
+    slope: Array
     lag_time: Array
 
 
@@ -61,6 +64,7 @@ class MovingLattice:
     ) -> None:
         self.parts = lattice_parts(table, riders, core, density, mach)
         self.at = lattice_place(self.parts, riders.sections, table.corners)
+        self.at.slope[:] = riders.slope
         self._rings = table.rings
         self._factors: Any = None  # of `lu_factor`, computed on first use in this place
 
@@ -111,6 +115,7 @@ def lattice_parts(
         drag=riders.drag,
         drag_arm=riders.drag_arm,
         drag_area=riders.drag_area,
+        moment_area=riders.moment_area,
         smoothed=core.law == "smoothed",
         stretch=1.0 / prandtl_glauert(mach),
         density=float(density),

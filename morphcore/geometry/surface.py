@@ -28,7 +28,8 @@ class Surface(Shown):
     +y, the left one -y. As in documents, ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the
     distances of the elastic axis and of the line of centres of mass aft of mid-chord (negative: forward);
     computations in W use ``elastic_axis_x_m`` and ``mass_axis_x_m``. ``hinges`` carry the surface, from the
-    fuselage outward; a fixed surface has none.
+    fuselage outward; a fixed surface has none. The lattice stays flat: ``twist_rad`` (of the tip against the
+    root, nose up) and ``zero_lift_rad`` are slopes of the mean line in its boundary condition.
     """
 
     name: str
@@ -42,6 +43,9 @@ class Surface(Shown):
     position_m: tuple[float, float, float]
     flexible: bool
     profile_drag: float
+    zero_lift_rad: float
+    cm0: float
+    twist_rad: float
     section: Section | None
     elastic_axis_offset_m: float
     mass_axis_offset_m: float
@@ -63,6 +67,9 @@ class Surface(Shown):
             position_m=(x, y, z),
             flexible=document.flexible,
             profile_drag=document.profile_drag,
+            zero_lift_rad=document.zero_lift_rad,
+            cm0=document.cm0,
+            twist_rad=document.twist_rad,
             section=document.section,
             elastic_axis_offset_m=document.elastic_axis_offset_m,
             mass_axis_offset_m=document.mass_axis_offset_m,
@@ -102,6 +109,14 @@ class Surface(Shown):
         """Chord (m) at a distance from the root along the span, shape of the input."""
         fraction = np.asarray(distance_m, dtype=np.float64) / self.span_m
         return self.root_chord_m + (self.tip_chord_m - self.root_chord_m) * fraction
+
+    def twist_at(self, distance_m: ArrayLike) -> Array:
+        """Twist (rad, nose up) of the section at a distance from the root; zero at the root, linear."""
+        return self.twist_rad * np.asarray(distance_m, dtype=np.float64) / self.span_m
+
+    def slope_at(self, distance_m: ArrayLike) -> Array:
+        """Incidence (rad) that twist and camber add to a flat section at a distance from the root."""
+        return self.twist_at(distance_m) - self.zero_lift_rad
 
     def section_at(self, distance_m: ArrayLike) -> SectionProperties:
         """Section properties at distances from the root, shape (stations,)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,17 @@ def _apart(drives: Mapping[str, Array], name: str) -> float:
 
 
 def determined_corrections(
-    parameters: Sequence[Parameter], training: Sequence[Trajectory]
+    parameters: Sequence[Parameter], training: Sequence[Trajectory], bounded: Container[str] = ()
 ) -> tuple[str, ...]:
-    """The corrections among a model's parameters that the flights to fit can tell."""
+    """The corrections among a model's parameters that the flights to fit can tell.
+
+    Those that are searched on request are among them if the request gives their bounds.
+    """
     uneven = any(asymmetric(sample) for sample in training)
-    return tuple(each.name for each in parameters if each.correction and (uneven or not each.asymmetric))
+    return tuple(
+        each.name
+        for each in parameters
+        if each.correction
+        and (uneven or not each.asymmetric)
+        and (each.name in bounded or not each.on_request)
+    )

@@ -117,14 +117,15 @@ class Identification:
             )
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
         free: Sequence[str] | None = self.settings.aero_coefficients
+        bounds = None if self.settings.bounds is None else self.settings.bounds.given()
         if free is None:
             training = [sample for sample in samples.given if sample.role == "train"]
-            free = determined_corrections(self.model.parameters, training)
+            free = determined_corrections(self.model.parameters, training, bounds or ())
         self._first_space: SearchSpace = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
             aero_coefficients=free,
-            bounds=None if self.settings.bounds is None else self.settings.bounds.given(),
+            bounds=bounds,
         )
         # the same with the bounds that the search has widened by now, and the weight that it gives the prior
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2

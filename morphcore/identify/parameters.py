@@ -312,7 +312,7 @@ def search_space(
     separate_wings : bool
         Whether both surfaces of a mirror pair have parameters of their own.
     aero_coefficients : sequence of str, optional
-        The corrections to search; None: all.
+        The corrections to search; None: all, those on request only if they have bounds.
     bounds : mapping of str to (float, float), optional
         Low and high in SI units, by the name of a parameter, in the place of its own.
 
@@ -332,7 +332,11 @@ def search_space(
                 pointer=f"/model/aero_coefficients/{index}",
                 hint=f"use some of {', '.join(corrections)}",
             )
-    chosen = corrections if aero_coefficients is None else current_names(aero_coefficients)
+    chosen = (
+        [p.name for p in model.parameters if p.name in given_bounds or not p.on_request]
+        if aero_coefficients is None
+        else current_names(aero_coefficients)
+    )
     free = tuple(name for name in corrections if name in chosen)
     fixed = physical_guess(model, separate_wings=separate_wings)
     unknowns = []

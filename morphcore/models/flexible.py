@@ -217,8 +217,18 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
         drag=middle,
         drag_arm=middle_W - axis - origin_W[middle],
         drag_area=surface.profile_drag * part.panel_area_m2.sum(axis=0),
+        moment_area=surface.cm0 * _chord_squared(surface, part),
+        slope=np.tile(
+            surface.slope_at(0.5 * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])), part.chordwise
+        ),
         lag_time=semichord / flight.airspeed_m_s / np.array([[JONES_B1], [JONES_B2]]),
     )
+
+
+def _chord_squared(surface: Surface, part: SurfaceLattice) -> Array:
+    """Integral (strips,) of the chord squared over each strip, m^3; exact for linear taper."""
+    inner, outer = surface.chord_at(part.strip_edges_m[:-1]), surface.chord_at(part.strip_edges_m[1:])
+    return np.asarray(np.diff(part.strip_edges_m) * (inner**2 + inner * outer + outer**2) / 3.0)
 
 
 def _joined(parts: list[Riders]) -> Riders:
@@ -240,5 +250,7 @@ def _joined(parts: list[Riders]) -> Riders:
         drag=numbered("drag"),
         drag_arm=stacked("drag_arm"),
         drag_area=stacked("drag_area"),
+        moment_area=stacked("moment_area"),
+        slope=stacked("slope"),
         lag_time=stacked("lag_time"),
     )

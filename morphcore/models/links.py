@@ -128,6 +128,16 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
     return stations, moment / stiffness
 
 
+def twist_slopes(surface: Surface, edges: Array) -> Array:
+    """Rows L_SLOPE to L_TURN_Y (particles, n, 4) of links whose sections are twisted (see `sloped`)."""
+    growth = surface.span_sign * surface.twist_rad / surface.span_m  # along y
+    length = surface.span_sign * np.diff(edges, axis=1)
+    start = surface.twist_at(edges[:, :-1])
+    return np.stack(
+        [start, np.full_like(start, growth), growth * length**2 / 6.0, -(start + growth * length)], axis=-1
+    )
+
+
 def strip_overlap(surface: Surface, lattice: SurfaceLattice, edges: Array) -> tuple[Array, Array]:
     """Share of each strip that lies on each link, and the middle of that share.
 
@@ -151,3 +161,12 @@ def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     chord = surface.chord_at(stations) * 0.5 * length * WEIGHTS
     area = chord.sum(-1)
     return area, surface.span_sign * (chord * (stations - start)).sum(-1) / area
+
+
+def moment_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
+    """Integral of the chord squared (particles, n) over each link in m^3, and the y of its centroid, m."""
+    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
+    stations = start + length * 0.5 * (POINTS + 1)
+    squared = surface.chord_at(stations) ** 2 * 0.5 * length * WEIGHTS
+    total = squared.sum(-1)
+    return total, surface.span_sign * (squared * (stations - start)).sum(-1) / total

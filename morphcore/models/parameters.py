@@ -24,7 +24,11 @@ from morphcore.aero.kernels.loads import (
     L_DRAG_Y,
     L_FAST_WEIGHT,
     L_LIFT,
+    L_MOMENT,
+    L_MOMENT_Y,
+    L_SLOPE,
     L_SLOW_DECAY,
+    L_TURN_Y,
 )
 from morphcore.geometry.aircraft import Flight
 from morphcore.geometry.lattice import SurfaceLattice
@@ -36,7 +40,9 @@ from morphcore.models.links import (
     joint_stiffness,
     link_edges,
     link_masses,
+    moment_areas,
     strip_overlap,
+    twist_slopes,
 )
 from morphcore.models.transforms import Linear, Log, Shares, Transform
 from morphcore.multibody.kernels.articulated import L_APPARENT, L_MASS, L_OFFSET
@@ -65,6 +71,12 @@ LAG_LIMIT_FACTOR = 100.0
 LIFT_LIMITS = (0.3, 2.5)
 CENTRE_LIMIT_CHORDS = 0.5
 DRAG_LIMITS = (0.0, 0.5)
+ZERO_LIFT_RANGE = 0.2  # either way from the aircraft document's, like that of cm0
+ZERO_LIFT_UNIT = 0.02
+ZERO_LIFT_LIMITS = (-0.35, 0.35)
+CM0_RANGE = 0.2
+CM0_UNIT = 0.02
+CM0_LIMITS = (-0.5, 0.5)
 DIVISION_LIMIT_RATIO = 3.0  # of the log-ratios: a share over the last one 20 times smaller or larger
 SHORTEST_LAG_S = 1e-9  # shorter lags are quasi-steady; avoids a division by zero
 
@@ -162,10 +174,14 @@ class Parameter:
         Whether a request may exclude it from the search. Documents list it under ``aero``.
     asymmetric : bool
         Whether only flights with different sides determine it.
+    on_request : bool
+        Whether it is searched only where a request names it, among the corrections or by its bounds.
     factor : bool
         Whether different surfaces share one set of it as factors on their own guesses.
     default : float, optional
-        Value used if a document omits it; None: it is required.
+        Value used if a document omits it; None: it is required, or `own_default`.
+    own_default : bool
+        Whether a document may omit it, which leaves it at the surface's own guess.
     at_bound : mapping of str to str
         Hints for a fit that ends at the "lower" or "upper" bound when widening the bound does not help.
     """
@@ -182,9 +198,11 @@ class Parameter:
     coordinates: Callable[[int], tuple[str, ...]] | None = None
     correction: bool = True
     asymmetric: bool = False
+    on_request: bool = False
     factor: bool = False
     limits: Callable[[CutSurface], tuple[Array, Array]] | None = None
     default: float | None = None
+    own_default: bool = False
     at_bound: Mapping[str, str] = field(default_factory=dict)
 
     def names(self, links: int) -> tuple[str, ...]:
@@ -244,6 +262,8 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
     rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
     rows.links[:, 1:, L_OFFSET] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
     rows.links[:, :, L_DRAG], rows.links[:, :, L_DRAG_Y] = drag_areas(surface, edges)
+    rows.links[:, :, L_SLOPE : L_TURN_Y + 1] = twist_slopes(surface, edges)
+    rows.links[:, :, L_MOMENT], rows.links[:, :, L_MOMENT_Y] = moment_areas(surface, edges)
     weight, middle = strip_overlap(surface, rows.part, edges)
     rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
     is_touched = weight > 0.0
@@ -344,6 +364,15 @@ def _drag(rows: SurfaceRows, coefficient: Array) -> None:
     rows.links[:, :, L_DRAG] *= coefficient[:, None]
 
 
+def _camber(rows: SurfaceRows, zero_lift_rad: Array) -> None:
+    rows.links[:, :, L_SLOPE] -= zero_lift_rad[:, None]
+    rows.links[:, :, L_TURN_Y] += zero_lift_rad[:, None]
+
+
+def _pitch(rows: SurfaceRows, cm0: Array) -> None:
+    rows.links[:, :, L_MOMENT] *= cm0[:, None]
+
+
 def _lag(rows: SurfaceRows, lag_s: Array) -> None:
     weights = lag_weights(lag_s[:, None], rows.step_s)
     weights[..., ::2] **= 0.5  # the step advances the lag states by half steps
@@ -358,6 +387,11 @@ def _jones_lag_s(cut: CutSurface) -> float:
 def _centre_box(cut: CutSurface, range_chords: float) -> tuple[Array, Array]:
     chord = _chord(cut.surface)
     return Linear(CENTRE_UNIT_CHORDS * chord).box(-range_chords * chord, range_chords * chord, 1)
+
+
+def _around(value: float, reach: float, unit: float, limits: tuple[float, float]) -> tuple[Array, Array]:
+    low, high = max(value - reach, limits[0]), min(value + reach, limits[1])
+    return Linear(unit).box(low, high, 1)
 
 
 LIFT_FACTOR = Parameter(
@@ -409,6 +443,33 @@ LAG = Parameter(
     size=_chord,
 )
 
+ZERO_LIFT = Parameter(
+    name="zero_lift_rad",
+    unit="rad",
+    transform=lambda _: Linear(ZERO_LIFT_UNIT),
+    bounds=lambda cut: _around(cut.surface.zero_lift_rad, ZERO_LIFT_RANGE, ZERO_LIFT_UNIT, ZERO_LIFT_LIMITS),
+    guess=lambda cut: np.full(cut.division.shape[0], cut.surface.zero_lift_rad),
+    apply=_camber,
+    limits=lambda _: Linear(ZERO_LIFT_UNIT).box(*ZERO_LIFT_LIMITS, 1),
+    scope="pair",
+    # a biased attitude sensor and a wing mounted askew look alike: whoever knows the section need not search
+    on_request=True,
+    own_default=True,
+)
+
+CM0 = Parameter(
+    name="cm0",
+    unit="1",
+    transform=lambda _: Linear(CM0_UNIT),
+    bounds=lambda cut: _around(cut.surface.cm0, CM0_RANGE, CM0_UNIT, CM0_LIMITS),
+    guess=lambda cut: np.full(cut.division.shape[0], cut.surface.cm0),
+    apply=_pitch,
+    limits=lambda _: Linear(CM0_UNIT).box(*CM0_LIMITS, 1),
+    scope="pair",
+    on_request=True,
+    own_default=True,
+)
+
 # in the order of search coordinates and reports; `division` defines the links that the others write to
 CHAIN_PARAMETERS: list[Parameter] = [
     DIVISION,
@@ -418,4 +479,6 @@ CHAIN_PARAMETERS: list[Parameter] = [
     AC_OFFSET,
     PROFILE_DRAG,
     LAG,
+    ZERO_LIFT,
+    CM0,
 ]

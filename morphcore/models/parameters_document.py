@@ -50,7 +50,11 @@ def parameter_batch(given: Parameters) -> ParameterBatch:
         return np.full(1, getattr(holder, parameter.name, parameter.default), dtype=np.float64)
 
     def sets_of(own: Parameters | SurfaceParameters, holder: Any, wings: int) -> dict[str, Array]:
-        theirs = {p.name: np.tile(correction(holder, p), wings) for p in corrections if p.scope != "aircraft"}
+        theirs = {
+            p.name: np.tile(correction(holder, p), wings)
+            for p in corrections
+            if p.scope != "aircraft" and not (p.own_default and getattr(holder, p.name) is None)
+        }
         return {**_structure(own, wings, links), **theirs}
 
     of_aircraft = {p.name: correction(given.aero, p) for p in corrections if p.scope == "aircraft"}

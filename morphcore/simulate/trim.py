@@ -20,6 +20,7 @@ from morphcore.models.equivalent import (
 )
 from morphcore.models.kernels.layout import FORCE_C, JOINTS, OMEGA
 from morphcore.models.kinematics import link_poses
+from morphcore.models.slopes import sloped_motion
 from morphcore.shown import Shown
 from morphcore.simulate.batch import initial_state, state_rates
 
@@ -108,14 +109,12 @@ def _state(
     # level relative to the air: the wind carries the aircraft along
     wind_B = _to_body(quaternion, plan.wind_N[0])
     R_BL, _ = link_poses(model, batch, plan.hinges[0], q_joint)
-    lag = np.zeros((particles, model.links, 3))
-    lag[..., 0] = np.einsum("pka,pa->pk", R_BL[..., 2], air_B)
     return initial_state(
         quaternion=quaternion,
         omega_B=np.zeros((particles, 3)),
         velocity_B=air_B + wind_B,
         q_joint=q_joint,
-        lag_motion=lag,
+        lag_motion=sloped_motion(model, batch, R_BL, air_B),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from morphdata.aircraft import Surface
 from morphdata.drive_keys import resolved
 from morphdata.drives import SIDES, Hinge, drive_name, shown_drives
-from morphdata.identifiable import corrections
+from morphdata.identifiable import corrections, on_request
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
 from morphdata.operations.descriptor import Operation, after_budget
@@ -68,18 +68,21 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
     """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections.
 
     Every flexible surface has its own, except that mirror images may share theirs; a pair always shares the
-    profile drag.
+    profile drag and the coefficients of its sections.
     """
     model, surfaces = request.model, request.aircraft.surfaces
     groups = _mirror_groups(surfaces)
     if model.aero_coefficients is None:
-        drag = any(_asymmetric(sample) for sample in training)
-        searched = len(corrections()) - 1 + drag
+        bounded = () if model.bounds is None else model.bounds.given()
+        left_out = {name for name in on_request() if name not in bounded}
+        if not any(_asymmetric(sample) for sample in training):
+            left_out.add("profile_drag")
+        searched = [name for name in corrections() if name not in left_out]
     else:
-        drag = "profile_drag" in model.aero_coefficients
-        searched = len(model.aero_coefficients)
+        searched = list(model.aero_coefficients)
+    of_pairs = sum(name in ("profile_drag", *on_request()) for name in searched)
     sets = sum(surface.flexible for surface in surfaces) if model.separate_wings else groups
-    return 7 * (links - 1) * sets + searched + drag * (groups - 1)
+    return 7 * (links - 1) * sets + len(searched) + of_pairs * (groups - 1)
 
 
 def _mirror_groups(surfaces: Sequence[Surface]) -> int:

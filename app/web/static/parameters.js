@@ -7,6 +7,8 @@ const AERO = {
   ac_offset_m: "Aerodynamic-centre offset, m",
   profile_drag: "Profile drag coefficient",
   lag_s: "Circulation lag, s",
+  zero_lift_rad: "Zero-lift angle, rad",
+  cm0: "Section moment coefficient",
 };
 const GROUPS = {
   division: "Share of the span",
@@ -54,7 +56,7 @@ function parameterGroups(model) {
 
 /* A parameter's name for people: "stiffness_nm_rad.joint_1.edgewise" is "stiffness, joint 1, edgewise". */
 function parameterTitle(name) {
-  if (AERO[name]) return AERO[name].replace(/, [ms]$/, "").toLowerCase();
+  if (AERO[name]) return AERO[name].replace(/, (m|s|rad)$/, "").toLowerCase();
   const words = { stiffness_nm_rad: "stiffness", damping_nms_rad: "damping", division: "share of the span", log_ratio: "share of the span" };
   return name.split(".").map((part) => words[part] ?? (/^\d+$/.test(part) ? `link ${part}` : part.replaceAll("_", " "))).join(", ");
 }

@@ -43,7 +43,9 @@ def add_rider_force(R, arm, fx, fy, fz, out):
 def blocked_flow(parts, place, twists, wind_B, out):
     """Normal velocity (r,) that the circulations have to induce at the control points, m/s.
 
-    ``twists`` (k, 6) of the sections in their axes; wind_B (3,).
+    A slope of the mean line tilts the normal (towards -z of the section) aft, to first order, which takes
+    the slope times the velocity along the section's chord. ``twists`` (k, 6) of the sections in their axes;
+    wind_B (3,).
     """
     for p in range(out.size):
         k = parts.control[p]
@@ -52,6 +54,10 @@ def blocked_flow(parts, place, twists, wind_B, out):
         total = 0.0
         for i in range(3):
             total += place.normals[i, p] * (velocity[i] - wind_B[i])
+        slope = place.slope[p]
+        if slope != 0.0:
+            for i in range(3):
+                total -= slope * place.R_BS[k, i, 0] * (velocity[i] - wind_B[i])
         out[p] = total
 
 
@@ -60,8 +66,9 @@ def section_forces(parts, place, gamma, twists, wind_B, still, out):
     """Force vectors (k, 6) on the sections, in their axes, for the acting circulations (r,).
 
     Each bound edge bears density * gamma * velocity x edge, half on each end corner; its middle moves with
-    the mean of its corners. Profile drag of each strip is along the velocity of its middle. ``still`` :
-    tolerance of `induced_velocity`, 0 for exact.
+    the mean of its corners. Profile drag of each strip is along the velocity of its middle; cm0 acts about
+    the span, in the part of that velocity in the section's plane. ``still`` : tolerance of
+    `induced_velocity`, 0 for exact.
     """
     induced_velocity(parts, place, gamma, still)
     for c in range(place.corners.shape[0]):
@@ -97,4 +104,8 @@ def section_forces(parts, place, gamma, twists, wind_B, still, out):
         rider_velocity(place.R_BS[k], twists[k], parts.drag_arm[t], flow)
         u, v, w = wind_B[0] - flow[0], wind_B[1] - flow[1], wind_B[2] - flow[2]
         factor = 0.5 * parts.density * parts.drag_area[t] * sqrt(u * u + v * v + w * w)
-        add_rider_force(place.R_BS[k], parts.drag_arm[t], factor * u, factor * v, factor * w, out[k])
+        R = place.R_BS[k]
+        add_rider_force(R, parts.drag_arm[t], factor * u, factor * v, factor * w, out[k])
+        x = R[0, 0] * u + R[1, 0] * v + R[2, 0] * w
+        z = R[0, 2] * u + R[1, 2] * v + R[2, 2] * w
+        out[k, 1] += 0.5 * parts.density * parts.moment_area[t] * (x * x + z * z)

@@ -19,22 +19,37 @@ from __future__ import annotations
 
 import math
 
-from morphcore.jit import kernel
+from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
 OUTPUTS = 5
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
-# forward)
+# forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
+# (1/m); what the link's yaw rate adds to v_z (m) and to omega_x (see ``sloped``); cm0 times the integral of
+# the chord squared (m^3), and the y of its centroid (m)
 L_DRAG, L_DRAG_Y = 8, 9
 L_SLOW_DECAY, L_SLOW_WEIGHT, L_FAST_DECAY, L_FAST_WEIGHT = 10, 11, 12, 13
 L_LIFT, L_CENTRE = 14, 15
+L_SLOPE, L_SLOPE_Y, L_TURN, L_TURN_Y, L_MOMENT, L_MOMENT_Y = 16, 17, 18, 19, 20, 21
 # Wagner's function by R. T. Jones (1940): 1 - A1 exp(-b1 s) - A2 exp(-b2 s), s in semichords travelled
 JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
 LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
+
+
+@inlined
+def sloped(motion, slope, forward, turned, turn):
+    """A component of the link's motion (v_z, omega_x) with that of its sections' slope added.
+
+    In linear theory a section of slope s meets the normal velocity v_z + y omega_x + u_x s of a flat one,
+    where u_x = ``forward`` - y ``turn`` and s = s0 + s1 y. On a link from 0 to L the product's y^2 is
+    replaced by the line L y - L^2 / 6, of the same integral and moment. The sum is then the motion of a flat
+    link, with v_z + s0 u + s1 L^2 / 6 r and omega_x + s1 u - (s0 + s1 L) r, and lags as such.
+    """
+    return motion + slope * forward + turned * turn
 
 
 @kernel
@@ -55,10 +70,14 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
     if not_in_lanes(previous, lanes) or not_in_lanes(effective, lanes):
         return
     now = 1.0 - JONES_A1 - JONES_A2
+    for l in range(len(lanes)):
+        forward, turn = twist[3, l], twist[2, l]
+        effective[0, l] = sloped(twist[5, l], link[L_SLOPE, l], forward, link[L_TURN, l], turn)
+        effective[1, l] = sloped(twist[0, l], link[L_SLOPE_Y, l], forward, link[L_TURN_Y, l], turn)
+        effective[2, l] = twist[1, l]
     for i in range(3):
-        source = twist[(5, 0, 1)[i]]
         for l in range(len(lanes)):
-            motion = source[l]
+            motion = effective[i, l]
             change = motion - previous[i, l]
             effective[i, l] = link[L_LIFT, l] * (
                 now * motion
@@ -126,11 +145,11 @@ def lane_product(lanes, matrix, inputs, outputs):
 
 @kernel
 def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, sums, wrench):
-    """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, and profile drag.
+    """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, profile drag, cm0.
 
     ``strips`` (n, 3): trailing edge x and circulation centre x of each strip from the link axis, m, and the
     slope dx/dy of the trailing edge. ``sums``: 13 scratch rows. Profile drag is quadratic in the velocity at
-    the link's centre of drag area.
+    the link's centre of drag area; the moment cm0 of the sections in its part in their planes.
     """
     if (
         not_in_lanes(overlap, lanes)
@@ -194,6 +213,8 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         vx, vy, vz = ux - wz * y, uy, uz + wx * y
         drag = -0.5 * density * link[L_DRAG, l] * math.sqrt(vx * vx + vy * vy + vz * vz)
         dx, dy, dz = drag * vx, drag * vy, drag * vz
+        my_x, my_z = ux - wz * link[L_MOMENT_Y, l], uz + wx * link[L_MOMENT_Y, l]
+        my += 0.5 * density * link[L_MOMENT, l] * (my_x * my_x + my_z * my_z)
         wrench[0, l] = mx + y * dz
         wrench[1, l] = my
         wrench[2, l] = mz - y * dx

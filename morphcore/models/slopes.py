@@ -1,0 +1,55 @@
+"""The slope of a chain's sections, twist less zero-lift angle, as part of the motion of its links."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.models.links import link_edges, twist_slopes
+
+Array = NDArray[np.float64]
+
+
+def sloped_motion(model: ChainModel, batch: ParameterBatch, R_BL: Array, air_B: Array) -> Array:
+    """Motion (v_z, omega_x, omega_y) of all links that drives their circulation, without rotation.
+
+    Parameters
+    ----------
+    model : ChainModel
+    batch : ParameterBatch
+        Of p particles.
+    R_BL : ndarray, shape (p, links, 3, 3)
+        Link to body components.
+    air_B : ndarray, shape (p, 3)
+        Velocity of the aircraft through the air in B, m/s.
+
+    Returns
+    -------
+    ndarray, shape (p, links, 3)
+        In link axes, m/s and rad/s; the slope is in the first two as in `aero.kernels.loads.sloped`.
+    """
+    motion = np.zeros((*R_BL.shape[:2], 3))
+    motion[..., 0] = np.einsum("pka,pa->pk", R_BL[..., 2], air_B)
+    for s, surface in enumerate(model.aircraft.surfaces):
+        zero_lift = _zero_lift(model, batch, s)
+        if not (surface.twist_rad or zero_lift.any()):
+            continue
+        first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
+        division = np.ones((batch.particles, 1))
+        if count > 1:
+            division = batch["division"][:, model.set_of(batch)[s]]
+        slopes = twist_slopes(surface, link_edges(division, surface.span_m))
+        mine = slice(first, first + count)
+        forward = np.einsum("pka,pa->pk", R_BL[:, mine, :, 0], air_B)
+        motion[:, mine, 0] += (slopes[..., 0] - zero_lift[:, None]) * forward
+        motion[:, mine, 1] += slopes[..., 1] * forward
+    return motion
+
+
+def _zero_lift(model: ChainModel, batch: ParameterBatch, number: int) -> Array:
+    """Zero-lift angle (p,) of one surface, rad: the batch's, or its own."""
+    surface, known = model.aircraft.surfaces[number], batch.values.get("zero_lift_rad")
+    if surface.flexible and known is not None:
+        return np.asarray(known[:, model.set_of(batch)[number]])
+    return np.full(batch.particles, surface.zero_lift_rad)
