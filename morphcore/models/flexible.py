@@ -79,15 +79,15 @@ def flexible_model(
         count = elements if surface.flexible else 0
         roots.append(node)
         tips.append(node + count)
-        stations = np.linspace(0.0, surface.span_m, count + 1)
+        stations = np.linspace(0.0, surface.length_m, count + 1)
         rest_W.append(stations[:, None] * np.array([0.0, surface.span_sign, 0.0]))
         place = _section_places(surface, part, node, len(ends), count)
         places.append(place[:2])
         riders.append(_riders(surface, part, flight, place[2]))
         for e in range(count):
             ends.append([node + e, node + e + 1])
-            rest.append([0.0, 0.0, 0.0, 0.0, surface.span_sign * surface.span_m / count, 0.0])
-            sections.append(beam_sections(surface, stations[e] + GAUSS * surface.span_m / count))
+            rest.append([0.0, 0.0, 0.0, 0.0, surface.span_sign * surface.length_m / count, 0.0])
+            sections.append(beam_sections(surface, stations[e] + GAUSS * surface.length_m / count))
             damping.append(surface.material.stiffness_damping_s)
         if count == 0:
             bodies.append(node)
@@ -113,17 +113,16 @@ def flexible_model(
 def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:
     """Stiffness and mass of a surface's sections at distances from the root, about its elastic axis.
 
-    Axes of W: x chord, y span, z normal.
+    Axes of W: x across the elastic axis, y along it, z normal.
     """
     properties = surface.section_at(distance_m)
     axial, shear = surface.axial_at(distance_m)
-    arm = surface.mass_axis_x_m - surface.elastic_axis_x_m
     sections = []
     for i in range(distance_m.size):
         stiffness = np.diag(
             [properties.ei_flap[i], properties.gj[i], properties.ei_edge[i], shear[i], axial[i], shear[i]]
         )
-        sections.append(Section(stiffness, section_inertia(properties, i, np.array([arm, 0.0, 0.0]))))
+        sections.append(Section(stiffness, section_inertia(properties, i, surface.mass_arm_W)))
     return sections
 
 
@@ -156,13 +155,13 @@ def fuselage_inertia(fuselage: Fuselage) -> Array:
 
 def rigid_surface_inertia(surface: Surface) -> Array:
     """Spatial inertia (6, 6) of an unbent surface about its root node, in W."""
-    width = surface.span_m / INERTIA_POINTS
+    width = surface.length_m / INERTIA_POINTS
     distance = (np.arange(INERTIA_POINTS) + 0.5) * width
     properties = surface.section_at(distance)
-    arm_x = surface.mass_axis_x_m - surface.elastic_axis_x_m
     total = np.zeros((6, 6))
     for i, y in enumerate(distance):
-        total += width * section_inertia(properties, i, np.array([arm_x, surface.span_sign * y, 0.0]))
+        along = np.array([0.0, surface.span_sign * y, 0.0])
+        total += width * section_inertia(properties, i, surface.mass_arm_W + along)
     return total
 
 
@@ -177,7 +176,7 @@ def _section_places(
     distance = np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])])
     if not elements:
         return np.full(distance.size, -1 - root), np.zeros(distance.size), np.zeros((distance.size, 3))
-    place = distance / surface.span_m * elements
+    place = distance / surface.length_m * elements
     inside = np.minimum(np.floor(place + 1e-12), elements - 1)
     origin_W = distance[:, None] * np.array([0.0, surface.span_sign, 0.0])
     return first_element + inside.astype(np.int64), place - inside, origin_W
@@ -185,7 +184,7 @@ def _section_places(
 
 def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Array) -> Riders:
     """Riders of one surface on its sections."""
-    axis = np.array([surface.elastic_axis_x_m, 0.0, 0.0])
+    axis = surface.elastic_axis_W
     strips = part.spanwise
     corner = np.tile(np.arange(strips + 1), part.chordwise + 1)
     middle = strips + 1 + np.arange(strips)

@@ -87,7 +87,7 @@ class CutSurface:
     @property
     def edges(self) -> Array:
         """Ends of the links (p, n + 1), distances from the root in m."""
-        return link_edges(self.division, self.surface.span_m)
+        return link_edges(self.division, self.surface.length_m)
 
 
 @dataclass
@@ -231,7 +231,7 @@ def _factor(centre: Array, factor: float) -> tuple[Array, Array]:
 
 def _cut(rows: SurfaceRows, division: Array) -> None:
     """Masses, joint offsets, drag areas and strips of links with these shares of the span."""
-    surface, edges = rows.surface, link_edges(division, rows.surface.span_m)
+    surface, edges = rows.surface, link_edges(division, rows.surface.length_m)
     particles = division.shape[0]
     rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
     rows.links[:, 1:, L_OFFSET] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
