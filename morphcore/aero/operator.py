@@ -17,8 +17,8 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
   averaged with the chordwise distribution of the circulation in uniform incidence, which is exact there and
   of second order elsewhere.
 - The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces lie in
-  one plane. Otherwise, or with sweep, two more numbers for each strip hold it, and the moment of the forces
-  in the plane about the strip's point on the axis.
+  one plane. Otherwise, or with sweep or taper, two more numbers for each strip hold it, and the moment of the
+  forces in the plane about the strip's point on the axis.
 """
 
 from __future__ import annotations
@@ -76,22 +76,23 @@ class AircraftLattice:
         return sum(lattice.rings for lattice in self.lattices)
 
     @property
-    def spatial(self) -> bool:
-        """Whether forces need `MORE_OUTPUTS`: surfaces are swept or may leave the plane of the others."""
+    def has_more_outputs(self) -> bool:
+        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs that stay in one plane."""
         surfaces = self.aircraft.surfaces
         turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
         heights = {surface.position_m[2] for surface in surfaces}
-        return turns or len(heights) > 1 or not all(surface.is_upright for surface in surfaces)
+        oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
+        return turns or len(heights) > 1 or not oblong
 
     def more_rows(self, strip: int) -> int:
         """First of the further rows of a strip; -1 if there are none."""
-        return OUTPUTS * self.strips + MORE_OUTPUTS * strip if self.spatial else -1
+        return OUTPUTS * self.strips + MORE_OUTPUTS * strip if self.has_more_outputs else -1
 
     @property
     def operator_shape(self) -> tuple[int, int]:
         """Rows and columns of the operator, padded to whole tiles."""
         return (
-            -(-(OUTPUTS + MORE_OUTPUTS * self.spatial) * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
+            -(-(OUTPUTS + MORE_OUTPUTS * self.has_more_outputs) * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
             -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
 
@@ -167,7 +168,7 @@ def lattice_operator(
     induced = along(normal)
     circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
     flow = [induced[rings:] @ circulation]
-    if lattice.spatial:
+    if lattice.has_more_outputs:
         flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
     return _reduced(lattice, circulation, flow, _references(lattice, poses, circulation))
 
@@ -213,7 +214,7 @@ def _reduced(
 ) -> LatticeOperator:
     """The operator from circulations (rings, inputs) and what they induce at fronts and sides.
 
-    flow : normal velocity (points, inputs); if the lattice is spatial, also those along x and y of W.
+    flow : normal velocity (points, inputs); if it has further outputs, also those along x and y of W.
     references : (rings,) for each surface.
     """
     matrix = np.zeros(lattice.operator_shape)
@@ -241,7 +242,7 @@ def _reduced(
         matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, edges.area * edges.centre_x)
         matrix[row + 3, :inputs] = edges.summed(on_edges[0], edges.front[..., 1], edges.side[..., 1])
         matrix[row + 4, :inputs] = -edges.summed(on_edges[0], edges.front[..., 0], edges.side[..., 0])
-        if lattice.spatial:
+        if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
             matrix[more, :inputs] = edges.summed(
                 on_edges[1], edges.front[..., 1], edges.side[..., 1]

@@ -13,7 +13,7 @@ follow (see aero/operator.py for their derivation):
     4  w_y   the same for the chordwise edges, m/s
 
 Both are sums over all bound edges, by their components along y and x, per circulation and width of the
-strip. If surfaces are swept or out of one plane, two more outputs of each strip follow those of all strips:
+strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
