@@ -124,7 +124,9 @@ def judged(folder: Path) -> list[str]:
 def main() -> int:
     """Fly or judge all aircraft, or those named on the command line."""
     names = [word for word in sys.argv[1:] if word != "--fly"]
-    folders = [FOLDER / name for name in names] or sorted(path.parent for path in FOLDER.glob("*/aircraft.json"))
+    folders = [FOLDER / name for name in names] or sorted(
+        path.parent for path in FOLDER.glob("*/aircraft.json")
+    )
     if "--fly" in sys.argv:
         for folder in folders:
             fly(folder)

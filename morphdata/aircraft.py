@@ -48,6 +48,9 @@ Matrix3 = list[list[float]]
 Stiffness = Annotated[float, Field(gt=0.0, le=1e15)]
 Chord = Annotated[float, Field(gt=0.0, le=50.0)]
 ROUND_OFF = 1e-9  # relative tolerance of the terms of an inertia
+MAX_SWEEP_RAD = 1.2
+MAX_DIHEDRAL_RAD = 1.5708  # pi / 2, as it is usually written
+MAX_INCIDENCE_RAD = 0.5
 BOX = ("length_m", "width_m", "height_m", "density_kg_m3")
 
 
@@ -184,6 +187,17 @@ class Surface(Document):
     )
     root_chord_m: Chord | None = None
     tip_chord_m: Chord | None = None
+    sweep_rad: Annotated[float, Field(ge=-MAX_SWEEP_RAD, le=MAX_SWEEP_RAD)] = Field(
+        default=0.0,
+        description="Sweep of the mid-chord line, aft, in the plane of the surface; chords stay parallel to the "
+        "root's. `span_m` is measured across the root chord: the mid-chord line is span / cos(sweep) long.",
+    )
+    dihedral_rad: Annotated[float, Field(ge=-MAX_DIHEDRAL_RAD, le=MAX_DIHEDRAL_RAD)] = Field(
+        default=0.0, description="Tip up; pi / 2 makes a vertical fin."
+    )
+    incidence_rad: Annotated[float, Field(ge=-MAX_INCIDENCE_RAD, le=MAX_INCIDENCE_RAD)] = Field(
+        default=0.0, description="Of the root chord to the fuselage, nose up, after the dihedral."
+    )
     thickness_m: Annotated[float, Field(gt=0.0, le=10.0)]
     material: Material
     section: Section | None = None

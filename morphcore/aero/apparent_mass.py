@@ -50,11 +50,12 @@ def apparent_inertia(
     length = (end - start)[..., None]
     distance = start[..., None] + length * 0.5 * (POINTS + 1.0)
     weight = np.pi * density_kg_m3 * 0.5 * length * WEIGHTS
-    semichord = 0.5 * np.asarray(surface.chord_at(distance.ravel())).reshape(distance.shape)
+    across = surface.chord_W[0]  # theory holds in planes across a swept wing's axis
+    semichord = 0.5 * across * np.asarray(surface.chord_at(distance.ravel())).reshape(distance.shape)
     mass = weight * semichord**2
     own = weight * semichord**4 / 8.0
-    y = surface.span_sign * (distance - origin[..., None])
-    x = -surface.elastic_axis_x_m  # of mid-chord from the elastic axis
+    x, aside = -surface.elastic_axis_W[:2]  # of mid-chord from the elastic axis
+    y = surface.span_sign * (distance - origin[..., None]) + aside
     # w = v_z + y omega_x - x omega_y
     motion = np.stack([y, np.full_like(y, -x), np.ones_like(y)], axis=-1)
     found = np.einsum("...q,...qi,...qj->...ij", mass, motion, motion)
@@ -71,6 +72,7 @@ def spatial(normal: Array) -> Array:
 
 def share_of_mass(surface: Surface, density_kg_m3: float) -> float:
     """Apparent mass of a surface over its own mass."""
-    middles = surface.span_m * (np.arange(100) + 0.5) / 100
-    apparent = np.pi * density_kg_m3 * (0.5 * np.asarray(surface.chord_at(middles))) ** 2
+    middles = surface.length_m * (np.arange(100) + 0.5) / 100
+    semichord = 0.5 * surface.chord_W[0] * np.asarray(surface.chord_at(middles))
+    apparent = np.pi * density_kg_m3 * semichord**2
     return float(apparent.sum() / surface.section_at(middles).mass.sum())

@@ -30,7 +30,8 @@ class Riders:
     corner, control, drag : (c,), (r,), (t,) the section that carries each ring corner, control point and
     strip's drag. corner_arm, control_arm, drag_arm : (.., 3) their positions in section axes, m. drag_area :
     (t,) profile drag coefficient times area, m^2. moment_area : (t,) cm0 times the integral of the chord
-    squared, m^3. slope : (r,) of the mean line, nose up (twist less zero-lift angle). lag_time : (2, r) both
+    squared, m^3. control_chord, drag_chord : (r, 2), (t, 2) x and y of the unit vector of the chord, forward,
+    in section axes, at control points and strips. slope : (r,) of the mean line, nose up (twist less zero-lift angle). lag_time : (2, r) both
     time constants of Jones' function, s.
     """
 
@@ -43,6 +44,8 @@ class Riders:
     drag_arm: Array
     drag_area: Array
     moment_area: Array
+    control_chord: Array
+    drag_chord: Array
     slope: Array
     lag_time: Array
 
@@ -116,6 +119,8 @@ def lattice_parts(
         drag_arm=riders.drag_arm,
         drag_area=riders.drag_area,
         moment_area=riders.moment_area,
+        control_chord=riders.control_chord,
+        drag_chord=riders.drag_chord,
         smoothed=core.law == "smoothed",
         stretch=1.0 / prandtl_glauert(mach),
         density=float(density),

@@ -4,7 +4,7 @@ With the lattice frozen on the undeformed surfaces (at their hinge angles) and i
 direction, the circulations are linear in the normal velocity of the structure, and on a flat link that
 velocity is ``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the
 strips to five numbers for each strip (rows as listed in aero/kernels/loads.py), from which the forces on all
-bound edges follow.
+bound edges follow. On swept surfaces x is measured along the chord, which is oblique in the axes of the link.
 
 Kutta-Joukowski on a ring of circulation G in the flow U = induced velocity - velocity of the structure:
 
@@ -16,6 +16,9 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
   circulation and induced velocity, both distributed along the chord; here the induced velocity of a strip is
   averaged with the chordwise distribution of the circulation in uniform incidence, which is exact there and
   of second order elsewhere.
+- The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces lie in
+  one plane. Otherwise, or with sweep or taper, two more numbers for each strip hold it, and the moment of the
+  forces in the plane about the strip's point on the axis.
 """
 
 from __future__ import annotations
@@ -26,7 +29,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import OUTPUTS
+from morphcore.aero.kernels.loads import (
+    CENTRE_X,
+    CHORD_X,
+    CHORD_Y,
+    EDGE_DX,
+    EDGE_DY,
+    EDGE_X,
+    EDGE_Y,
+    MORE_OUTPUTS,
+    OUTPUTS,
+    STRIP_COLUMNS,
+)
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
@@ -62,10 +76,23 @@ class AircraftLattice:
         return sum(lattice.rings for lattice in self.lattices)
 
     @property
+    def has_more_outputs(self) -> bool:
+        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs that stay in one plane."""
+        surfaces = self.aircraft.surfaces
+        turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
+        heights = {surface.position_m[2] for surface in surfaces}
+        oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
+        return turns or len(heights) > 1 or not oblong
+
+    def more_rows(self, strip: int) -> int:
+        """First of the further rows of a strip; -1 if there are none."""
+        return OUTPUTS * self.strips + MORE_OUTPUTS * strip if self.has_more_outputs else -1
+
+    @property
     def operator_shape(self) -> tuple[int, int]:
         """Rows and columns of the operator, padded to whole tiles."""
         return (
-            -(-OUTPUTS * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
+            -(-(OUTPUTS + MORE_OUTPUTS * self.has_more_outputs) * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
             -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
 
@@ -74,9 +101,8 @@ class AircraftLattice:
 class LatticeOperator:
     """One reduced operator.
 
-    matrix : (rows, columns) as ``operator_shape``. strips : (strips, 3): x of the trailing edge and of the
-    centre of circulation of each strip from the link axis (the elastic axis), m; slope dx/dy of its trailing
-    edge in link axes.
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS), columns as listed in
+    aero/kernels/loads.py.
     """
 
     matrix: Array
@@ -117,34 +143,54 @@ def lattice_operator(
         surface_pose(surface, angles[own])
         for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
     ]
-    corners, controls, fronts, sides, normals = [], [], [], [], []
+    corners, controls, fronts, sides = [], [], [], []
     for (R_BW, r_B), part in zip(poses, lattice.lattices, strict=True):
         ring = part.ring_corners_W @ R_BW.T + r_B
         corners.append(ring.reshape(-1, 3))
         controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
         fronts.append((0.5 * (ring[:-1, :-1] + ring[:-1, 1:])).reshape(-1, 3))
         sides.append((0.5 * (ring[:-1] + ring[1:])).reshape(-1, 3))
-        normals.append(R_BW[:, 2])
     corners += [ring * ACROSS for ring in corners if lattice.images]
     groups = (controls, fronts, sides)
     points = np.concatenate([part for group in groups for part in group])
     velocity = influence(
         points, np.concatenate(corners), lattice.table, wake_direction_B, lattice.settings.core, mach
     )
-    normal = np.concatenate(
+    normal = _at_points(poses, groups, 2)
+    rings = lattice.rings
+
+    def along(direction: Array) -> Array:
+        """Component (points, rings) of the induced velocity along a direction at each point."""
+        induced = np.einsum("pa,arp->pr", direction, velocity)
+        # an image has the circulation of its original
+        return np.asarray(induced[:, :rings] + induced[:, rings:] if lattice.images else induced)
+
+    induced = along(normal)
+    circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
+    flow = [induced[rings:] @ circulation]
+    if lattice.has_more_outputs:
+        flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
+    return _reduced(lattice, circulation, flow, _references(lattice, poses, circulation))
+
+
+def _at_points(poses: Sequence[tuple[Array, Array]], groups: Sequence[Sequence[Array]], axis: int) -> Array:
+    """One of the wing axes (points, 3) in B at each point of some groups of points of all surfaces."""
+    return np.concatenate(
         [
-            np.repeat(n[None, :], part.shape[0], axis=0)
+            np.repeat(R_BW[None, :, axis], part.shape[0], axis=0)
             for group in groups
-            for n, part in zip(normals, group, strict=True)
+            for (R_BW, _), part in zip(poses, group, strict=True)
         ]
     )
-    induced = np.einsum("pa,arp->pr", normal, velocity)  # normal velocity, (points, rings)
-    rings = lattice.rings
-    if lattice.images:  # an image has the circulation of its original
-        induced = induced[:, :rings] + induced[:, rings:]
-    circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
-    downwash = induced[rings:] @ circulation
-    return _reduced(lattice, circulation, downwash)
+
+
+def _references(
+    lattice: AircraftLattice, poses: Sequence[tuple[Array, Array]], circulation: Array
+) -> list[Array]:
+    """Circulations (rings,) for each surface in a uniform flow normal to it: its chordwise distribution."""
+    counts = [part.spanwise for part in lattice.lattices]
+    normals = np.repeat([R_BW[:, 2] for R_BW, _ in poses], counts, axis=0)
+    return [(circulation[:, ::2] * (normals @ R_BW[:, 2])).sum(axis=1) for R_BW, _ in poses]
 
 
 def _boundary(lattice: AircraftLattice) -> Array:
@@ -154,7 +200,7 @@ def _boundary(lattice: AircraftLattice) -> Array:
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
     ):
-        x = part.control_points_W[..., 0] - surface.elastic_axis_x_m
+        x = part.control_points_W[..., 0] / part.cos_sweep - surface.elastic_axis_x_m
         for i in range(part.chordwise):
             for j in range(part.spanwise):
                 out[ring, 2 * (strip0 + j)] = 1.0
@@ -163,44 +209,117 @@ def _boundary(lattice: AircraftLattice) -> Array:
     return out
 
 
-def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> LatticeOperator:
-    rows, columns = lattice.operator_shape
-    matrix = np.zeros((rows, columns))
-    strips = np.zeros((lattice.strips, 3))
-    uniform = circulation[:, ::2].sum(axis=1)  # every strip at the same incidence
+def _reduced(
+    lattice: AircraftLattice, circulation: Array, flow: Sequence[Array], references: Sequence[Array]
+) -> LatticeOperator:
+    """The operator from circulations (rings, inputs) and what they induce at fronts and sides.
+
+    flow : normal velocity (points, inputs); if it has further outputs, also those along x and y of W.
+    references : (rings,) for each surface.
+    """
+    matrix = np.zeros(lattice.operator_shape)
+    strips = np.zeros((lattice.strips, STRIP_COLUMNS))
     inputs = circulation.shape[1]
-    ring = 0
-    side0 = lattice.rings
-    for surface, part, strip0 in zip(
-        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
+    ring, side0 = 0, lattice.rings
+    for surface, part, strip0, uniform in zip(
+        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, references, strict=True
     ):
         shape = (part.chordwise, part.spanwise)
-        count = part.rings
-        side_count = part.chordwise * (part.spanwise + 1)
-        gamma = circulation[ring : ring + count].reshape(*shape, inputs)
-        reference = uniform[ring : ring + count].reshape(shape)
-        front = downwash[ring : ring + count].reshape(*shape, inputs)
-        side = downwash[side0 : side0 + side_count].reshape(part.chordwise, part.spanwise + 1, inputs)
-        ring, side0 = ring + count, side0 + side_count
-
-        corners = part.ring_corners_W - np.array([surface.elastic_axis_x_m, 0.0, 0.0])
-        width = np.diff(part.strip_edges_m)
-        edge_x = corners[..., 0]
-        middle_x = 0.5 * (edge_x[:, 1:] + edge_x[:, :-1])
-        area = (middle_x[:-1] - middle_x[1:]) * width  # of the rings, trapezia between straight strip edges
-        centre_x = 0.5 * (middle_x[:-1] + middle_x[1:])
-        length = 0.5 * (edge_x[:-1, 1:] + edge_x[:-1, :-1] - edge_x[1:, 1:] - edge_x[1:, :-1])
-        bound = np.diff(reference, axis=0, prepend=0.0) / reference[-1]
-        chordwise_share = reference / reference[-1]
+        fronts = slice(ring, ring + part.rings)
+        sides = slice(side0, side0 + part.chordwise * (part.spanwise + 1))
+        gamma = circulation[fronts].reshape(*shape, inputs)
+        reference = uniform[fronts].reshape(shape)
+        on_edges = [
+            (each[fronts].reshape(*shape, inputs), each[sides].reshape(part.chordwise, -1, inputs))
+            for each in flow
+        ]
+        ring, side0 = fronts.stop, sides.stop
+        edges = _edges(surface, part, reference / reference[-1])
 
         row = OUTPUTS * strip0 + OUTPUTS * np.arange(part.spanwise)
-        matrix[row, :inputs] = gamma[-1] * width[:, None]
-        matrix[row + 1, :inputs] = np.einsum("ijn,ij->jn", gamma, area)
-        matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, area * centre_x)
-        matrix[row + 3, :inputs] = np.einsum("ijn,ij->jn", front, bound)
-        jump = part.span_sign * np.diff(side, axis=1)
-        matrix[row + 4, :inputs] = np.einsum("ijn,ij->jn", jump, chordwise_share * length) / width[:, None]
-        strips[strip0 : strip0 + part.spanwise, 0] = middle_x[-1]
-        strips[strip0 : strip0 + part.spanwise, 1] = np.sum(bound * middle_x[:-1], axis=0)
-        strips[strip0 : strip0 + part.spanwise, 2] = np.diff(edge_x[-1]) / (part.span_sign * width)
+        matrix[row, :inputs] = gamma[-1] * edges.width[:, None]
+        matrix[row + 1, :inputs] = np.einsum("ijn,ij->jn", gamma, edges.area)
+        matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, edges.area * edges.centre_x)
+        matrix[row + 3, :inputs] = edges.summed(on_edges[0], edges.front[..., 1], edges.side[..., 1])
+        matrix[row + 4, :inputs] = -edges.summed(on_edges[0], edges.front[..., 0], edges.side[..., 0])
+        if lattice.has_more_outputs:
+            more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
+            matrix[more, :inputs] = edges.summed(
+                on_edges[1], edges.front[..., 1], edges.side[..., 1]
+            ) - edges.summed(on_edges[2], edges.front[..., 0], edges.side[..., 0])
+            matrix[more + 1, :inputs] = edges.moment(on_edges[0])
+        strips[strip0 : strip0 + part.spanwise] = edges.columns(surface.chord_W)
     return LatticeOperator(matrix, strips)
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Bound edges of a surface's strips in link axes, each strip about its own point on the axis (m, m^2).
+
+    corners : (chordwise + 1, spanwise, 2, 3) of the rings, at the root and tip side of each strip. front :
+    (chordwise, spanwise, 3) and side : (chordwise, spanwise, 2, 3) edges, in the sense of the lifting
+    circulation but for the root side. area, centre_x : (chordwise, spanwise) of the rings. share : the same,
+    of each ring's circulation in that of the strip's last ring, and bound : on each front. width : (spanwise,)
+    along the axis. sign : of the span.
+    """
+
+    corners: Array
+    front: Array
+    side: Array
+    area: Array
+    centre_x: Array
+    share: Array
+    bound: Array
+    width: Array
+    sign: float
+
+    def summed(self, flow: tuple[Array, Array], front: Array, side: Array) -> Array:
+        """Sum (spanwise, inputs) over a strip's edges of velocity times weight, by their circulation.
+
+        flow : velocities on fronts and sides, (chordwise, spanwise or spanwise + 1, inputs); front, side :
+        weights, (chordwise, spanwise) and (chordwise, spanwise, 2). Per width of the strip.
+        """
+        on_fronts, on_sides = flow
+        total = np.einsum("ijn,ij->jn", on_fronts, self.bound * front)
+        total += np.einsum("ijn,ij->jn", on_sides[:, 1:], self.share * side[..., 1])
+        total -= np.einsum("ijn,ij->jn", on_sides[:, :-1], self.share * side[..., 0])
+        return np.asarray(total / self.width[:, None])
+
+    def moment(self, flow: tuple[Array, Array]) -> Array:
+        """Moment about z (spanwise, inputs) of the forces that a normal velocity makes in the plane."""
+        front = 0.5 * (self.corners[:-1, :, 0] + self.corners[:-1, :, 1])
+        side = 0.5 * (self.corners[:-1] + self.corners[1:])
+        return self.summed(flow, np.sum(front * self.front, axis=-1), np.sum(side * self.side, axis=-1))
+
+    def columns(self, chord_W: Array) -> Array:
+        """Columns (spanwise, STRIP_COLUMNS) of the strips."""
+        out = np.empty((self.width.size, STRIP_COLUMNS))
+        middle_x = 0.5 * (self.corners[:, :, 0, 0] + self.corners[:, :, 1, 0])
+        trailing = self.sign * (self.corners[-1, :, 1] - self.corners[-1, :, 0]) / self.width[:, None]
+        out[:, EDGE_X] = middle_x[-1]
+        out[:, EDGE_Y] = 0.5 * (self.corners[-1, :, 0, 1] + self.corners[-1, :, 1, 1])
+        out[:, CENTRE_X] = np.sum(self.bound * middle_x[:-1], axis=0)
+        out[:, EDGE_DX], out[:, EDGE_DY] = trailing[:, 0], trailing[:, 1]
+        out[:, CHORD_X], out[:, CHORD_Y] = chord_W[0], chord_W[1]
+        return out
+
+
+def _edges(surface: Surface, part: SurfaceLattice, share: Array) -> _Edges:
+    """The bound edges of a surface; ``share`` (chordwise, spanwise) of its circulation on each ring."""
+    corners_W = part.ring_corners_W - surface.elastic_axis_W
+    own_y = 0.5 * part.span_sign * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])
+    corners = np.stack([corners_W[:, :-1], corners_W[:, 1:]], axis=2)
+    corners[..., 1] -= own_y[:, None]
+    width = np.diff(part.strip_edges_m)
+    middle_x = 0.5 * (corners[:, :, 1, 0] + corners[:, :, 0, 0])
+    return _Edges(
+        corners=corners,
+        front=part.span_sign * (corners[:-1, :, 1] - corners[:-1, :, 0]),
+        side=part.span_sign * np.diff(corners, axis=0),
+        area=(middle_x[:-1] - middle_x[1:]) * width,  # trapezia between straight strip edges
+        centre_x=0.5 * (middle_x[:-1] + middle_x[1:]),
+        share=share,
+        bound=np.diff(share, axis=0, prepend=0.0),
+        width=width,
+        sign=part.span_sign,
+    )

@@ -127,7 +127,7 @@ def _parameters(chain: ChainModel, batch: ParameterBatch) -> Table:
 
 def _root(surface: Surface) -> Array:
     """Origin of the first link in B with all hinges at zero, m."""
-    return np.asarray(np.add(surface.position_m, [surface.elastic_axis_x_m, 0.0, 0.0]))
+    return np.asarray(np.add(surface.position_m, surface.rest_R_BW @ surface.elastic_axis_W))
 
 
 def _surfaces(chain: ChainModel) -> Table:
@@ -136,6 +136,7 @@ def _surfaces(chain: ChainModel) -> Table:
         "name": np.array([surface.name for surface in surfaces]),
         "side": np.array([surface.side for surface in surfaces]),
         "root_m": np.stack([_root(surface) for surface in surfaces]),
+        "rotation": np.stack([surface.rest_R_BW for surface in surfaces]),
         "first_link_index": chain.surfaces[:, 0].copy(),
         "links": chain.surfaces[:, 1].copy(),
     }
@@ -145,7 +146,7 @@ def _links(chain: ChainModel, batch: ParameterBatch) -> Table:
     lengths, origins, rows, apparent = [], [], [], []
     density = chain.flight.air_density_kg_m3 if chain.flight.apparent_mass else 0.0
     for number, surface in enumerate(chain.aircraft.surfaces):
-        edges = link_edges(chain.on_surface(batch, number)["division"], surface.span_m)
+        edges = link_edges(chain.on_surface(batch, number)["division"], surface.length_m)
         length = np.diff(edges, axis=1)[0]
         origin = np.zeros((length.size, 3))
         origin[0] = _root(surface)

@@ -20,6 +20,9 @@ from morphdata.drives import ANGLE_TOLERANCE_RAD, drive_name
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
+UPRIGHT: Array = np.eye(3)  # a surface whose axes are those of the body
+UPRIGHT.setflags(write=False)
+
 
 @dataclass(frozen=True)
 class Hinge:
@@ -87,8 +90,12 @@ def hinge_arms(hinges: Sequence[Hinge], root_B: Array, offset: Array | None = No
     return np.asarray(arms if offset is None else arms + offset)
 
 
-def hinged_pose(hinges: Sequence[Hinge], arms: Array, angles: Array) -> tuple[Array, Array]:
+def hinged_pose(
+    hinges: Sequence[Hinge], arms: Array, angles: Array, rest: Array = UPRIGHT
+) -> tuple[Array, Array]:
     """Pose of a surface for angles (k, m) of its m hinges; ``arms`` from `hinge_arms`.
+
+    ``rest`` (3, 3) is its rotation with all hinges at rest, wing components to body components.
 
     Returns
     -------
@@ -97,7 +104,7 @@ def hinged_pose(hinges: Sequence[Hinge], arms: Array, angles: Array) -> tuple[Ar
     """
     count = angles.shape[0]
     if not hinges:
-        return np.tile(np.eye(3), (count, 1, 1)), np.tile(arms[0], (count, 1))
+        return np.tile(rest, (count, 1, 1)), np.tile(arms[0], (count, 1))
     # surface -> fuselage: each hinge turns everything outboard of it
     pivot = np.array(hinges[-1].position_m)
     R_BW = hinges[-1].rotation(angles[:, -1])
@@ -106,4 +113,4 @@ def hinged_pose(hinges: Sequence[Hinge], arms: Array, angles: Array) -> tuple[Ar
         pivot, turn = np.array(hinges[place].position_m), hinges[place].rotation(angles[:, place])
         R_BW = turn @ R_BW
         r_B = pivot + np.einsum("kij,kj->ki", turn, r_B - pivot)
-    return R_BW, r_B
+    return R_BW @ rest, r_B

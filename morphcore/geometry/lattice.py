@@ -19,7 +19,8 @@ CONTROL_POINT = 0.75  # of panel chord (Katz & Plotkin 2001, section 12.3; James
 
 @dataclass(frozen=True)
 class SurfaceLattice:
-    """Panels, vortex rings and control points of one surface, uniformly spaced.
+    """Panels, vortex rings and control points of one surface, uniformly spaced; panels of swept surfaces are
+    oblique.
 
     Row i = 0..chordwise-1 counts from the leading edge, strip j = 0..spanwise-1 from the root to the tip, on
     either side. Positions are in the surface's wing axes W (origin root mid-chord, x forward, y right, z
@@ -34,9 +35,9 @@ class SurfaceLattice:
         but the two chordwise pieces behind the trailing edge would carry a load, which a wake cannot.
     control_points_W : (chordwise, spanwise, 3) at three quarters of the panel's chord, mid panel span.
     panel_area_m2 : (chordwise, spanwise).
-    strip_edges_m : (spanwise + 1,) distance of the strips' edges from the root.
+    strip_edges_m : (spanwise + 1,) distance of the strips' edges from the root, along the mid-chord line.
     strip_chord_m : (spanwise,) chord at mid strip.
-    span_sign : +1 for a right surface, -1 for a left one.
+    span_sign : +1 for a right surface, -1 for a left one. cos_sweep : cosine of its sweep.
     """
 
     panel_corners_W: Array
@@ -46,6 +47,7 @@ class SurfaceLattice:
     strip_edges_m: Array
     strip_chord_m: Array
     span_sign: float
+    cos_sweep: float = 1.0
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -75,7 +77,7 @@ class SurfaceLattice:
     @property
     def panel_size_m(self) -> float:
         """Smaller of a panel's mean chord and width: the reference length of the core "line"."""
-        return min(self.mean_chord_m / self.chordwise, float(self.strip_edges_m[1]))
+        return min(self.mean_chord_m / self.chordwise, float(self.strip_edges_m[1]) * self.cos_sweep)
 
     @property
     def mean_chord_m(self) -> float:
@@ -87,22 +89,24 @@ def surface_lattice(
     surface: Surface, chordwise: int = DEFAULT_LATTICE.chordwise, spanwise: int = DEFAULT_LATTICE.spanwise
 ) -> SurfaceLattice:
     """Lattice of ``chordwise`` x ``spanwise`` panels of uniform spacing on a surface's mid-plane."""
-    edges = np.linspace(0.0, surface.span_m, spanwise + 1)
+    edges = np.linspace(0.0, surface.length_m, spanwise + 1)
+    cos_sweep = float(surface.chord_W[0])
     middles = 0.5 * (edges[1:] + edges[:-1])
     rows = np.arange(chordwise)
     panel_chordwise = np.arange(chordwise + 1) / chordwise
     ring_chordwise = np.append((rows + RING_FRONT) / chordwise, 1.0)
-    panel_corners_W = _points(surface, panel_chordwise, edges)
-    strip_width = np.diff(edges)
+    panel_corners_W = chord_points(surface, panel_chordwise, edges)
+    strip_width = np.diff(edges) * cos_sweep
     strip_chord = surface.chord_at(middles)
     return SurfaceLattice(
         panel_corners_W=panel_corners_W,
-        ring_corners_W=_points(surface, ring_chordwise, edges),
-        control_points_W=_points(surface, (rows + CONTROL_POINT) / chordwise, middles),
+        ring_corners_W=chord_points(surface, ring_chordwise, edges),
+        control_points_W=chord_points(surface, (rows + CONTROL_POINT) / chordwise, middles),
         panel_area_m2=np.tile(strip_chord * strip_width / chordwise, (chordwise, 1)),
         strip_edges_m=edges,
         strip_chord_m=strip_chord,
         span_sign=surface.span_sign,
+        cos_sweep=cos_sweep,
     )
 
 
@@ -116,14 +120,13 @@ def surface_pose(surface: Surface, hinge_rad: ArrayLike | None = None) -> tuple[
     """
     angles = np.zeros(len(surface.hinges)) if hinge_rad is None else np.asarray(hinge_rad, dtype=np.float64)
     arms = hinge_arms(surface.hinges, np.array(surface.position_m))
-    R_BW, r_B = hinged_pose(surface.hinges, arms, angles[None])
+    R_BW, r_B = hinged_pose(surface.hinges, arms, angles[None], surface.rest_R_BW)
     return R_BW[0], r_B[0]
 
 
-def _points(surface: Surface, chord_fraction: Array, distance_m: Array) -> Array:
+def chord_points(surface: Surface, chord_fraction: Array, distance_m: Array) -> Array:
     """Points (rows, columns, 3) in W at chord fractions from the leading edge and distances from the root."""
-    chord = surface.chord_at(distance_m)
-    points = np.zeros((chord_fraction.size, distance_m.size, 3))
-    points[..., 0] = (0.5 - chord_fraction)[:, None] * chord
-    points[..., 1] = surface.span_sign * distance_m
+    forward = (0.5 - chord_fraction)[:, None] * surface.chord_at(distance_m)
+    points = forward[..., None] * surface.chord_W
+    points[..., 1] += surface.span_sign * distance_m
     return points

@@ -20,6 +20,7 @@ STATIONS = 200  # midpoints along the span
 LARGEST_SLOPE_RAD = 1.0  # slope of a tip under its share of the load: beyond this no wing carries any load
 LARGEST_LIFT_COEFFICIENT = 2.0  # lift coefficient of all surfaces together; a clean wing reaches 1.5 at most
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad, of a thin airfoil
+SWEEP_WITHOUT_DIVERGENCE_RAD = 0.2  # swept aft by more, bending relieves a wing of its incidence
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def obstacle(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
 def too_little_air(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
     """The flight condition as an obstacle, if no wing of that area could carry the weight in it."""
     weight_n = _mass(aircraft) * flight.gravity_m_s2
-    area = sum(surface.area_m2 for surface in aircraft.surfaces)
+    area = sum(surface.area_m2 * _share_of_lift(surface) for surface in aircraft.surfaces)
     carried = flight.dynamic_pressure_pa * area * LARGEST_LIFT_COEFFICIENT
     if weight_n <= carried:
         return None
@@ -85,7 +86,13 @@ def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
 def load_per_length(aircraft: Aircraft, flight: Flight) -> float:
     """The weight distributed evenly over all spans, N/m: an estimate of the lift per length."""
     weight_n = _mass(aircraft) * flight.gravity_m_s2
-    return weight_n / sum(surface.span_m for surface in aircraft.surfaces)
+    length_m = sum(surface.length_m * _share_of_lift(surface) for surface in aircraft.surfaces)
+    return weight_n / length_m if length_m > 0.0 else 0.0
+
+
+def _share_of_lift(surface: Surface) -> float:
+    """Cosine of the dihedral: fins carry no weight."""
+    return float(abs(surface.rest_R_BW[2, 2])) if surface.dihedral_rad else 1.0
 
 
 def _mass(aircraft: Aircraft) -> float:
@@ -97,14 +104,14 @@ def _mass(aircraft: Aircraft) -> float:
 
 
 def _stations(surface: Surface) -> tuple[np.ndarray, float]:
-    width = surface.span_m / STATIONS
+    width = surface.length_m / STATIONS
     return (np.arange(STATIONS) + 0.5) * width, width
 
 
 def _tip_slope(surface: Surface, load_n_m: float) -> float:
     """Slope at the tip of a cantilever under a load per length, rad: the integral of M / EI."""
     distance, width = _stations(surface)
-    moment = 0.5 * load_n_m * (surface.span_m - distance) ** 2
+    moment = 0.5 * load_n_m * (surface.length_m - distance) ** 2
     with np.errstate(over="ignore"):  # for a modulus close to zero
         return float((moment / surface.section_at(distance).ei_flap).sum()) * width
 
@@ -116,10 +123,10 @@ def _divergence_pressure(surface: Surface) -> float:
     of the elastic axis, for the mean section.
     """
     ahead = 0.25 * surface.mean_chord_m + surface.elastic_axis_offset_m
-    if ahead <= 0.0:
+    if ahead <= 0.0 or surface.sweep_rad > SWEEP_WITHOUT_DIVERGENCE_RAD:
         return float("inf")
     stiffness = float(surface.section_at(_stations(surface)[0]).gj.mean())
-    return (0.5 * np.pi / surface.span_m) ** 2 * stiffness / (ahead * surface.mean_chord_m * LIFT_SLOPE)
+    return (0.5 * np.pi / surface.length_m) ** 2 * stiffness / (ahead * surface.mean_chord_m * LIFT_SLOPE)
 
 
 def _too_soft(surface: Surface, number: int, slope: float) -> Obstacle:

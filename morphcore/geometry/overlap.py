@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.lattice import surface_pose
+from morphcore.geometry.lattice import chord_points, surface_pose
 from morphcore.geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -57,9 +57,8 @@ def outline_B(surface: Surface, hinge_rad: ArrayLike) -> Array:
 
     hinge_rad : (m,) of its hinges.
     """
-    tip_y = surface.span_sign * surface.span_m
-    root, tip = 0.5 * surface.root_chord_m, 0.5 * surface.tip_chord_m
-    corners_W = np.array([[root, 0.0, 0.0], [tip, tip_y, 0.0], [-tip, tip_y, 0.0], [-root, 0.0, 0.0]])
+    front, aft = chord_points(surface, np.array([0.0, 1.0]), np.array([0.0, surface.length_m]))
+    corners_W = np.concatenate([front, aft[::-1]])
     R_BW, r_B = surface_pose(surface, hinge_rad)
     return np.asarray(corners_W @ R_BW.T + r_B)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +18,7 @@ from morphdata.aircraft import Material, Section
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
 
+VERTICAL_RAD = 1e-5  # a dihedral this close to pi / 2 is a vertical fin, exactly
 SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
 
 
@@ -24,12 +26,20 @@ SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
 class Surface(Shown):
     """A flat lifting surface on hinges: straight mid-chord line along its own y, linear taper.
 
-    Wing axes W: origin at the root's mid-chord, x forward, y to the right, z down; the right surface spans
-    +y, the left one -y. As in documents, ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the
-    distances of the elastic axis and of the line of centres of mass aft of mid-chord (negative: forward);
-    computations in W use ``elastic_axis_x_m`` and ``mass_axis_x_m``. ``hinges`` carry the surface, from the
-    fuselage outward; a fixed surface has none. The lattice stays flat: ``twist_rad`` (of the tip against the
-    root, nose up) and ``zero_lift_rad`` are slopes of the mean line in its boundary condition.
+    Wing axes W: origin at the root's mid-chord, y along the mid-chord line, the right surface spanning +y
+    and the left one -y, z normal to the surface (down without dihedral), x forward. With all hinges at rest
+    they are the body axes turned by the dihedral about x, then the incidence about y, then the sweep about z
+    (``rest_R_BW``). Chords are parallel to the root's, hence oblique in W if swept (``chord_W``); the length
+    of the mid-chord line is ``length_m`` = span / cos(sweep), and "distance from the root" is measured along
+    it. Section properties are per length of that line; a section is perpendicular to it, the solid box
+    chord cos(sweep) wide.
+
+    As in documents, ``elastic_axis_offset_m`` and ``mass_axis_offset_m`` are the distances of the elastic
+    axis and of the line of centres of mass aft of mid-chord (negative: forward), along the chord;
+    ``elastic_axis_x_m`` and ``mass_axis_x_m`` are the same, positive forward. Both lines are parallel to y
+    and begin at the root chord. ``hinges`` carry the surface, from the fuselage outward; a fixed surface has
+    none. The lattice stays flat: ``twist_rad`` (of the tip against the root, nose up) and ``zero_lift_rad``
+    are slopes of the mean line in its boundary condition.
     """
 
     name: str
@@ -37,6 +47,9 @@ class Surface(Shown):
     span_m: float
     root_chord_m: float
     tip_chord_m: float
+    sweep_rad: float
+    dihedral_rad: float
+    incidence_rad: float
     thickness_m: float
     material: Material
     hinges: tuple[Hinge, ...]
@@ -61,6 +74,9 @@ class Surface(Shown):
             span_m=document.span_m,
             root_chord_m=root,
             tip_chord_m=tip,
+            sweep_rad=document.sweep_rad,
+            dihedral_rad=document.dihedral_rad,
+            incidence_rad=document.incidence_rad,
             thickness_m=document.thickness_m,
             material=document.material,
             hinges=tuple(Hinge.of(hinge, document.side) for hinge in document.all_hinges),
@@ -81,19 +97,57 @@ class Surface(Shown):
         return 1.0 if self.side == "right" else -1.0
 
     @property
+    def length_m(self) -> float:
+        """Length of the mid-chord line, and of the elastic axis."""
+        return self.span_m / math.cos(self.sweep_rad)
+
+    @property
+    def chord_W(self) -> Array:
+        """Unit vector (3,) of the chords in W, forward."""
+        return np.array([math.cos(self.sweep_rad), -self.span_sign * math.sin(self.sweep_rad), 0.0])
+
+    @property
+    def rest_R_BW(self) -> Array:
+        """Rotation (3, 3) with all hinges at rest, wing components to body components."""
+        upright = abs(abs(self.dihedral_rad) - 0.5 * math.pi) < VERTICAL_RAD
+        cosine = 0.0 if upright else math.cos(self.dihedral_rad)
+        sine = -self.span_sign * math.sin(self.dihedral_rad)  # tip up on both sides
+        dihedral = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        cosine, sine = math.cos(self.incidence_rad), math.sin(self.incidence_rad)
+        incidence = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+        cosine, sine = math.cos(self.sweep_rad), self.span_sign * math.sin(self.sweep_rad)
+        sweep = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray(dihedral @ incidence @ sweep)
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether wing axes and body axes are parallel with all hinges at rest."""
+        return self.sweep_rad == self.dihedral_rad == self.incidence_rad == 0.0
+
+    @property
+    def elastic_axis_W(self) -> Array:
+        """The elastic axis at the root (3,), m: the origin of beam and links."""
+        return self.elastic_axis_x_m * self.chord_W
+
+    @property
+    def mass_arm_W(self) -> Array:
+        """A section's centre of mass (3,) from the elastic axis, m."""
+        return (self.mass_axis_x_m - self.elastic_axis_x_m) * self.chord_W
+
+    @property
     def elastic_axis_x_m(self) -> float:
-        """The x in W (forward positive) of the elastic axis; the offset itself is positive aft."""
+        """The elastic axis ahead of mid-chord, along the chord; the offset itself is positive aft."""
         return -self.elastic_axis_offset_m
 
     @property
     def mass_axis_x_m(self) -> float:
-        """The x in W (forward positive) of the line of centres of mass; the offset itself is positive aft."""
+        """The line of centres of mass ahead of mid-chord, along the chord."""
         return -self.mass_axis_offset_m
 
     @property
     def root_arms_B(self) -> Array:
         """Vectors (m, 3), m, from each hinge to the elastic axis at the root, at rest; see `hinge_arms`."""
-        return hinge_arms(self.hinges, np.array(self.position_m), np.array([self.elastic_axis_x_m, 0.0, 0.0]))
+        return hinge_arms(self.hinges, np.array(self.position_m), self.rest_R_BW @ self.elastic_axis_W)
 
     @property
     def mean_chord_m(self) -> float:
@@ -106,13 +160,13 @@ class Surface(Shown):
         return self.span_m * self.mean_chord_m
 
     def chord_at(self, distance_m: ArrayLike) -> Array:
-        """Chord (m) at a distance from the root along the span, shape of the input."""
-        fraction = np.asarray(distance_m, dtype=np.float64) / self.span_m
+        """Chord (m) at a distance from the root along the mid-chord line, shape of the input."""
+        fraction = np.asarray(distance_m, dtype=np.float64) / self.length_m
         return self.root_chord_m + (self.tip_chord_m - self.root_chord_m) * fraction
 
     def twist_at(self, distance_m: ArrayLike) -> Array:
         """Twist (rad, nose up) of the section at a distance from the root; zero at the root, linear."""
-        return self.twist_rad * np.asarray(distance_m, dtype=np.float64) / self.span_m
+        return self.twist_rad * np.asarray(distance_m, dtype=np.float64) / self.length_m
 
     def slope_at(self, distance_m: ArrayLike) -> Array:
         """Incidence (rad) that twist and camber add to a flat section at a distance from the root."""
@@ -123,7 +177,7 @@ class Surface(Shown):
         chord = np.atleast_1d(self.chord_at(distance_m))
         if self.section is not None:
             return given_section(self.section, chord)
-        return solid_box(self.material, chord, self.thickness_m)
+        return solid_box(self.material, chord * math.cos(self.sweep_rad), self.thickness_m)
 
     def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array]:
         """Axial and shear stiffness, N, each (stations,), at distances from the root.

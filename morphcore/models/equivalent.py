@@ -101,8 +101,8 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 6) first link, links, first strip, strips, first overlap pair of each surface, and whether
-        it also represents its mirror image.
+    surfaces : (s, 7) first link, links, first strip, strips, first overlap pair of each surface, whether
+        it also represents its mirror image, and the first of its further outputs of the lattice, or -1.
     """
 
     aircraft: Aircraft
@@ -302,7 +302,8 @@ def _chain_model(
     rows, link, pair = [], 0, 0
     for surface, part, strip0 in zip(aircraft.surfaces, lattices.lattices, lattices.strip0, strict=True):
         count = links_per_wing if surface.flexible else 1
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images))])
+        more = lattices.more_rows(strip0)
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
@@ -445,7 +446,7 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
         for parameter in model.parameters:
             parameter.apply(laid, values[parameter.name])
         if model.flight.apparent_mass:
-            laid.add_apparent_mass(link_edges(values["division"], surface.span_m), model.flight)
+            laid.add_apparent_mass(link_edges(values["division"], surface.length_m), model.flight)
         every.append(laid)
     rows = np.concatenate(
         [

@@ -82,15 +82,15 @@ def flexible_model(
         count = elements if surface.flexible else 0
         roots.append(node)
         tips.append(node + count)
-        stations = np.linspace(0.0, surface.span_m, count + 1)
+        stations = np.linspace(0.0, surface.length_m, count + 1)
         rest_W.append(stations[:, None] * np.array([0.0, surface.span_sign, 0.0]))
         place = _section_places(surface, part, node, len(ends), count)
         places.append(place[:2])
         riders.append(_riders(surface, part, flight, place[2]))
         for e in range(count):
             ends.append([node + e, node + e + 1])
-            rest.append([0.0, 0.0, 0.0, 0.0, surface.span_sign * surface.span_m / count, 0.0])
-            sections.append(beam_sections(surface, stations[e] + GAUSS * surface.span_m / count))
+            rest.append([0.0, 0.0, 0.0, 0.0, surface.span_sign * surface.length_m / count, 0.0])
+            sections.append(beam_sections(surface, stations[e] + GAUSS * surface.length_m / count))
             damping.append(surface.material.stiffness_damping_s)
         if count == 0:
             bodies.append(node)
@@ -121,24 +121,23 @@ def _apparent_at(surface: Surface, flight: Flight, stations: Array) -> Array:
 
     Each node carries the air of the half elements beside it; a rigid surface's root that of the whole.
     """
-    edges = np.concatenate([[0.0], 0.5 * (stations[1:] + stations[:-1]), [surface.span_m]])
+    edges = np.concatenate([[0.0], 0.5 * (stations[1:] + stations[:-1]), [surface.length_m]])
     return spatial(apparent_inertia(surface, flight.air_density_kg_m3, edges[:-1], edges[1:], stations))
 
 
 def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:
     """Stiffness and mass of a surface's sections at distances from the root, about its elastic axis.
 
-    Axes of W: x chord, y span, z normal.
+    Axes of W: x across the elastic axis, y along it, z normal.
     """
     properties = surface.section_at(distance_m)
     axial, shear = surface.axial_at(distance_m)
-    arm = surface.mass_axis_x_m - surface.elastic_axis_x_m
     sections = []
     for i in range(distance_m.size):
         stiffness = np.diag(
             [properties.ei_flap[i], properties.gj[i], properties.ei_edge[i], shear[i], axial[i], shear[i]]
         )
-        sections.append(Section(stiffness, section_inertia(properties, i, np.array([arm, 0.0, 0.0]))))
+        sections.append(Section(stiffness, section_inertia(properties, i, surface.mass_arm_W)))
     return sections
 
 
@@ -171,13 +170,13 @@ def fuselage_inertia(fuselage: Fuselage) -> Array:
 
 def rigid_surface_inertia(surface: Surface) -> Array:
     """Spatial inertia (6, 6) of an unbent surface about its root node, in W."""
-    width = surface.span_m / INERTIA_POINTS
+    width = surface.length_m / INERTIA_POINTS
     distance = (np.arange(INERTIA_POINTS) + 0.5) * width
     properties = surface.section_at(distance)
-    arm_x = surface.mass_axis_x_m - surface.elastic_axis_x_m
     total = np.zeros((6, 6))
     for i, y in enumerate(distance):
-        total += width * section_inertia(properties, i, np.array([arm_x, surface.span_sign * y, 0.0]))
+        along = np.array([0.0, surface.span_sign * y, 0.0])
+        total += width * section_inertia(properties, i, surface.mass_arm_W + along)
     return total
 
 
@@ -192,7 +191,7 @@ def _section_places(
     distance = np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])])
     if not elements:
         return np.full(distance.size, -1 - root), np.zeros(distance.size), np.zeros((distance.size, 3))
-    place = distance / surface.span_m * elements
+    place = distance / surface.length_m * elements
     inside = np.minimum(np.floor(place + 1e-12), elements - 1)
     origin_W = distance[:, None] * np.array([0.0, surface.span_sign, 0.0])
     return first_element + inside.astype(np.int64), place - inside, origin_W
@@ -200,7 +199,7 @@ def _section_places(
 
 def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Array) -> Riders:
     """Riders of one surface on its sections."""
-    axis = np.array([surface.elastic_axis_x_m, 0.0, 0.0])
+    axis = surface.elastic_axis_W
     strips = part.spanwise
     corner = np.tile(np.arange(strips + 1), part.chordwise + 1)
     middle = strips + 1 + np.arange(strips)
@@ -218,6 +217,8 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
         drag_arm=middle_W - axis - origin_W[middle],
         drag_area=surface.profile_drag * part.panel_area_m2.sum(axis=0),
         moment_area=surface.cm0 * _chord_squared(surface, part),
+        control_chord=np.tile(surface.chord_W[:2], (control.size, 1)),
+        drag_chord=np.tile(surface.chord_W[:2], (strips, 1)),
         slope=np.tile(
             surface.slope_at(0.5 * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])), part.chordwise
         ),
@@ -228,7 +229,8 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
 def _chord_squared(surface: Surface, part: SurfaceLattice) -> Array:
     """Integral (strips,) of the chord squared over each strip, m^3; exact for linear taper."""
     inner, outer = surface.chord_at(part.strip_edges_m[:-1]), surface.chord_at(part.strip_edges_m[1:])
-    return np.asarray(np.diff(part.strip_edges_m) * (inner**2 + inner * outer + outer**2) / 3.0)
+    width = np.diff(part.strip_edges_m) * surface.chord_W[0]
+    return np.asarray(width * (inner**2 + inner * outer + outer**2) / 3.0)
 
 
 def _joined(parts: list[Riders]) -> Riders:
@@ -251,6 +253,8 @@ def _joined(parts: list[Riders]) -> Riders:
         drag_arm=stacked("drag_arm"),
         drag_area=stacked("drag_area"),
         moment_area=stacked("moment_area"),
+        control_chord=stacked("control_chord"),
+        drag_chord=stacked("drag_chord"),
         slope=stacked("slope"),
         lag_time=stacked("lag_time"),
     )

@@ -1,7 +1,7 @@
 """Rigid links cut from a lifting surface: mass properties, joint compliance, share of the lattice's strips.
 
 All functions work on batches: ``edges`` (particles, n + 1) are the links' ends as distances from the root, m,
-increasing from 0 to the span.
+increasing from 0 to the length of the elastic axis (the span, unless swept).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ MASS_ROWS = 7
 BEAM_POINTS, BEAM_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-def link_edges(division: Array, span_m: float) -> Array:
+def link_edges(division: Array, length_m: float) -> Array:
     """Ends of the links (particles, n + 1) from the division fractions (particles, n), which sum to one."""
-    edges = np.concatenate([np.zeros((division.shape[0], 1)), np.cumsum(division, axis=1)], axis=1) * span_m
-    edges[:, -1] = span_m
+    edges = np.concatenate([np.zeros((division.shape[0], 1)), np.cumsum(division, axis=1)], axis=1) * length_m
+    edges[:, -1] = length_m
     return edges
 
 
@@ -43,8 +43,8 @@ def link_masses(surface: Surface, edges: Array) -> Array:
         value.reshape(stations.shape) * weight
         for value in (section.mass, section.inertia_x, section.inertia_y, section.inertia_z)
     )
-    x = surface.mass_axis_x_m - surface.elastic_axis_x_m
-    y = surface.span_sign * (stations - start)
+    x, aside, _ = surface.mass_arm_W
+    y = surface.span_sign * (stations - start) + aside
     return np.stack(
         [
             mass.sum(-1),
@@ -69,11 +69,11 @@ def beam_division(surface: Surface, links: int) -> Array:
     """
     if links == 1:
         return np.ones(1)
-    ends = np.linspace(0.0, surface.span_m, links)
+    ends = np.linspace(0.0, surface.length_m, links)
     stations, curvature = _segment_compliance(surface, ends[None])
     flap = curvature[0, 0]
     joints = (flap * stations[0]).sum(-1) / flap.sum(-1)
-    return np.asarray(np.diff(joints, prepend=0.0, append=surface.span_m) / surface.span_m)
+    return np.asarray(np.diff(joints, prepend=0.0, append=surface.length_m) / surface.length_m)
 
 
 def joint_stiffness(surface: Surface, edges: Array) -> Array:
@@ -94,7 +94,7 @@ def joint_stiffness(surface: Surface, edges: Array) -> Array:
     links = edges.shape[1] - 1
     if links == 1:
         return np.zeros((edges.shape[0], 0, 3))
-    span = surface.span_m
+    span = surface.length_m
     own = link_edges(beam_division(surface, links)[None], span)[0, 1:-1]
     cut = (np.linspace(0.0, span, links)[1:-1] - own[:-1]) / np.diff(own)
     joints = edges[:, 1:-1]
@@ -122,7 +122,7 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
     """
     start, length = ends[:, :-1, None], np.diff(ends, axis=1)[..., None]
     stations = start + length * 0.5 * (BEAM_POINTS + 1)
-    moment = 0.5 * length * BEAM_WEIGHTS * (surface.span_m - stations)
+    moment = 0.5 * length * BEAM_WEIGHTS * (surface.length_m - stations)
     section = surface.section_at(stations.ravel())
     stiffness = np.stack([section.ei_flap, section.gj, section.ei_edge]).reshape(3, *stations.shape)
     return stations, moment / stiffness
@@ -130,11 +130,17 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
 
 def twist_slopes(surface: Surface, edges: Array) -> Array:
     """Rows L_SLOPE to L_TURN_Y (particles, n, 4) of links whose sections are twisted (see `sloped`)."""
-    growth = surface.span_sign * surface.twist_rad / surface.span_m  # along y
+    growth = surface.span_sign * surface.twist_rad / surface.length_m  # along y
     length = surface.span_sign * np.diff(edges, axis=1)
     start = surface.twist_at(edges[:, :-1])
     return np.stack(
-        [start, np.full_like(start, growth), growth * length**2 / 6.0, -(start + growth * length)], axis=-1
+        [
+            start,
+            np.full_like(start, growth),
+            surface.chord_W[0] * growth * length**2 / 6.0,
+            -surface.chord_W[0] * (start + growth * length),
+        ],
+        axis=-1,
     )
 
 
@@ -158,7 +164,7 @@ def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     """Planform area (particles, n) of each link in m^2 and the y of its centroid in link axes, m."""
     start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
     stations = start + length * 0.5 * (POINTS + 1)
-    chord = surface.chord_at(stations) * 0.5 * length * WEIGHTS
+    chord = surface.chord_at(stations) * surface.chord_W[0] * 0.5 * length * WEIGHTS
     area = chord.sum(-1)
     return area, surface.span_sign * (chord * (stations - start)).sum(-1) / area
 
@@ -167,6 +173,6 @@ def moment_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     """Integral of the chord squared (particles, n) over each link in m^3, and the y of its centroid, m."""
     start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
     stations = start + length * 0.5 * (POINTS + 1)
-    squared = surface.chord_at(stations) ** 2 * 0.5 * length * WEIGHTS
+    squared = surface.chord_at(stations) ** 2 * surface.chord_W[0] * 0.5 * length * WEIGHTS
     total = squared.sum(-1)
     return total, surface.span_sign * (squared * (stations - start)).sum(-1) / total

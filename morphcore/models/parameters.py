@@ -20,12 +20,15 @@ from morphcore.aero.kernels.loads import (
     JONES_B2,
     JONES_MEAN_LAG,
     L_CENTRE,
+    L_CHORD_X,
+    L_CHORD_Y,
     L_DRAG,
     L_DRAG_Y,
     L_FAST_WEIGHT,
     L_LIFT,
     L_MOMENT,
     L_MOMENT_Y,
+    L_SKEW,
     L_SLOPE,
     L_SLOW_DECAY,
     L_TURN_Y,
@@ -100,7 +103,7 @@ class CutSurface:
     @property
     def edges(self) -> Array:
         """Ends of the links (p, n + 1), distances from the root in m."""
-        return link_edges(self.division, self.surface.span_m)
+        return link_edges(self.division, self.surface.length_m)
 
 
 @dataclass
@@ -257,13 +260,15 @@ def _factor(centre: Array, factor: float) -> tuple[Array, Array]:
 
 def _cut(rows: SurfaceRows, division: Array) -> None:
     """Masses, joint offsets, drag areas and strips of links with these shares of the span."""
-    surface, edges = rows.surface, link_edges(division, rows.surface.span_m)
+    surface, edges = rows.surface, link_edges(division, rows.surface.length_m)
     particles = division.shape[0]
     rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
     rows.links[:, 1:, L_OFFSET] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
     rows.links[:, :, L_DRAG], rows.links[:, :, L_DRAG_Y] = drag_areas(surface, edges)
     rows.links[:, :, L_SLOPE : L_TURN_Y + 1] = twist_slopes(surface, edges)
     rows.links[:, :, L_MOMENT], rows.links[:, :, L_MOMENT_Y] = moment_areas(surface, edges)
+    x, y, _ = surface.chord_W
+    rows.links[:, :, L_CHORD_X], rows.links[:, :, L_CHORD_Y], rows.links[:, :, L_SKEW] = x, y, y / x
     weight, middle = strip_overlap(surface, rows.part, edges)
     rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
     is_touched = weight > 0.0
@@ -366,7 +371,7 @@ def _drag(rows: SurfaceRows, coefficient: Array) -> None:
 
 def _camber(rows: SurfaceRows, zero_lift_rad: Array) -> None:
     rows.links[:, :, L_SLOPE] -= zero_lift_rad[:, None]
-    rows.links[:, :, L_TURN_Y] += zero_lift_rad[:, None]
+    rows.links[:, :, L_TURN_Y] += rows.surface.chord_W[0] * zero_lift_rad[:, None]
 
 
 def _pitch(rows: SurfaceRows, cm0: Array) -> None:

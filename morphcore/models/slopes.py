@@ -39,11 +39,13 @@ def sloped_motion(model: ChainModel, batch: ParameterBatch, R_BL: Array, air_B: 
         division = np.ones((batch.particles, 1))
         if count > 1:
             division = batch["division"][:, model.set_of(batch)[s]]
-        slopes = twist_slopes(surface, link_edges(division, surface.span_m))
+        slopes = twist_slopes(surface, link_edges(division, surface.length_m))
         mine = slice(first, first + count)
-        forward = np.einsum("pka,pa->pk", R_BL[:, mine, :, 0], air_B)
+        chord = surface.chord_W
+        forward = np.einsum("pkac,c,pa->pk", R_BL[:, mine], chord, air_B)
         motion[:, mine, 0] += (slopes[..., 0] - zero_lift[:, None]) * forward
         motion[:, mine, 1] += slopes[..., 1] * forward
+        motion[:, mine, 2] += chord[1] / chord[0] * slopes[..., 1] * forward
     return motion
 
 

@@ -12,13 +12,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.geometry.hinge import Hinge
+from morphcore.geometry.hinge import UPRIGHT, Hinge
 
 Array = NDArray[np.float64]
 
 
 def relative_motion(
-    hinges: Sequence[Hinge], arms: Array, angles: Array, rates: Array, accelerations: Array
+    hinges: Sequence[Hinge],
+    arms: Array,
+    angles: Array,
+    rates: Array,
+    accelerations: Array,
+    rest: Array = UPRIGHT,
 ) -> tuple[Array, Array]:
     """Twist of a surface relative to the fuselage, and its time derivative in W.
 
@@ -34,6 +39,8 @@ def relative_motion(
         From each hinge to the point of the surface, at rest, m; see `hinge_arms`.
     angles, rates, accelerations : ndarray, shape (k, m)
         rad, rad/s, rad/s^2.
+    rest : ndarray, shape (3, 3)
+        Rotation of the surface with all hinges at rest, W to B.
 
     Returns
     -------
@@ -52,18 +59,26 @@ def relative_motion(
         twist = _carried(turn, arm, twist)
         acceleration = _carried(turn, arm, acceleration) + _cross(twist, own) + change
         twist = twist + own
-    return twist, acceleration
+    return _in_wing_axes(rest, twist), _in_wing_axes(rest, acceleration)
 
 
-def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array) -> Array:
-    """Twist (k, m, 6) of a surface for a unit rate of each of its hinges, in W at a point of it."""
+def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array, rest: Array = UPRIGHT) -> Array:
+    """Twist (k, m, 6) of a surface for a unit rate of each of its hinges, in W at a point of it.
+
+    ``rest`` as in `relative_motion`.
+    """
     out = np.empty((angles.shape[0], len(hinges), 6))
     for place, (hinge, arm) in enumerate(zip(hinges, arms, strict=False)):
         turn = hinge.rotation(angles[:, place])
         for inner in range(place):
             out[:, inner] = _carried(turn, arm, out[:, inner])
         out[:, place] = _screw(hinge, arm)
-    return out
+    return _in_wing_axes(rest, out)
+
+
+def _in_wing_axes(rest: Array, motion: Array) -> Array:
+    """Motion vectors (..., 6) in W from those in axes that are parallel to B with all hinges at rest."""
+    return np.concatenate([motion[..., :3] @ rest, motion[..., 3:] @ rest], axis=-1)
 
 
 def _screw(hinge: Hinge, arm: Array) -> Array:

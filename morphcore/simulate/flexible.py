@@ -110,11 +110,11 @@ def _root_path(
     surface: Surface, angles: Array, rates: Array, accelerations: Array
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Pose, axis, rate and acceleration of one surface's root, see ``HingePath``, from its hinges (k, m)."""
-    arms = surface.root_arms_B
-    R_BW, origin_B = hinged_pose(surface.hinges, arms, angles)
-    twist, change = relative_motion(surface.hinges, arms, angles, rates, accelerations)
+    arms, rest = surface.root_arms_B, surface.rest_R_BW
+    R_BW, origin_B = hinged_pose(surface.hinges, arms, angles, rest)
+    twist, change = relative_motion(surface.hinges, arms, angles, rates, accelerations, rest)
     if len(surface.hinges) == 1:
-        return R_BW, origin_B, hinge_screws(surface.hinges, arms, angles)[:, 0], rates[:, 0], change
+        return R_BW, origin_B, hinge_screws(surface.hinges, arms, angles, rest)[:, 0], rates[:, 0], change
     return R_BW, origin_B, twist, np.ones(angles.shape[0]), change
 
 

@@ -387,9 +387,10 @@ def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
     """
     rows = np.empty((angles.shape[0], len(aircraft.surfaces), HINGE_ROWS))
     for number, (surface, own) in enumerate(zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)):
-        arms = surface.root_arms_B
-        R_BW, origin_B = hinged_pose(surface.hinges, arms, angles[:, own])
-        twist, _ = relative_motion(surface.hinges, arms, angles[:, own], rates[:, own], 0.0 * rates[:, own])
+        arms, rest = surface.root_arms_B, surface.rest_R_BW
+        R_BW, origin_B = hinged_pose(surface.hinges, arms, angles[:, own], rest)
+        still = 0.0 * rates[:, own]
+        twist, _ = relative_motion(surface.hinges, arms, angles[:, own], rates[:, own], still, rest)
         rows[:, number, H_ROTATION:H_TWIST] = R_BW.reshape(-1, 9)
         rows[:, number, H_TWIST:H_ORIGIN] = twist
         rows[:, number, H_ORIGIN:] = origin_B
@@ -401,7 +402,12 @@ def surface_accelerations(aircraft: Aircraft, angles: Array, rates: Array, accel
     return np.stack(
         [
             relative_motion(
-                surface.hinges, surface.root_arms_B, angles[:, own], rates[:, own], accelerations[:, own]
+                surface.hinges,
+                surface.root_arms_B,
+                angles[:, own],
+                rates[:, own],
+                accelerations[:, own],
+                surface.rest_R_BW,
             )[1]
             for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
         ],

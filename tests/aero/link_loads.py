@@ -62,7 +62,7 @@ def edge_loads(model: ChainModel, angles: Array, twist_B: Array) -> Array:
         R_BW, r_B = surface_pose(surface, angles[own])
         corners.append((part.ring_corners_W @ R_BW.T + r_B).reshape(-1, 3))
         controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
-        poses.append((R_BW, r_B - R_BW[:, 0] * surface.elastic_axis_offset_m))
+        poses.append((R_BW, r_B + R_BW @ surface.elastic_axis_W))
     corners_B, controls_B = np.concatenate(corners), np.concatenate(controls)
 
     def flow(points: Array) -> Array:

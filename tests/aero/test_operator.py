@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from morphcore.aero.kernels.loads import OUTPUTS
+from morphcore.aero.kernels.loads import MORE_OUTPUTS, OUTPUTS
 from morphcore.aero.operator import (
     BODY_AFT,
     COLUMN_MULTIPLE,
@@ -116,7 +116,7 @@ def test_padding_is_empty():
     assert columns % COLUMN_MULTIPLE == 0
     matrix = lattice_operator(lattice, (0.1, 0.2, 0.1)).matrix
     assert matrix.shape == (rows, columns)
-    np.testing.assert_array_equal(matrix[OUTPUTS * lattice.strips :], 0.0)
+    np.testing.assert_array_equal(matrix[(OUTPUTS + MORE_OUTPUTS) * lattice.strips :], 0.0)
     np.testing.assert_array_equal(matrix[:, 2 * lattice.strips :], 0.0)
 
 

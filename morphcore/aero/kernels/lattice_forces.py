@@ -57,7 +57,9 @@ def blocked_flow(parts, place, twists, wind_B, out):
         slope = place.slope[p]
         if slope != 0.0:
             for i in range(3):
-                total -= slope * place.R_BS[k, i, 0] * (velocity[i] - wind_B[i])
+                chord = place.R_BS[k, i, 0] * parts.control_chord[p, 0]
+                chord += place.R_BS[k, i, 1] * parts.control_chord[p, 1]
+                total -= slope * chord * (velocity[i] - wind_B[i])
         out[p] = total
 
 
@@ -106,6 +108,9 @@ def section_forces(parts, place, gamma, twists, wind_B, still, out):
         factor = 0.5 * parts.density * parts.drag_area[t] * sqrt(u * u + v * v + w * w)
         R = place.R_BS[k]
         add_rider_force(R, parts.drag_arm[t], factor * u, factor * v, factor * w, out[k])
-        x = R[0, 0] * u + R[1, 0] * v + R[2, 0] * w
+        cx, cy = parts.drag_chord[t, 0], parts.drag_chord[t, 1]
+        x = (R[0, 0] * u + R[1, 0] * v + R[2, 0] * w) * cx + (R[0, 1] * u + R[1, 1] * v + R[2, 1] * w) * cy
         z = R[0, 2] * u + R[1, 2] * v + R[2, 2] * w
-        out[k, 1] += 0.5 * parts.density * parts.moment_area[t] * (x * x + z * z)
+        nose_up = 0.5 * parts.density * parts.moment_area[t] * (x * x + z * z)
+        out[k, 0] -= cy * nose_up
+        out[k, 1] += cx * nose_up

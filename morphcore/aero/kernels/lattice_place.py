@@ -53,6 +53,8 @@ class LatticeParts(NamedTuple):
     drag_arm: Array
     drag_area: Array
     moment_area: Array
+    control_chord: Array
+    drag_chord: Array
     smoothed: bool
     stretch: float
     density: float

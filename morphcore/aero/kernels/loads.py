@@ -3,7 +3,7 @@
 The lattice is fixed on the undeformed surface; its strips ride on the links. A strip that spans a joint
 belongs to both links in proportion to its width on each (``overlap``), so that loads are continuous in the
 division lengths. The operator maps the normal velocity of the strips (two inputs each: at the link axis, and
-its slope along the chord) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
+its slope along the chord, which is oblique in link axes on a swept surface) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
 follow (see aero/operator.py for their derivation):
 
     0  g = Gamma dy       circulation at the trailing edge times strip width, m^3/s
@@ -11,6 +11,13 @@ follow (see aero/operator.py for their derivation):
     2  X = sum Gamma_i A_i x_i          its chordwise moment, m^5/s
     3  w_x   induced normal velocity weighted by the bound spanwise circulation, m/s
     4  w_y   the same for the chordwise edges, m/s
+
+Both are sums over all bound edges, by their components along y and x, per circulation and width of the
+strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all strips:
+
+    0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
+    1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
+             per density and g, m^2/s
 
 All quantities are in link axes; velocities are those of the structure relative to still air.
 """
@@ -22,34 +29,49 @@ import math
 from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
-OUTPUTS = 5
+OUTPUTS, MORE_OUTPUTS = 5, 2
+# columns of the table of strips, in link axes about each strip's middle on the link axis (the elastic axis),
+# m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
+# lifting circulation, per width of the strip; unit vector of the chord, forward
+EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y = 0, 1, 2, 3, 4, 5, 6
+STRIP_COLUMNS = 7
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
 # (1/m); what the link's yaw rate adds to v_z (m) and to omega_x (see ``sloped``); cm0 times the integral of
-# the chord squared (m^3), and the y of its centroid (m)
+# the chord squared (m^3), and the y of its centroid (m); unit vector of the chords, forward, and y over x of it
 L_DRAG, L_DRAG_Y = 8, 9
 L_SLOW_DECAY, L_SLOW_WEIGHT, L_FAST_DECAY, L_FAST_WEIGHT = 10, 11, 12, 13
 L_LIFT, L_CENTRE = 14, 15
 L_SLOPE, L_SLOPE_Y, L_TURN, L_TURN_Y, L_MOMENT, L_MOMENT_Y = 16, 17, 18, 19, 20, 21
+L_CHORD_X, L_CHORD_Y, L_SKEW = 22, 23, 24
 # Wagner's function by R. T. Jones (1940): 1 - A1 exp(-b1 s) - A2 exp(-b2 s), s in semichords travelled
 JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0 = 0, 1, 2, 3, 4, 5, 6
 
 
 @inlined
-def sloped(motion, slope, forward, turned, turn):
-    """A component of the link's motion (v_z, omega_x) with that of its sections' slope added.
+def sloped(link, twist, l):
+    """The link's motion (v_z, omega_x, omega_y) with that of its sections' slope added.
 
-    In linear theory a section of slope s meets the normal velocity v_z + y omega_x + u_x s of a flat one,
-    where u_x = ``forward`` - y ``turn`` and s = s0 + s1 y. On a link from 0 to L the product's y^2 is
-    replaced by the line L y - L^2 / 6, of the same integral and moment. The sum is then the motion of a flat
-    link, with v_z + s0 u + s1 L^2 / 6 r and omega_x + s1 u - (s0 + s1 L) r, and lags as such.
+    In linear theory a section of slope s meets the normal velocity v_z + y omega_x + u s of a flat one. The
+    velocity along its chord is u = u0 - y c r with the chord's x component c and the yaw rate r = omega_z,
+    the slope s = s0 + s1 y. On a link from 0 to L the product's y^2 is replaced by the line L y - L^2 / 6, of
+    the same integral and moment. The sum is then the motion of a flat link, with v_z + s0 u0 + s1 L^2 / 6 c r
+    and omega_x + s1 u0 - (s0 + s1 L) c r, and lags as such. On an oblique chord omega_y takes a share that
+    leaves the velocity's slope along the chord as it is.
     """
-    return motion + slope * forward + turned * turn
+    forward = link[L_CHORD_X, l] * twist[3, l] + link[L_CHORD_Y, l] * twist[4, l]
+    turn = twist[2, l]
+    raised = link[L_SLOPE_Y, l] * forward + link[L_TURN_Y, l] * turn
+    return (
+        twist[5, l] + link[L_SLOPE, l] * forward + link[L_TURN, l] * turn,
+        twist[0, l] + raised,
+        twist[1, l] + link[L_SKEW, l] * raised,
+    )
 
 
 @kernel
@@ -71,10 +93,7 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
         return
     now = 1.0 - JONES_A1 - JONES_A2
     for l in range(len(lanes)):
-        forward, turn = twist[3, l], twist[2, l]
-        effective[0, l] = sloped(twist[5, l], link[L_SLOPE, l], forward, link[L_TURN, l], turn)
-        effective[1, l] = sloped(twist[0, l], link[L_SLOPE_Y, l], forward, link[L_TURN_Y, l], turn)
-        effective[2, l] = twist[1, l]
+        effective[0, l], effective[1, l], effective[2, l] = sloped(link, twist, l)
     for i in range(3):
         for l in range(len(lanes)):
             motion = effective[i, l]
@@ -87,12 +106,12 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
 
 
 @kernel
-def strip_inputs(lanes, surface, ranges, overlap, effective, inputs):
-    """Normal velocity of each strip of a surface at the link axis and its slope along x: two rows each."""
+def strip_inputs(lanes, surface, ranges, strips, overlap, effective, inputs):
+    """Normal velocity of each strip of a surface at the link axis and its slope along the chord: two rows."""
     if not_in_lanes(overlap, lanes) or not_in_lanes(effective, lanes) or not_in_lanes(inputs, lanes):
         return
-    strip0, strips = surface[STRIP0], surface[STRIPS]
-    for j in range(2 * strip0, 2 * (strip0 + strips)):
+    strip0 = surface[STRIP0]
+    for j in range(2 * strip0, 2 * (strip0 + surface[STRIPS])):
         row = inputs[j]
         for l in range(len(lanes)):
             row[l] = 0.0
@@ -103,10 +122,11 @@ def strip_inputs(lanes, surface, ranges, overlap, effective, inputs):
             pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
             part = overlap[pair : pair + 2]
             out = inputs[2 * (strip0 + j) : 2 * (strip0 + j) + 2]
+            cx, cy = strips[strip0 + j, CHORD_X], strips[strip0 + j, CHORD_Y]
             for l in range(len(lanes)):
                 weight = part[0, l]
                 out[0, l] += weight * (motion[0, l] + part[1, l] * motion[1, l])
-                out[1, l] -= weight * motion[2, l]
+                out[1, l] += weight * (cy * motion[1, l] - cx * motion[2, l])
 
 
 @kernel
@@ -147,9 +167,10 @@ def lane_product(lanes, matrix, inputs, outputs):
 def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, sums, wrench):
     """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, profile drag, cm0.
 
-    ``strips`` (n, 3): trailing edge x and circulation centre x of each strip from the link axis, m, and the
-    slope dx/dy of the trailing edge. ``sums``: 13 scratch rows. Profile drag is quadratic in the velocity at
-    the link's centre of drag area; the moment cm0 of the sections in its part in their planes.
+    ``strips`` : table of the strips. ``sums``: 6 scratch rows. Each strip has the force of its open trailing
+    edge in the velocity there and the moments of its closed rings (see aero/operator.py); the in-plane force
+    of a pitch rate acts at the centre of circulation. Profile drag is quadratic in the velocity at the link's
+    centre of drag area, the moment cm0 of the sections in its part in their planes.
     """
     if (
         not_in_lanes(overlap, lanes)
@@ -160,63 +181,62 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         return
     if not_in_lanes(sums, lanes) or not_in_lanes(wrench, lanes):
         return
-    for i in range(13):
+    for i in range(6):
         row = sums[i]
         for l in range(len(lanes)):
             row[l] = 0.0
     number = surface[LINK0] + k
-    slope = strips[surface[STRIP0], 2]  # one slope for the whole surface: taper is linear
+    cx, cy = strips[surface[STRIP0], CHORD_X], strips[surface[STRIP0], CHORD_Y]
     for j in range(ranges[number, 0], ranges[number, 1]):
         pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
         part = overlap[pair : pair + 2]
         strip = surface[STRIP0] + j
         out = outputs[OUTPUTS * strip : OUTPUTS * strip + OUTPUTS]
-        edge, centre = strips[strip, 0], strips[strip, 1]
+        edge, centre = strips[strip, EDGE_X], strips[strip, CENTRE_X]
+        ex, ey, aside = strips[strip, EDGE_DX], strips[strip, EDGE_DY], strips[strip, EDGE_Y]
+        skew = strips[strip, CHORD_Y] / strips[strip, CHORD_X]
+        behind = centre - edge
         for l in range(len(lanes)):
+            wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
             weight, y = part[0, l], part[1, l]
             g = weight * out[0, l]
             moment = weight * out[1, l]
-            sums[0, l] += g
-            sums[1, l] += g * y
-            sums[2, l] += g * y * y
-            sums[3, l] += g * edge
-            sums[4, l] += g * edge * y
-            sums[5, l] += moment
-            sums[6, l] += moment * y
-            sums[7, l] += weight * out[2, l]
-            sums[8, l] += g * centre
-            sums[9, l] += g * centre * y
-            sums[10, l] += g * out[3, l]
-            sums[11, l] += g * y * out[3, l]
-            sums[12, l] += g * out[4, l]
+            edge_y = y + aside
+            lift = g * (ey * (twist[3, l] - wz * edge_y) - ex * (twist[4, l] + wz * edge))
+            suction = g * (twist[5, l] + wx * edge_y - wy * edge)
+            forward, across = ey * suction, ex * suction
+            back = g * (wy * behind + out[3, l])
+            sums[0, l] -= edge_y * lift + moment * twist[4, l] + weight * out[2, l] * wz
+            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * skew
+            sums[2, l] += y * back - edge_y * forward - edge * across
+            sums[3, l] += forward - back
+            sums[4, l] += moment * wx - across - g * out[4, l]
+            sums[5, l] -= lift
+        if surface[MORE0] >= 0:
+            more = outputs[surface[MORE0] + MORE_OUTPUTS * j : surface[MORE0] + MORE_OUTPUTS * (j + 1)]
+            for l in range(len(lanes)):
+                g = part[0, l] * out[0, l]
+                normal = g * more[0, l]
+                sums[0, l] += (part[1, l] + centre * skew) * normal
+                sums[1, l] -= centre * normal
+                sums[2, l] += g * more[1, l]
+                sums[5, l] += normal
     for l in range(len(lanes)):
-        wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
-        ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
-        g0, g1, g2 = sums[0, l], sums[1, l], sums[2, l]
-        # a slanted trailing edge also meets spanwise flow; slope times chord times yaw rate is neglected
-        vy_slope = uy * slope
-        wz_slope = wz * slope
-        lift = ux * g0 - wz * g1 - vy_slope * g0 - wz_slope * sums[3, l]
-        fz = -density * lift
-        fx = density * (uz * g0 + wx * g1 - wy * sums[8, l] - sums[10, l])
-        fy = density * (sums[5, l] * wx - sums[12, l])
-        mx = -density * (
-            sums[5, l] * uy + sums[7, l] * wz + ux * g1 - wz * g2 - vy_slope * g1 - wz_slope * sums[4, l]
-        )
-        my = density * (
-            sums[5, l] * ux - sums[6, l] * wz + ux * sums[3, l] - wz * sums[4, l] - vy_slope * sums[3, l]
-        )
-        mz = -density * (uz * g1 + wx * g2 - wy * sums[9, l] - sums[11, l])
-        my -= link[L_CENTRE, l] * fz
-        mz += link[L_CENTRE, l] * fy
+        wx, wz = twist[0, l], twist[2, l]
+        fx, fy, fz = density * sums[3, l], density * sums[4, l], density * sums[5, l]
+        shift = link[L_CENTRE, l]
+        mx = density * sums[0, l] + shift * cy * fz
+        my = density * sums[1, l] - shift * cx * fz
+        mz = density * sums[2, l] + shift * (cx * fy - cy * fx)
         y = link[L_DRAG_Y, l]
-        vx, vy, vz = ux - wz * y, uy, uz + wx * y
+        vx, vy, vz = twist[3, l] - wz * y, twist[4, l], twist[5, l] + wx * y
         drag = -0.5 * density * link[L_DRAG, l] * math.sqrt(vx * vx + vy * vy + vz * vz)
         dx, dy, dz = drag * vx, drag * vy, drag * vz
-        my_x, my_z = ux - wz * link[L_MOMENT_Y, l], uz + wx * link[L_MOMENT_Y, l]
-        my += 0.5 * density * link[L_MOMENT, l] * (my_x * my_x + my_z * my_z)
-        wrench[0, l] = mx + y * dz
-        wrench[1, l] = my
+        y0 = link[L_MOMENT_Y, l]
+        along, normal = cx * (twist[3, l] - wz * y0) + cy * twist[4, l], twist[5, l] + wx * y0
+        nose_up = 0.5 * density * link[L_MOMENT, l] * (along * along + normal * normal)
+        wrench[0, l] = mx - cy * nose_up + y * dz
+        wrench[1, l] = my + cx * nose_up
         wrench[2, l] = mz - y * dx
         wrench[3, l] = fx + dx
         wrench[4, l] = fy + dy

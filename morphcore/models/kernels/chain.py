@@ -199,7 +199,7 @@ def accelerations(
     # air loads
     effective = scratch[w_effective : w_effective + 3 * links]
     for s in range(surfaces.shape[0]):
-        strip_inputs(lanes, surfaces[s], ranges, overlap, effective, inputs)
+        strip_inputs(lanes, surfaces[s], ranges, strips, overlap, effective, inputs)
     lane_product(lanes, operator, inputs, outputs)
     for s in range(surfaces.shape[0]):
         for k in range(surfaces[s, LINKS]):
@@ -209,7 +209,7 @@ def accelerations(
                 constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
                 scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                 density,
-                scratch[S_SUMS : S_SUMS + 13],
+                scratch[S_SUMS : S_SUMS + 6],
                 scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
             )  # fmt: skip
 

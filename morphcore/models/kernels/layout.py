@@ -14,7 +14,7 @@ OMEGA, VELOCITY, POSITION, JOINTS = 4, 7, 10, 13
 FORCE_C, MOMENT_C, LINKS_C = 0, 3, 6
 # rows of the scratch block before the per-link and per-joint ones
 S_TWIST, S_BASE_ACCELERATION, S_BASE_INERTIA, S_BASE_FORCE = 0, 6, 12, 33
-S_INERTIA, S_CARRIED, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 79, 82, 85
+S_INERTIA, S_CARRIED, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 72, 75, 78
 # indices of the shared numbers
 DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
 APPARENT = 23  # whether the links have apparent mass: not zero

@@ -20,8 +20,8 @@ from morphcore.lanes import not_in_lanes
 # rows of a link's constants: its mass properties (mass, m x, m y, Ixx, Iyy, Izz, Ixy) and the offset of its
 # joint along y; then the aerodynamic rows, named in aero/kernels/loads.py; then its apparent inertia on
 # (omega_x, omega_y, v_z): 00 01 02 11 12 22
-L_MASS, L_OFFSET, L_APPARENT = 0, 7, 22
-LINK_ROWS = 28
+L_MASS, L_OFFSET, L_APPARENT = 0, 7, 25
+LINK_ROWS = 31
 
 
 @inlined

@@ -18,7 +18,7 @@ def fly(
 
     Parameters (b blocks, t steps, s surfaces, n links, j strips)
     ----------
-    surfaces : (s, 6); ranges : (b, n, 2); shared : (23,). In the middles of the steps: strips : (t, j, 3);
+    surfaces : (s, 7); ranges : (b, n, 2); shared : (23,). In the middles of the steps: strips : (t, j, 3);
     hinges : (t, s, HINGE_ROWS); hinge_accelerations : (t, s, 6); operators : (t, rows, columns); wind : (t,
     3). constants : (b, rows, width). step : s. number : steps made before. state : (b, rows, width), advanced
     in place. slopes : (b, SLOPES, mechanical rows, width), the blocks' memory. middle : (rows, width);

@@ -37,12 +37,8 @@ import math
 from morphcore.aero.kernels.loads import (
     L_FAST_DECAY,
     L_FAST_WEIGHT,
-    L_SLOPE,
-    L_SLOPE_Y,
     L_SLOW_DECAY,
     L_SLOW_WEIGHT,
-    L_TURN,
-    L_TURN_Y,
     sloped,
 )
 from morphcore.jit import inlined, kernel
@@ -196,10 +192,7 @@ def lag_from_stage(lanes, link, twist, stage_slow, stage_fast, slow, fast, previ
     for l in range(len(lanes)):
         slow_decay, slow_weight = link[L_SLOW_DECAY, l], link[L_SLOW_WEIGHT, l]
         fast_decay, fast_weight = link[L_FAST_DECAY, l], link[L_FAST_WEIGHT, l]
-        forward, turn = twist[3, l], twist[2, l]
-        z = sloped(twist[5, l], link[L_SLOPE, l], forward, link[L_TURN, l], turn)
-        x = sloped(twist[0, l], link[L_SLOPE_Y, l], forward, link[L_TURN_Y, l], turn)
-        y = twist[1, l]
+        z, x, y = sloped(link, twist, l)
         dz, dx, dy = z - previous[0, l], x - previous[1, l], y - previous[2, l]
         slow[0, l] = carried(stage_slow[0, l] + slow_weight * dz, z, slow_decay)
         slow[1, l] = carried(stage_slow[1, l] + slow_weight * dx, x, slow_decay)
