@@ -81,7 +81,7 @@ def one_link(aircraft: Aircraft, twist_B: Array, lattice: Lattice = GRID, links:
         lag_motion=np.zeros((1, model.links, 3)),
     )[0]
     angles = np.zeros((len(aircraft.hinges), 3))
-    return lane_loads(model, batch, instant(model, angles), state).wrench
+    return lane_loads(model, batch, instant(model, angles, wake_alpha=0.0), state).wrench
 
 
 def riding(aircraft: Aircraft, alpha: float, lattice: Lattice = GRID) -> Array:
