@@ -184,15 +184,14 @@ def _found(model: ChainModel, angles: Array, columns: NDArray[np.int64], instant
     scale = flight.dynamic_pressure_pa * area * rigid.reference_surface.mean_chord_m
     if scale == 0.0:
         return NominalStart(0.0)  # without air there is no wake
-    drives = trim_drives(rigid.aircraft, flight.trim_drive)
+    drives, batch = trim_drives(rigid.aircraft, flight.trim_drive), physical_guess(rigid)
 
     def defect(x: Array) -> Array:
         """Trimmed less assumed angle of attack, and the coefficient of the moment, at (alpha, drive)."""
         moved = angles.copy()
         moved[columns] = x[1:].sum()
         plan = instant(rigid, moved, float(x[0]))
-        flown = plan.flown(rigid)
-        found = trim(flown, physical_guess(flown), plan).require()
+        found = trim(plan.flown(rigid), batch, plan).require()
         return np.array([found.alpha[0] - x[0], found.moment_B[0, 1] / scale])[: x.size]
 
     # Broyden's first method: the slopes are nearly constant

@@ -49,8 +49,8 @@ def flown(kind: str, flight: dict[str, Any], schedules: Any = None, **options: A
 def test_the_drive_balances_the_moment(kind: str, left: float) -> None:
     """Of the moment that would be needed without the drive, nothing is left, and trim holds in flight.
 
-    A chain flies at the angle of the rigid model, so that all parameter sets of a batch share a lattice: a few
-    per cent are left, which its start reports. The angles are found again among the drives' histories.
+    A chain flies at the angle of the rigid model, so that all parameter sets of a batch share a lattice:
+    a few per cent are left, as its start reports. The angles are found again among the drives' histories.
     """
     without, found = flown(kind, FLIGHT), flown(kind, BY_TAIL)
     assert abs(found.trim.moment_B[0, 1]) < left * abs(without.trim.moment_B[0, 1])

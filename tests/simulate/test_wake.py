@@ -53,7 +53,7 @@ def beam_trim(model: ChainModel) -> FlexibleTrim:
 
 
 def edge_circulations(model: ChainModel, alpha: float) -> np.ndarray:
-    """Circulations (strips,) at the trailing edge in flight at an angle of attack, by the reduced operator."""
+    """Circulations (strips,) at the trailing edge at an angle of attack, by the reduced operator."""
     matrix = lattice_operator(
         model.lattice, [0.0] * len(model.aircraft.hinges), wake_direction_B=wake_direction(alpha)
     ).matrix
