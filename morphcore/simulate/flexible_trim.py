@@ -192,6 +192,6 @@ def _equilibrium(balance: _Balance) -> Root:
         return root
 
     found = continue_root(balance.imbalance, begin, rules)
-    if found.share < 1.0:
+    if not found.arrived:
         raise TrimNotFound(residual=found.root.size, iterations=found.solves)
     return found.root
