@@ -18,17 +18,20 @@ class TrimNotFound(NotFlyable):
 
     Parameters
     ----------
-    residual : largest remaining joint acceleration or vertical specific force, rad/s^2 or m/s^2.
-    iterations : Newton steps taken.
+    residual : what is left: of a chain the last Newton step, rad; of beams the largest imbalance of the angle
+    of attack and the elements' strains, rad and m. iterations : Newton steps taken.
+    limit : what was found on the way, a clause: where the equilibrium was lost, and at what shape.
+    hint : what would trim.
     """
 
     code = "trim_not_found"
 
-    def __init__(self, *, residual: float, iterations: int) -> None:
+    def __init__(self, *, residual: float, iterations: int, limit: str = "", hint: str = "") -> None:
+        found = f"{limit}; " if limit else ""
         super().__init__(
-            f"no trimmed level flight found: residual {residual:.3g} after {iterations} Newton steps",
+            f"no trimmed level flight found: {found}residual {residual:.3g} after {iterations} Newton steps",
             pointer="/flight",
-            hint="raise the airspeed, lower the mass, or stiffen the wings",
+            hint=hint,
         )
         self.residual = residual
         self.iterations = iterations

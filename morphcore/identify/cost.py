@@ -21,7 +21,13 @@ from morphcore.identify.measurement import START, Measured, Openness, measured
 from morphcore.identify.nuisance import Reduced, pseudo_residual, reduced
 from morphcore.identify.readings import Readings, readings, rows_needed
 from morphcore.lanes import TOGETHER
-from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
+from morphcore.models.equivalent import (
+    ChainModel,
+    LaneConstants,
+    ParameterBatch,
+    lane_constants,
+    physical_guess,
+)
 from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
@@ -57,6 +63,19 @@ class SampleCase:
     def setup(self) -> Measured:
         """The readings and what is unknown about them."""
         return measured(self.sample, Measurement(), Openness()) if self.given is None else self.given
+
+    def needs_following(self, model: ChainModel, start: StartMode) -> bool:
+        """Whether the model's trim is found only by following it from stiff joints.
+
+        Decided once, by the nominal parameters: where these trim at once, sets of a search that do not are
+        far from any flight, and following each of them would cost more than flying the others.
+        """
+        known: dict[StartMode, bool] = self.__dict__.setdefault("_needs_following", {})
+        if start not in known:
+            flown = self.plan.flown(model)
+            found = trim(flown, physical_guess(model), self.plan, start=start, follow=False)
+            known[start] = not bool(found.converged.all())
+        return known[start]
 
     @property
     def weight(self) -> Array:
@@ -164,7 +183,13 @@ def shared_trims(
     for case in cases:
         key = tuple(np.round(np.concatenate([case.plan.angles[0], case.plan.wind_N[0]]), 9))
         if key not in known:
-            known[key] = trim(case.plan.flown(model), batch, case.plan, start=start)
+            known[key] = trim(
+                case.plan.flown(model),
+                batch,
+                case.plan,
+                start=start,
+                follow=case.needs_following(model, start),
+            )
         yield case, known[key]
 
 

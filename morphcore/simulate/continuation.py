@@ -9,7 +9,7 @@ following steps as well, each with one evaluation, as long as they converge quic
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ FIRST_LENGTH = 0.25  # of its next step, along the curve
 LONGEST = 0.5
 SMALLEST = 1e-4
 EASY = 3  # linear solves of a root after which the next step is twice as long
-MAX_ROOTS = 100  # of one continuation
+MAX_SOLVES = 300  # of one continuation
 
 
 @dataclass
@@ -183,15 +183,15 @@ def _follow(
 
 @dataclass
 class Continued:
-    """Where a continuation ended: the last root, its share, and the linear solves of all steps together.
+    """Where a continuation ended: the root of the largest share that it reached, and all linear solves.
 
-    missed : largest residual that the iteration for the next root left, if that ended the continuation.
+    arrived : whether the share is 1.
     """
 
     root: Root
     share: float
     solves: int
-    missed: float | None
+    arrived: bool
 
 
 def continue_root(residual: Callable[[Array, float], Array], start: Array, rules: Rules) -> Continued:
@@ -205,42 +205,46 @@ def continue_root(residual: Callable[[Array, float], Array], start: Array, rules
     ----------
     residual : (n,) of unknowns (n,) and the share.
     """
-
-    def across(place: Array, line: Array) -> Residual:
-        return lambda z: np.append(residual(z[:-1], z[-1]), line @ (z - place))
-
     extended = Rules(rules.tolerance, rules.accepted, lambda step: rules.longest(step[:-1]))
-    root = find_root(lambda x: residual(x, 0.0), start, rules)
-    if not root.arrived:
-        return Continued(root, 0.0, root.solves, root.size)
-    near = find_root(lambda x: residual(x, FIRST_SHARE), root.x, rules)
-    solves = root.solves + near.solves
+    best = Continued(find_root(lambda x: residual(x, 0.0), start, rules), 0.0, 0, arrived=False)
+    best.solves = best.root.solves
+    if not best.root.arrived:
+        return best
+    near = find_root(lambda x: residual(x, FIRST_SHARE), best.root.x, rules)
+    best.solves += near.solves
     if not near.arrived:
-        return Continued(root, 0.0, solves, near.size)
-    z, line = np.append(near.x, FIRST_SHARE), np.append(near.x - root.x, FIRST_SHARE)
-    root, line, length = near, line / _norm(line), FIRST_LENGTH
-    for _ in range(MAX_ROOTS):
+        return best
+    z, line = np.append(near.x, FIRST_SHARE), np.append(near.x - best.root.x, FIRST_SHARE)
+    best.root, best.share = near, FIRST_SHARE
+    line, length = line / _norm(line), FIRST_LENGTH
+    while best.solves < MAX_SOLVES:
         ahead = z + length * line
         last = ahead[-1] >= 1.0
         if last:  # shares beyond 1 mean nothing: the root of 1 itself
-            begin = z + (1.0 - z[-1]) / line[-1] * line
-            found = find_root(lambda x: residual(x, 1.0), begin[:-1], rules)
+            ahead = z + (1.0 - z[-1]) / line[-1] * line
+            found = find_root(lambda x: residual(x, 1.0), ahead[:-1], rules)
             moved = np.append(found.x, 1.0)
         else:
-            found = find_root(across(ahead, line), ahead, extended)
+            found = find_root(_across(residual, ahead, line), ahead, extended)
             moved = found.x
-        solves += found.solves
+        best.solves += found.solves
         step = moved - z
         distance = _norm(step)
         # a root far from the straight line may lie on another curve
-        if not found.arrived or distance > 2.0 * length or not -1e-3 < moved[-1] < 1.0 + 1e-12:
+        if not found.arrived or distance > 2.0 * length or not 0.0 < moved[-1] <= 1.0:
             length *= 0.25
             if length < SMALLEST:
-                return Continued(Root(z[:-1], root.size, root.solves, True, False), z[-1], solves, found.size)
+                break
             continue
-        root = found
-        if last:
-            return Continued(found, 1.0, solves, None)
         z, line = moved, step / distance
         length = min(LONGEST, distance * (2.0 if found.solves <= EASY else 1.0))
-    return Continued(Root(z[:-1], root.size, root.solves, True, False), z[-1], solves, None)
+        if z[-1] > best.share:
+            best.root, best.share, best.arrived = replace(found, x=z[:-1]), float(z[-1]), last
+        if last:
+            break
+    return best
+
+
+def _across(residual: Callable[[Array, float], Array], place: Array, line: Array) -> Residual:
+    """The equations of unknowns and share together, on the plane across ``line`` at ``place``."""
+    return lambda z: np.append(residual(z[:-1], float(z[-1])), line @ (z - place))

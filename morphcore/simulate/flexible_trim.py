@@ -11,9 +11,10 @@ from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried, node_forces
 from morphcore.multibody.strain_poses import StrainPoses
-from morphcore.simulate.continuation import Root, Rules, continue_root, find_root
+from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.trim import StartMode
+from morphcore.simulate.trim_limits import STALL_RAD, Limit, lost, no_lift
 
 Array = NDArray[np.float64]
 
@@ -129,6 +130,20 @@ class _Balance:
         lag = np.stack([circulation, circulation])
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands
 
+    def lift_coefficients(self, alpha: float) -> tuple[float, float]:
+        """Mean lift coefficient that the weight needs, and the unbent wings' at an angle of attack, rad."""
+        x = np.zeros(self.unknowns)
+        x[-1] = alpha
+        state, demands = self.state(x)
+        weight = self.loads(state.poses, state.V, state.A)
+        scale = self.flight.model.flight.dynamic_pressure_pa * self.area
+        needed, missing = (
+            float(np.array([np.sin(alpha), 0.0, -np.cos(alpha)]) @ self.total(state.poses, forces)[3:])
+            / scale
+            for forces in (weight, demands)
+        )
+        return needed, needed - missing
+
     def imbalance(self, x: Array, share: float = 1.0) -> Array:
         """Imbalance (n,) of the unknowns x (n,), rad and m, with ``share`` of the wings' flexibility.
 
@@ -192,6 +207,28 @@ def _equilibrium(balance: _Balance) -> Root:
         return root
 
     found = continue_root(balance.imbalance, begin, rules)
-    if found.share < 1.0:
-        raise TrimNotFound(residual=found.root.size, iterations=found.solves)
+    if not found.arrived:
+        limit = _limit(balance, found)
+        left = float(np.abs(balance.imbalance(found.root.x)).max())
+        raise TrimNotFound(
+            residual=left if np.isfinite(left) else float("inf"),
+            iterations=found.solves,
+            limit=limit.found,
+            hint=limit.hint,
+        )
     return found.root
+
+
+def _limit(balance: _Balance, found: Continued) -> Limit:
+    """What limits a trim that ended on the way from rigid wings."""
+    model = balance.flight.model
+    if not found.root.arrived:
+        return no_lift(*balance.lift_coefficients(STALL_RAD), model.flight.airspeed_m_s)
+    R = balance.state(found.root.x)[0].poses.R
+    turns = [
+        float(np.arccos(np.clip(0.5 * (np.trace(R[root].T @ R[tip]) - 1.0), -1.0, 1.0)))
+        for root, tip in zip(model.roots, model.tips, strict=True)
+    ]
+    most = int(np.argmax(turns))
+    alpha = float(found.root.x[-1]) if balance.given is None else balance.given.alpha_rad
+    return lost(found.share, alpha, (f"the tip of {model.aircraft.surfaces[most].name!r}", turns[most]))

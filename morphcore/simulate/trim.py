@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from morphcore.models.kinematics import link_poses
 from morphcore.models.slopes import sloped_motion
 from morphcore.shown import Shown
 from morphcore.simulate.batch import initial_state, state_rates
+from morphcore.simulate.trim_limits import chain_limit
 
 if TYPE_CHECKING:  # a plan is made for a trim (see wake.py)
     from morphcore.simulate.plan import FlightPlan
@@ -36,6 +37,8 @@ ANGLE_TOLERANCE = 1e-11  # rad, limit of the last Newton step in angle of attack
 ANGLE_PROBE = 1e-6  # rad; balances truncation and round-off of a forward difference in double precision
 FORCE_PROBE = 1.0  # N and N m; these enter linearly
 LARGEST_STEP = 0.2  # rad in one Newton step: beyond that the linear model is meaningless
+# shares of the joints' flexibility by which a trim that is not found at once is followed from stiff joints
+SHARES = (0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 SLAB = 256  # particles at a time; bounds the memory of the Jacobian's probes
 
 
@@ -46,7 +49,8 @@ class Trim(Shown):
     alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference
     point;
     q_joint : (p, coordinates) rad; converged : (p,) whether Newton's iteration arrived; residual : (p,) the
-    last step, rad.
+    last step, rad; share : (p,) of the joints' flexibility up to which the equilibrium was followed. Without
+    a trim, angles are those at that share, or where the iteration ended if that is none.
     """
 
     alpha: Array
@@ -55,21 +59,37 @@ class Trim(Shown):
     q_joint: Array
     converged: NDArray[np.bool_]
     residual: Array
+    share: Array = field(default_factory=lambda: np.ones(1))
 
     def require(self) -> Trim:
         """Return itself if every parameter set is trimmed; otherwise raise TrimNotFound."""
         if not np.all(self.converged):
-            raise TrimNotFound(residual=float(np.nanmax(self.residual)), iterations=MAX_ITERATIONS)
+            lost = int(np.argmin(self.converged))
+            limit = chain_limit(float(self.share[lost]), float(self.alpha[lost]), self.q_joint[lost])
+            raise TrimNotFound(
+                residual=float(self.residual[lost]),
+                iterations=MAX_ITERATIONS,
+                limit=limit.found,
+                hint=limit.hint,
+            )
         return self
 
 
-def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: StartMode = "trim") -> Trim:
+def trim(
+    model: ChainModel,
+    batch: ParameterBatch,
+    plan: FlightPlan,
+    *,
+    start: StartMode = "trim",
+    follow: bool = True,
+) -> Trim:
     """Find the equilibrium at the plan's first hinge angles, with the hinges held.
 
     With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and
     across it, a constant moment, and the joint angles: the aircraft then flies straight and level. With
     ``"given"`` angle of attack, force and moment are those of the flight's start and only the joints settle
-    (their accelerations vanish).
+    (their accelerations vanish). Where Newton's method from straight joints does not arrive, the equilibrium
+    is followed from stiff joints to their own stiffness, unless ``follow`` is False.
 
     Raises
     ------
@@ -86,9 +106,51 @@ def trim(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, *, start: S
         _trim_slab(model, batch.select(slice(i, i + SLAB)), held, start)
         for i in range(0, batch.particles, SLAB)
     ]
-    return Trim(
+    found = Trim(
         *(np.concatenate([getattr(part, name) for part in parts]) for name in Trim.__dataclass_fields__)
     )
+    lost = np.flatnonzero(~found.converged)
+    for i in range(0, lost.size if model.coordinates and follow else 0, SLAB):
+        _follow(model, batch, held, start, (found, lost[i : i + SLAB]))
+    return found
+
+
+def _follow(
+    model: ChainModel,
+    batch: ParameterBatch,
+    held: FlightPlan,
+    start: StartMode,
+    lost: tuple[Trim, NDArray[np.int64]],
+) -> None:
+    """Follow the equilibrium of particles without a trim from stiff joints to their own, in place.
+
+    A particle is followed as far as Newton's iteration arrives, each time from the straight line through its
+    last two equilibria.
+    """
+    found, left = lost
+    n = model.coordinates
+    before, last = np.zeros((left.size, n + 1)), None
+    shares = (0.0, *SHARES)
+    for k in range(1, len(shares)):
+        softer = batch.select(left)
+        softer = softer.changed(stiffness_nm_rad=softer["stiffness_nm_rad"] / shares[k])
+        begin = before
+        if last is not None:
+            ratio = (shares[k] - shares[k - 1]) / (shares[k - 1] - shares[k - 2])
+            begin = last + ratio * (last - before)
+        part = _trim_slab(model, softer, held, start, begin)
+        ok = part.converged
+        arrived = left[ok]
+        for name in ("alpha", "force_B", "moment_B", "q_joint"):
+            getattr(found, name)[arrived] = getattr(part, name)[ok]
+        found.share[arrived] = shares[k]
+        if k == len(shares) - 1:
+            found.converged[arrived], found.residual[arrived] = True, part.residual[ok]
+        left = arrived
+        if left.size == 0:
+            return
+        now = np.concatenate([part.q_joint, part.alpha[:, None]], axis=1)[ok]
+        before, last = now if last is None else last[ok], now
 
 
 def trimmed_state(
@@ -124,7 +186,10 @@ def _to_body(quaternion: Array, vector_N: Array) -> Array:
     return np.asarray(vector_N + w * cross + np.cross(xyz, cross))
 
 
-def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start: StartMode) -> Trim:
+def _trim_slab(
+    model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start: StartMode, begin: Array | None = None
+) -> Trim:
+    """Newton's iteration from joint angles and angle of attack, ``begin`` (p, coordinates + 1), or zero."""
     n, particles = model.coordinates, batch.particles
     given = model.flight.start if start == "given" else None
     free = n + (0 if given else 6)
@@ -132,6 +197,8 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
     probes[n + 1 :] = FORCE_PROBE
     # unknowns of a particle: joint angles, angle of attack, force along and across the path, moment
     x = np.zeros((particles, n + 6))
+    if begin is not None:
+        x[:, : n + 1] = begin
     if given:
         x[:, n] = given.alpha_rad
     constants = lane_constants(model, batch, plan.grid.step_s)
@@ -178,7 +245,8 @@ def _trim_slab(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start
             break
     force_B, moment_B = _thrust(x, n, given)
     # forward differences limit the last digits: nearly converged is good enough
-    return Trim(x[:, n], force_B, moment_B, x[:, :n], residual < 1e3 * ANGLE_TOLERANCE, residual)
+    converged = residual < 1e3 * ANGLE_TOLERANCE
+    return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, np.where(converged, 1.0, 0.0))
 
 
 def _solve(jacobian: Array, right: Array) -> Array:

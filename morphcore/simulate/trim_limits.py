@@ -1,0 +1,83 @@
+"""What a trim that fails has found on its way: sentences about the shape where the equilibrium was lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STALL_RAD = 0.35  # angle of attack at which wings stall; the lattice does not
+BENT_RAD = 1.0  # turn of a tip against its root, beyond which the lift no longer points upward
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A clause for the message of `TrimNotFound`, and its hint."""
+
+    found: str
+    hint: str
+
+
+def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
+    """Rigid wings find no level flight; lift coefficients needed, and given at the angle of stall."""
+    if given < needed:
+        found = (
+            f"the weight needs a mean lift coefficient of {needed:.3g}, and unbent wings give {given:.3g} at "
+            f"an angle of attack of {STALL_RAD:g} rad, where wings stall"
+        )
+        if given <= 0.0:
+            return Limit(found, "the surfaces do not lift upward: check their positions and hinge angles")
+        least = airspeed_m_s * (needed / given) ** 0.5
+        return Limit(found, f"at that angle they carry the weight from about {least:.3g} m/s, or less mass")
+    return Limit(
+        "rigid wings could carry the weight, but the iteration for them does not arrive",
+        "check whether surfaces overlap, or lie in each other's wake",
+    )
+
+
+def lost(share: float, alpha: float, bent: tuple[str, float]) -> Limit:
+    """The equilibrium was followed from rigid wings to a ``share`` of their flexibility.
+
+    Parameters
+    ----------
+    alpha : angle of attack there, rad. bent : the surface or joint that is bent most, and by how much, rad.
+    """
+    if share <= 0.0:
+        return Limit(
+            "even wings a thousand times as stiff bend away", "check the unit of the stiffness, and the loads"
+        )
+    stiffer = 1.0 / share
+    found = (
+        f"followed from rigid wings, the equilibrium ends at {100.0 * share:.3g} per cent of their "
+        f"flexibility, {shape(alpha, bent)}"
+    )
+    return Limit(found, f"wings {_rounded_up(stiffer)} times as stiff have a trim")
+
+
+def chain_limit(share: float, alpha: float, q_joint: Array) -> Limit:
+    """The same of a chain, from its angles (rad) at the last equilibrium found, or at the iteration's end."""
+    bent = float(np.abs(q_joint).max(initial=0.0))
+    if share > 0.0:
+        return lost(share, alpha, ("a joint", bent))
+    if not np.isfinite(alpha) or not np.isfinite(bent):
+        return Limit("the iteration left the range of numbers", "")
+    where = shape(alpha, ("a joint", bent)) if q_joint.size else shape(alpha, None)
+    return Limit(f"the iteration ended {where}", "")
+
+
+def shape(alpha: float, bent: tuple[str, float] | None) -> str:
+    """Angle of attack and bending, rad, with what limits them."""
+    stalled = f" (wings stall at about {STALL_RAD:g})" if abs(alpha) > STALL_RAD else ""
+    angle = f"with an angle of attack of {alpha:.3g} rad{stalled}"
+    if bent is None:
+        return angle
+    name, turn = bent
+    folded = " (beyond 1 its lift no longer points upward)" if turn > BENT_RAD else ""
+    return f"{angle} and {name} turned by {turn:.3g} rad{folded}"
+
+
+def _rounded_up(stiffer: float) -> str:
+    return f"{stiffer * 1.01:.3g}"
