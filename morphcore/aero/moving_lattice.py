@@ -115,7 +115,7 @@ def lattice_parts(
         drag=riders.drag,
         drag_arm=riders.drag_arm,
         drag_area=riders.drag_area,
-        moment_area=riders.moment_area,
+        moment_area=riders.moment_area / prandtl_glauert(mach),
         smoothed=core.law == "smoothed",
         stretch=1.0 / prandtl_glauert(mach),
         density=float(density),
