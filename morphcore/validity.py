@@ -52,7 +52,7 @@ class ResultWarning:
 class AirMotion:
     """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
-    The incidence is the angle of attack of the body, or of the surface whose hinges incline it furthest.
+    The incidence is that of the body, or of the section which hinges and twist incline furthest.
     """
 
     time_s: Array
@@ -65,7 +65,8 @@ def air_motion(
 ) -> AirMotion:
     """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
-    A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream.
+    A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream, twist its
+    tip once more.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
@@ -77,6 +78,9 @@ def air_motion(
         for own in aircraft.hinge_columns
         if across[own].any()
     ]
+    for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
+        if surface.twist_rad:
+            inclined.append(surface.twist_rad + angles[:, own] @ across[own])
     incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
     return AirMotion(time_s, furthest, np.asarray(np.linalg.norm(air_N, axis=1)))

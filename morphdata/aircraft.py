@@ -215,7 +215,8 @@ class Surface(Document):
     )
     cm0: Annotated[float, Field(ge=-0.5, le=0.5)] = Field(
         default=0.0,
-        description="Moment coefficient of the sections about their aerodynamic centre, nose up positive.",
+        description="Moment coefficient of the sections about their aerodynamic centre, nose up positive; in "
+        "incompressible flow.",
     )
     twist_rad: Annotated[float, Field(ge=-0.5, le=0.5)] = Field(
         default=0.0, description="Twist of the tip against the root, rad, nose up positive; linear."

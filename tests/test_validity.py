@@ -91,6 +91,18 @@ def test_a_hinge_of_incidence_counts() -> None:
     assert found.incidence[0] == pytest.approx(0.35)
 
 
+def test_a_twisted_tip_counts() -> None:
+    """Its incidence is that of body, hinges and twist together; or the root's, if the tip is turned down."""
+    aircraft = example_aircraft()
+    for twist, expected in ((0.2, 0.55), (-0.2, 0.35)):
+        twisted = tuple(replace(rehinged(surface, "y"), twist_rad=twist) for surface in aircraft.surfaces)
+        found = air_motion(
+            replace(aircraft, surfaces=twisted), np.zeros(1), np.array([[0.0, 0.05, 0.0]]),
+            np.array([[50.0, 0.0, 0.0]]), np.zeros((1, 3)), np.array([[0.0, 0.3]]),
+        )  # fmt: skip
+        assert found.incidence[0] == pytest.approx(expected)
+
+
 def test_steep_pitch() -> None:
     """Beyond the vertical no Euler angle lies; close to it roll and yaw cannot be distinguished."""
     assert steep_warning("x", "", np.array([0.0, 1.4])) == []

@@ -118,7 +118,7 @@ def lattice_parts(
         drag=riders.drag,
         drag_arm=riders.drag_arm,
         drag_area=riders.drag_area,
-        moment_area=riders.moment_area,
+        moment_area=riders.moment_area / prandtl_glauert(mach),
         control_chord=riders.control_chord,
         drag_chord=riders.drag_chord,
         smoothed=core.law == "smoothed",

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 UNSEEN_SPREAD = 1.0
 # the samples say nothing about it
 NEGLIGIBLE_PART = 0.1  # components of a direction smaller than this are left out of the report
+BLIND_SPREAD = 1e6  # stands for no bound at all: of a direction in which no residual changes
 PROBABILITY = 0.95  # of an interval
 WHITE = "white"  # the residuals are taken for independent and of one variance
 COLOURED = "coloured"  # for correlated in time, by sample and angle
@@ -134,6 +135,10 @@ def uncertainty(
         seen = pseudo @ noise.middle @ pseudo
         spreads = np.sqrt(np.einsum("id,de,ie->i", directions, noise.middle, directions)) * inverse**2
         covariance = noise.covariance
+    blind = singular <= floor
+    if blind.any():  # noise of no size over a slope of none
+        spreads = np.where(blind, np.inf, spreads)
+        seen = seen + BLIND_SPREAD**2 * directions[blind].T @ directions[blind]
     probe = 1e-6
     named = space.flatten(space.decode(np.concatenate([x[None, :], x + probe * np.eye(d)])))
     slope = (named[1:] - named[0]).T / probe
@@ -149,7 +154,7 @@ def uncertainty(
     # what only the prior holds has no interval
     half = np.where(wide & (rates > 0.0), np.inf, half) if noise is not None else half
     intervals = space.intervals(named[0], half, at_bound)
-    blind = {name for name, too_wide in zip(space.parameter_names, wide, strict=True) if too_wide}
+    unseen = {name for name, too_wide in zip(space.parameter_names, wide, strict=True) if too_wide}
     return Uncertainty(
         names=space.names,
         covariance=covariance,
@@ -159,7 +164,9 @@ def uncertainty(
         parameter_names=space.parameter_names,
         standard_error=standard_error,
         intervals=intervals,
-        undetermined=tuple(name for name, ends in intervals.items() if ends == (None, None) or name in blind),
+        undetermined=tuple(
+            name for name, ends in intervals.items() if ends == (None, None) or name in unseen
+        ),
         at_bound=tuple(at_bound),
         method=WHITE if noise is None else COLOURED,
         spreads=spreads,

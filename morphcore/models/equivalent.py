@@ -9,7 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.kernels.loads import L_MOMENT
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
+from morphcore.aero.vlm import prandtl_glauert
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import whole_number
@@ -448,6 +450,7 @@ def lane_constants(model: ChainModel, batch: ParameterBatch, step_s: float) -> L
         if model.flight.apparent_mass:
             laid.add_apparent_mass(link_edges(values["division"], surface.length_m), model.flight)
         every.append(laid)
+    links[:, :, L_MOMENT] /= prandtl_glauert(model.flight.mach or 0.0)
     rows = np.concatenate(
         [
             np.zeros((particles, LINKS_C)),
