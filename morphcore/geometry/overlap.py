@@ -42,26 +42,39 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
     found: dict[tuple[int, int], int] = {}
     for row in rows:
         outlines = [
-            outline_B(surface, angles[row, own])
+            panels_B(surface, angles[row, own])
             for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
         ]
         for first, second in itertools.combinations(range(len(outlines)), 2):
             pair = aircraft.surfaces[first], aircraft.surfaces[second]
-            if (first, second) not in found and _overlap(*pair, outlines[first], outlines[second]):
+            if (first, second) not in found and any(
+                _overlap(*pair, one, other)
+                for one, other in itertools.product(outlines[first], outlines[second])
+            ):
                 found[first, second] = int(row)
     return [(first, second, row) for (first, second), row in found.items()]
 
 
-def outline_B(surface: Surface, hinge_rad: ArrayLike) -> Array:
-    """Corners (4, 3) of an undeformed surface's mid-plane in B, around it from the root's leading edge, m.
+def panels_B(surface: Surface, hinge_rad: ArrayLike) -> list[Array]:
+    """Trapezia that make up an undeformed surface's mid-plane: the whole, or one between two stations each.
 
-    hinge_rad : (m,) of its hinges.
+    Corners (4, 3) in B, around it from the inner leading edge, m. hinge_rad : (m,) of its hinges.
     """
-    tip_y = surface.span_sign * surface.span_m
-    root, tip = 0.5 * surface.root_chord_m, 0.5 * surface.tip_chord_m
-    corners_W = np.array([[root, 0.0, 0.0], [tip, tip_y, 0.0], [-tip, tip_y, 0.0], [-root, 0.0, 0.0]])
     R_BW, r_B = surface_pose(surface, hinge_rad)
-    return np.asarray(corners_W @ R_BW.T + r_B)
+    ends = surface.breaks_m
+    half, aft, y = 0.5 * surface.chord_at(ends), surface.aft_at(ends), surface.span_sign * ends
+    panels = []
+    for a, b in itertools.pairwise(range(ends.size)):
+        corners_W = np.array(
+            [
+                [half[a] - aft[a], y[a], 0.0],
+                [half[b] - aft[b], y[b], 0.0],
+                [-half[b] - aft[b], y[b], 0.0],
+                [-half[a] - aft[a], y[a], 0.0],
+            ]
+        )
+        panels.append(np.asarray(corners_W @ R_BW.T + r_B))
+    return panels
 
 
 def _overlap(first: Surface, second: Surface, one_B: Array, other_B: Array) -> bool:

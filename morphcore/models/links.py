@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.surface import Surface
+from morphcore.models.span_quadrature import span_points
 
 Array = NDArray[np.float64]
 
@@ -35,15 +36,14 @@ def link_masses(surface: Surface, edges: Array) -> Array:
     Mass (kg), first moments m x and m y (kg m), and the elements xx, yy, zz, xy of the inertia matrix (kg
     m^2).
     """
-    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    weight = 0.5 * length * WEIGHTS
+    start = edges[:, :-1, None]
+    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
     section = surface.section_at(stations.ravel())
     mass, ix, iy, iz = (
         value.reshape(stations.shape) * weight
         for value in (section.mass, section.inertia_x, section.inertia_y, section.inertia_z)
     )
-    x = surface.mass_axis_x_m - surface.elastic_axis_x_m
+    x = surface.mass_arm_at(stations)
     y = surface.span_sign * (stations - start)
     return np.stack(
         [
@@ -120,9 +120,8 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
     compliance : ndarray, shape (3, p, n - 1, points)
         Flap, torsion, edgewise: weight times (L - y) over EI or GJ; the sum over points is the integral.
     """
-    start, length = ends[:, :-1, None], np.diff(ends, axis=1)[..., None]
-    stations = start + length * 0.5 * (BEAM_POINTS + 1)
-    moment = 0.5 * length * BEAM_WEIGHTS * (surface.span_m - stations)
+    stations, weight = span_points(surface, ends, BEAM_POINTS, BEAM_WEIGHTS)
+    moment = weight * (surface.span_m - stations)
     section = surface.section_at(stations.ravel())
     stiffness = np.stack([section.ei_flap, section.gj, section.ei_edge]).reshape(3, *stations.shape)
     return stations, moment / stiffness
@@ -145,9 +144,12 @@ def strip_overlap(surface: Surface, lattice: SurfaceLattice, edges: Array) -> tu
 
 
 def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
-    """Planform area (particles, n) of each link in m^2 and the y of its centroid in link axes, m."""
-    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    chord = surface.chord_at(stations) * 0.5 * length * WEIGHTS
+    """Planform area (particles, n) of each link in m^2 and the y of its centroid in link axes, m.
+
+    Where the profile drag varies along the span, the area is weighted by it (`Surface.drag_share_at`).
+    """
+    start = edges[:, :-1, None]
+    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
+    chord = surface.chord_at(stations) * weight * surface.drag_share_at(stations)
     area = chord.sum(-1)
     return area, surface.span_sign * (chord * (stations - start)).sum(-1) / area
