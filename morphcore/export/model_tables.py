@@ -46,8 +46,8 @@ from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges, link_masses
-from morphcore.models.soft_joints import chain_obstacle
 from morphcore.models.lumps import FLAT_ROWS, link_lumps
+from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.time_grid import STEP_S, time_grid

@@ -15,6 +15,8 @@ from morphdata.stations import Station, elastic_axes, row_chords
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
 
+SAME_SLOPE = 1e-12  # of the largest slope there could be: round-off of rows on one straight line
+
 # rows of a document by the properties they replace; a list of three is about x, y, z
 FIELDS: dict[str, Callable[[Station], float | None]] = {
     "ei_flap": lambda row: row.ei_flap_n_m2,
@@ -94,6 +96,18 @@ class SpanStations:
         """Axial stiffness at shares of the span, N; None if no row gives it."""
         known = dict(self.sections).get("ea")
         return None if known is None else self.between(share, known)
+
+    @property
+    def kinks(self) -> Array:
+        """Shares of the span at which a property changes its slope."""
+        at = np.array(self.at)
+        every = [self.chord_m, self.aft_m, self.mass_aft_m, *(values for _, values in self.sections)]
+        if self.drag_share is not None:
+            every.append(self.drag_share)
+        values = np.array(every)
+        slopes = np.diff(values, axis=1) / np.diff(at)
+        size = np.abs(values).max(axis=1, keepdims=True) / np.diff(at).min()
+        return at[1:-1][(np.abs(np.diff(slopes, axis=1)) > SAME_SLOPE * size).any(axis=0)]
 
     @property
     def mean_chord_m(self) -> float:

@@ -151,7 +151,7 @@ class Surface(Shown):
         """Distances from the root between which all properties are smooth: from 0 to the span, m."""
         if self.stations is None:
             return np.array([0.0, self.span_m])
-        return np.array(self.stations.at) * self.span_m
+        return np.concatenate([[0.0], self.stations.kinks, [1.0]]) * self.span_m
 
     def mass_arm_W(self, mass: PointMass, distance_m: float = 0.0) -> Array:
         """A point mass (3,) in W from the elastic axis at a distance from the root, undeformed, m."""

@@ -11,8 +11,8 @@ from morphdata.drives import SIDES, Hinge, drive_name, shown_drives
 from morphdata.identifiable import corrections
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
-from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.masses import reflected_masses
+from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
 from morphdata.vehicle import paired_by_reflection
 
