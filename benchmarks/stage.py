@@ -125,7 +125,7 @@ class Stages:
         self.count = 0
         self._constants: dict[int, Array] = {}
         laid: LaneConstants = lane_constants(model, batch, 1.0)
-        laid.set_thrust(found.force_B, found.moment_B)
+        laid.set_thrust(*found.acting_B)
         self._rows, self._ranges = laid.rows[0], laid.ranges[0]
         lag_s = np.stack([model.on_surface(batch, s)["lag_s"] for s in range(len(model.surfaces))], axis=1)
         self._lag_s = to_lanes(np.repeat(lag_s, model.surfaces[:, 1], axis=1))[0]

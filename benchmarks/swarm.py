@@ -14,7 +14,7 @@ def flown(clock: Clock, model: ChainModel, batch: ParameterBatch, case: SampleCa
     begin = clock()
     model = case.plan.flown(model)
     constants = lane_constants(model, batch, case.plan.grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
+    constants.set_thrust(*found.acting_B)
     state = trimmed_state(model, batch, case.plan, found)
     for _ in fly_batch(model, case.plan, constants, state, record_rows=4):
         pass

@@ -205,7 +205,7 @@ class _Flight:
     def _compiled(self, plan: FlightPlan) -> Array:
         """Euler angles (steps + 1, 3) of the compiled, shipped stepper."""
         constants = lane_constants(self.model, self.batch, plan.grid.step_s)
-        constants.set_thrust(self.found.force_B, self.found.moment_B)
+        constants.set_thrust(*self.found.acting_B)
         state = trimmed_state(self.model, self.batch, plan, self.found)
         rows = [chunk.rows[..., 0] for chunk in fly_batch(self.model, plan, constants, state, record_rows=4)]
         return euler_from_quaternion(np.concatenate(rows))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,6 +11,17 @@ from pydantic import ConfigDict, Field
 from morphdata.base import Document, Length, Position, Text
 from morphdata.drives import MAX_HINGES, Drive, Hinge, Side, drive_faults, drive_name, drives_of
 from morphdata.faults import Fault
+from morphdata.inertia import Inertia, inertia_faults
+from morphdata.masses import MAX_POINT_MASSES, PointMass, Propulsion, mass_faults
+from morphdata.stations import (
+    MAX_STATIONS,
+    MIN_STATIONS,
+    Chord,
+    Station,
+    Stiffness,
+    row_chords,
+    station_faults,
+)
 
 MAX_SURFACES = 16
 
@@ -42,12 +53,6 @@ EXAMPLE_AIRCRAFT: dict[str, Any] = {
     "surfaces": [_example_wing("right", 0.35), _example_wing("left", -0.35)],
 }
 
-Inertia = Annotated[float, Field(ge=-1e12, le=1e12)]
-Row3 = Annotated[list[Inertia], Field(min_length=3, max_length=3)]
-Matrix3 = list[list[float]]
-Stiffness = Annotated[float, Field(gt=0.0, le=1e15)]
-Chord = Annotated[float, Field(gt=0.0, le=50.0)]
-ROUND_OFF = 1e-9  # relative tolerance of the terms of an inertia
 MAX_SWEEP_RAD = 1.2
 MAX_DIHEDRAL_RAD = 1.5708  # pi / 2, as it is usually written
 MAX_INCIDENCE_RAD = 0.5
@@ -67,11 +72,9 @@ class Fuselage(Document):
     mass_kg: Annotated[float, Field(gt=0.0, le=1e7)] | None = Field(
         default=None, description="Instead of a density; needs `inertia_kg_m2`."
     )
-    inertia_kg_m2: (
-        Annotated[list[Inertia], Field(min_length=3, max_length=3)]
-        | Annotated[list[Row3], Field(min_length=3, max_length=3)]
-        | None
-    ) = Field(default=None, description="About the centre of mass, body axes: three diagonal terms or 3 x 3.")
+    inertia_kg_m2: Inertia | None = Field(
+        default=None, description="About the centre of mass, body axes: three diagonal terms or 3 x 3."
+    )
     centre_of_mass_m: Position | None = Field(
         default=None, description="From the reference point, body axes."
     )
@@ -94,48 +97,7 @@ class Fuselage(Document):
                 "/inertia_kg_m2",
                 "Add three diagonal terms or a 3 x 3 matrix about the centre of mass.",
             )
-        if self.inertia_kg_m2 is not None and not _is_inertia(inertia_matrix(self.inertia_kg_m2)):
-            yield Fault(
-                "inertia_not_physical",
-                "This matrix is not the inertia of a body: it must be symmetric and positive definite, and "
-                "no principal moment may exceed the sum of the other two.",
-                "/inertia_kg_m2",
-                "Check signs and symmetry; products of inertia enter with their minus sign.",
-            )
-
-
-def inertia_matrix(given: Sequence[float | list[float]]) -> Matrix3:
-    """Return the 3 x 3 matrix of an inertia given as a matrix or by its diagonal."""
-    return [
-        row if isinstance(row, list) else [row if column == number else 0.0 for column in range(3)]
-        for number, row in enumerate(given)
-    ]
-
-
-def _is_inertia(m: Matrix3) -> bool:
-    """Whether a matrix is symmetric, positive definite and satisfies the triangle inequality.
-
-    Moments of inertia are J = tr(P) - P with the second moments P of the mass, which are not negative.
-    """
-    scale = max(abs(term) for row in m for term in row) or 1.0
-    if any(abs(m[i][j] - m[j][i]) > ROUND_OFF * scale for i in range(3) for j in range(i)):
-        return False
-    half = (m[0][0] + m[1][1] + m[2][2]) / 2.0 + ROUND_OFF * scale
-    return _is_positive(m) and _is_positive(
-        [[(half if i == j else 0.0) - m[i][j] for j in range(3)] for i in range(3)]
-    )
-
-
-def _is_positive(m: Matrix3) -> bool:
-    """Whether a symmetric matrix is positive definite, by Sylvester's leading minors."""
-    first = m[0][0]
-    second = m[0][0] * m[1][1] - m[0][1] * m[1][0]
-    third = (
-        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
-        - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
-        + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
-    )
-    return first > 0.0 and second > 0.0 and third > 0.0
+        yield from inertia_faults(self.inertia_kg_m2)
 
 
 class Material(Document):
@@ -163,6 +125,16 @@ class Section(Document):
     mass_per_length_kg_m: float = Field(gt=0.0, le=1e5)
     inertia_per_length_kg_m: list[Annotated[float, Field(ge=0.0, le=1e6)]] = Field(
         min_length=3, max_length=3, description="About x, y, z of the section's centre of mass."
+    )
+    ea_n: Stiffness | None = Field(
+        default=None, description="Axial stiffness, N; default 12 EI_flap / thickness^2, a rectangle's."
+    )
+    ga_chord_n: Stiffness | None = Field(
+        default=None,
+        description="Shear stiffness along the chord, N; default 5/12 of the axial stiffness over (1 + nu).",
+    )
+    ga_normal_n: Stiffness | None = Field(
+        default=None, description="Shear stiffness along the normal, N; default as along the chord."
     )
 
     def faults(self) -> Iterator[Fault]:
@@ -231,10 +203,25 @@ class Surface(Document):
         default=None, description="Root at mid-chord; default: at the last hinge."
     )
     flexible: bool = True
+    stations: Annotated[list[Station], Field(min_length=MIN_STATIONS, max_length=MAX_STATIONS)] | None = (
+        Field(
+            default=None,
+            description="Properties that vary along the span, linear between rows; what a row leaves out is "
+            "the surface's own. Places across the chord are linear in m.",
+        )
+    )
 
     @property
     def root_and_tip_chord_m(self) -> tuple[float, float]:
         """Chord at the root and at the tip."""
+        if self.stations:
+            chords_of_rows = row_chords(self.stations, *self.own_chords_m)
+            return chords_of_rows[0], chords_of_rows[-1]
+        return self.own_chords_m
+
+    @property
+    def own_chords_m(self) -> tuple[float, float]:
+        """Chord at root and tip by the surface's own fields; 0 where it has none."""
         chords = [self.chord_m if chord is None else chord for chord in (self.root_chord_m, self.tip_chord_m)]
         return float(chords[0] or 0.0), float(chords[1] or 0.0)
 
@@ -254,6 +241,11 @@ class Surface(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that the chord is known, the surface is attached, and its axes are near the chord."""
+        if self.stations:
+            wrong = list(station_faults(self.stations, self.own_chords_m, self.elastic_axis_offset_m))
+            if wrong:
+                yield from wrong
+                return
         root, tip = self.root_and_tip_chord_m
         if not (root and tip):
             yield Fault(
@@ -293,6 +285,14 @@ class Aircraft(Document):
     name: Text = "aircraft"
     fuselage: Fuselage
     surfaces: list[Surface] = Field(min_length=1, max_length=MAX_SURFACES)
+    point_masses: Annotated[list[PointMass], Field(max_length=MAX_POINT_MASSES)] | None = Field(
+        default=None, description="Masses beside the fuselage's and the surfaces' own."
+    )
+    propulsion: Propulsion | None = Field(
+        default=None,
+        description="The line of thrust. Without it, the thrust that a trim finds acts along the flight path "
+        "at the reference point.",
+    )
 
     @property
     def drives(self) -> dict[str, Drive]:
@@ -316,6 +316,7 @@ class Aircraft(Document):
                     "Rename one.",
                 )
             names.add(surface.name)
+        yield from mass_faults(self.point_masses or [], [surface.name for surface in self.surfaces])
 
 
 def load_aircraft(path: str | Path) -> Aircraft:

@@ -36,7 +36,9 @@ class Start(Document):
     alpha_rad: float = Field(ge=-0.5, le=0.5)
     force_b_n: Vector3 = Field(default=[0.0, 0.0, 0.0], description="Body axes, at the reference point.")
     moment_b_n_m: Vector3 = Field(
-        default=[0.0, 0.0, 0.0], description="Body axes, about the reference point."
+        default=[0.0, 0.0, 0.0],
+        description="Body axes, about the reference point; beyond that of the thrust if the aircraft has a "
+        "line of thrust.",
     )
 
 

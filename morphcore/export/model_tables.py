@@ -30,7 +30,7 @@ from 0 here (in MATLAB files from 1).
     ``mass_kg`` (), ``centre_of_mass_m`` (3,), ``inertia_kg_m2`` (3, 3) about it, in B.
 ``trim``
     ``airspeed_m_s``, ``air_density_kg_m3``, ``gravity_m_s2``, ``alpha_rad`` (); ``force_n``, ``moment_nm``
-    (3,) constant, in B at the reference point; ``joint_rad`` (j, 3); ``hinge_rad`` (h,).
+    (3,) constant, in B at the reference point, thrust included; ``joint_rad`` (j, 3); ``hinge_rad`` (h,).
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges, link_masses
+from morphcore.models.lumps import FLAT_ROWS, link_lumps
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Hold
@@ -153,13 +154,17 @@ def _links(chain: ChainModel, batch: ParameterBatch) -> Table:
         origin[1:, 1] = surface.span_sign * length[:-1]
         lengths.append(length)
         origins.append(origin)
-        rows.append(link_masses(surface, edges)[0])
+        lumps = link_lumps(surface, edges)[0]
+        lumps[:, :FLAT_ROWS] += link_masses(surface, edges)[0]
+        rows.append(lumps)
         apparent.append(apparent_inertia(surface, density, edges[0, :-1], edges[0, 1:], edges[0, :-1]))
-    mass, mx, my, xx, yy, zz, xy = np.concatenate(rows).T
-    centre = np.stack([mx, my, np.zeros_like(mass)], axis=1) / mass[:, None]
+    mass, mx, my, xx, yy, zz, xy, mz, xz, yz = np.concatenate(rows).T
+    centre = np.stack([mx, my, mz], axis=1) / mass[:, None]
     about_origin = np.zeros((mass.size, 3, 3))
     about_origin[:, 0, 0], about_origin[:, 1, 1], about_origin[:, 2, 2] = xx, yy, zz
     about_origin[:, 0, 1] = about_origin[:, 1, 0] = xy
+    about_origin[:, 0, 2] = about_origin[:, 2, 0] = xz
+    about_origin[:, 1, 2] = about_origin[:, 2, 1] = yz
     # Steiner's theorem: m (|c|^2 1 - c c^T) from the origin to the centre of mass
     steiner = np.sum(centre**2, axis=1)[:, None, None] * np.eye(3) - centre[:, :, None] * centre[:, None]
     return {
@@ -200,13 +205,14 @@ def _hinges(aircraft: Aircraft) -> Table:
 
 def _trim(chain: ChainModel, found: Trim, angles: Array) -> Table:
     flight = chain.flight
+    force_B, moment_B = found.acting_B
     return {
         "airspeed_m_s": np.array(flight.airspeed_m_s),
         "air_density_kg_m3": np.array(flight.air_density_kg_m3),
         "gravity_m_s2": np.array(flight.gravity_m_s2),
         "alpha_rad": np.array(found.alpha[0]),
-        "force_n": found.force_B[0],
-        "moment_nm": found.moment_B[0],
+        "force_n": force_B[0],
+        "moment_nm": moment_B[0],
         "joint_rad": found.q_joint[0].reshape(-1, 3),
         "hinge_rad": angles.copy(),
     }

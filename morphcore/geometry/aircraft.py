@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -10,11 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.geometry.hinge import Hinge
+from morphcore.geometry.point_mass import masses_on, rigid_body
+from morphcore.geometry.propulsion import Propulsion
 from morphcore.geometry.surface import Surface
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.drives import Drive, drives_of
 from morphdata.flight import Flight as FlightDocument
+from morphdata.inertia import inertia_matrix
+from morphdata.masses import PointMass
 
 Array = NDArray[np.float64]
 
@@ -36,26 +41,49 @@ class Fuselage(Shown):
         """Return the body that a document describes: a box of uniform density, or explicit numbers."""
         centre = _vector(document.centre_of_mass_m or [0.0, 0.0, 0.0])
         if document.mass_kg is not None and document.inertia_kg_m2 is not None:
-            return cls(document.mass_kg, np.array(documents.inertia_matrix(document.inertia_kg_m2)), centre)
+            return cls(document.mass_kg, np.array(inertia_matrix(document.inertia_kg_m2)), centre)
         lx, ly, lz, density = (float(getattr(document, name)) for name in documents.BOX)
         mass = density * lx * ly * lz
         inertia = np.diag([ly**2 + lz**2, lx**2 + lz**2, lx**2 + ly**2]) * mass / 12
         return cls(mass, inertia, centre)
 
+    def carrying(self, masses: Sequence[PointMass]) -> Fuselage:
+        """The body together with those of some point masses that sit on it."""
+        bodies = [
+            (mass.mass_kg, mass.position_m, inertia_matrix(mass.inertia_kg_m2 or [0.0, 0.0, 0.0]))
+            for mass in masses
+            if mass.position_m is not None
+        ]
+        if not bodies:
+            return self
+        own = (self.mass_kg, self.centre_of_mass_B.tolist(), self.inertia_B.tolist())
+        mass_kg, centre_B, inertia_B = rigid_body([own, *bodies])
+        return replace(self, mass_kg=mass_kg, inertia_B=inertia_B, centre_of_mass_B=_vector(centre_B))
+
 
 @dataclass(frozen=True, repr=False)
 class Aircraft(Shown):
-    """A rigid fuselage with lifting surfaces on prescribed hinges."""
+    """A rigid fuselage with lifting surfaces on prescribed hinges.
+
+    The fuselage includes the point masses on it, each surface those that it carries. ``propulsion`` is None
+    if the thrust acts along the flight path at the reference point.
+    """
 
     name: str
     fuselage: Fuselage
     surfaces: tuple[Surface, ...]
+    propulsion: Propulsion | None = None
 
     @classmethod
     def of(cls, document: documents.Aircraft) -> Aircraft:
         """Return the aircraft that a document describes."""
-        surfaces = tuple(Surface.of(surface) for surface in document.surfaces)
-        return cls(document.name, Fuselage.of(document.fuselage), surfaces)
+        masses = document.point_masses or []
+        surfaces = tuple(
+            replace(Surface.of(surface), point_masses=masses_on(surface.name, masses))
+            for surface in document.surfaces
+        )
+        propulsion = None if document.propulsion is None else Propulsion.of(document.propulsion)
+        return cls(document.name, Fuselage.of(document.fuselage).carrying(masses), surfaces, propulsion)
 
     @cached_property
     def hinges(self) -> tuple[Hinge, ...]:

@@ -1,4 +1,4 @@
-"""Vortex-ring lattice of one flat, tapered lifting surface in its own wing axes."""
+"""Vortex-ring lattice of one flat lifting surface in its own wing axes."""
 
 from __future__ import annotations
 
@@ -95,13 +95,17 @@ def surface_lattice(
     rows = np.arange(chordwise)
     panel_chordwise = np.arange(chordwise + 1) / chordwise
     ring_chordwise = np.append((rows + RING_FRONT) / chordwise, 1.0)
-    panel_corners_W = chord_points(surface, panel_chordwise, edges)
+    at_edges = (surface.chord_at(edges), surface.aft_at(edges))
+    at_middles = (surface.chord_at(middles), surface.aft_at(middles))
+    if surface.stations is not None:  # strips are straight between their edges, whatever lies between
+        at_middles = (_means(at_edges[0]), _means(at_edges[1]))
+    panel_corners_W = _points(surface, panel_chordwise, edges, *at_edges)
     strip_width = np.diff(edges) * cos_sweep
-    strip_chord = surface.chord_at(middles)
+    strip_chord = at_middles[0]
     return SurfaceLattice(
         panel_corners_W=panel_corners_W,
-        ring_corners_W=chord_points(surface, ring_chordwise, edges),
-        control_points_W=chord_points(surface, (rows + CONTROL_POINT) / chordwise, middles),
+        ring_corners_W=_points(surface, ring_chordwise, edges, *at_edges),
+        control_points_W=_points(surface, (rows + CONTROL_POINT) / chordwise, middles, *at_middles),
         panel_area_m2=np.tile(strip_chord * strip_width / chordwise, (chordwise, 1)),
         strip_edges_m=edges,
         strip_chord_m=strip_chord,
@@ -126,7 +130,21 @@ def surface_pose(surface: Surface, hinge_rad: ArrayLike | None = None) -> tuple[
 
 def chord_points(surface: Surface, chord_fraction: Array, distance_m: Array) -> Array:
     """Points (rows, columns, 3) in W at chord fractions from the leading edge and distances from the root."""
-    forward = (0.5 - chord_fraction)[:, None] * surface.chord_at(distance_m)
+    return _points(
+        surface, chord_fraction, distance_m, surface.chord_at(distance_m), surface.aft_at(distance_m)
+    )
+
+
+def _means(values: Array) -> Array:
+    return np.asarray(0.5 * (values[1:] + values[:-1]))
+
+
+def _points(surface: Surface, chord_fraction: Array, distance_m: Array, chord: Array, aft: Array) -> Array:
+    """Points (rows, columns, 3) in W at chord fractions from the leading edge and distances from the root.
+
+    chord, aft : (columns,) chord, and mid-chord aft of the root's, there, m.
+    """
+    forward = (0.5 - chord_fraction)[:, None] * chord - aft
     points = forward[..., None] * surface.chord_W
     points[..., 1] += surface.span_sign * distance_m
     return points

@@ -72,6 +72,8 @@ def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
     paired = all(len(group) > 1 for group in groups)
     if not (paired and _is_symmetric(aircraft.fuselage) and _starts_straight(flight)):
         return None
+    if aircraft.propulsion is not None and not aircraft.propulsion.is_symmetric:
+        return None
     own, image = (tuple(group[side] for group in groups) for side in (0, 1))
     columns = aircraft.hinge_columns
     return Mirror(
@@ -92,6 +94,7 @@ def _reflection(surface: Surface) -> Surface:
         side="left" if surface.side == "right" else "right",
         position_m=(x, -y, z),
         hinges=tuple(hinge.reflection for hinge in surface.hinges),
+        point_masses=tuple(sorted(mass.reflection for mass in surface.point_masses)),
     )
 
 

@@ -100,6 +100,7 @@ def _mass(aircraft: Aircraft) -> float:
     for surface in aircraft.surfaces:
         distance, width = _stations(surface)
         wings += float(surface.section_at(distance).mass.sum()) * width
+        wings += sum(mass.mass_kg for mass in surface.point_masses)
     return aircraft.fuselage.mass_kg + wings
 
 

@@ -42,25 +42,27 @@ def overlapping_surfaces(aircraft: Aircraft, angles: Array) -> list[tuple[int, i
     found: dict[tuple[int, int], int] = {}
     for row in rows:
         outlines = [
-            outline_B(surface, angles[row, own])
+            panels_B(surface, angles[row, own])
             for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
         ]
         for first, second in itertools.combinations(range(len(outlines)), 2):
             pair = aircraft.surfaces[first], aircraft.surfaces[second]
-            if (first, second) not in found and _overlap(*pair, outlines[first], outlines[second]):
+            if (first, second) not in found and any(
+                _overlap(*pair, one, other)
+                for one, other in itertools.product(outlines[first], outlines[second])
+            ):
                 found[first, second] = int(row)
     return [(first, second, row) for (first, second), row in found.items()]
 
 
-def outline_B(surface: Surface, hinge_rad: ArrayLike) -> Array:
-    """Corners (4, 3) of an undeformed surface's mid-plane in B, around it from the root's leading edge, m.
+def panels_B(surface: Surface, hinge_rad: ArrayLike) -> list[Array]:
+    """Trapezia that make up an undeformed surface's mid-plane: the whole, or one between two stations each.
 
-    hinge_rad : (m,) of its hinges.
+    Corners (4, 3) in B, around it from the inner leading edge, m. hinge_rad : (m,) of its hinges.
     """
-    front, aft = chord_points(surface, np.array([0.0, 1.0]), np.array([0.0, surface.length_m]))
-    corners_W = np.concatenate([front, aft[::-1]])
     R_BW, r_B = surface_pose(surface, hinge_rad)
-    return np.asarray(corners_W @ R_BW.T + r_B)
+    front, aft = chord_points(surface, np.array([0.0, 1.0]), surface.breaks_m) @ R_BW.T + r_B
+    return [np.stack([front[a], front[a + 1], aft[a + 1], aft[a]]) for a in range(front.shape[0] - 1)]
 
 
 def _overlap(first: Surface, second: Surface, one_B: Array, other_B: Array) -> bool:

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.geometry.hinge import Hinge, hinge_arms
+from morphcore.geometry.point_mass import PointMass
 from morphcore.geometry.section import SectionProperties, given_section, solid_box
+from morphcore.geometry.span_stations import SpanStations
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.aircraft import Material, Section
@@ -24,7 +26,7 @@ SHEAR_FACTOR = 5.0 / 6.0  # of a rectangle, Timoshenko
 
 @dataclass(frozen=True, repr=False)
 class Surface(Shown):
-    """A flat lifting surface on hinges: straight mid-chord line along its own y, linear taper.
+    """A flat lifting surface on hinges: straight mid-chord line along its own y, linear taper, or stations.
 
     Wing axes W: origin at the root's mid-chord, y along the mid-chord line, the right surface spanning +y
     and the left one -y, z normal to the surface (down without dihedral), x forward. With all hinges at rest
@@ -39,7 +41,8 @@ class Surface(Shown):
     ``elastic_axis_x_m`` and ``mass_axis_x_m`` are the same, positive forward. Both lines are parallel to y
     and begin at the root chord. ``hinges`` carry the surface, from the fuselage outward; a fixed surface has
     none. The lattice stays flat: ``twist_rad`` (of the tip against the root, nose up) and ``zero_lift_rad``
-    are slopes of the mean line in its boundary condition.
+    are slopes of the mean line in its boundary condition. ``stations`` take precedence over the other fields;
+    with them ``profile_drag`` is the mean over the area, and the elastic axis is still straight along y.
     """
 
     name: str
@@ -62,12 +65,15 @@ class Surface(Shown):
     section: Section | None
     elastic_axis_offset_m: float
     mass_axis_offset_m: float
+    stations: SpanStations | None = None
+    point_masses: tuple[PointMass, ...] = ()
 
     @classmethod
     def of(cls, document: documents.Surface) -> Surface:
         """Return the surface that a document describes."""
         root, tip = document.root_and_tip_chord_m
         x, y, z = document.root_m
+        stations = SpanStations.of(document, lambda chord: _uniform_section(document, chord))
         return cls(
             name=document.name,
             side=document.side,
@@ -82,13 +88,14 @@ class Surface(Shown):
             hinges=tuple(Hinge.of(hinge, document.side) for hinge in document.all_hinges),
             position_m=(x, y, z),
             flexible=document.flexible,
-            profile_drag=document.profile_drag,
+            profile_drag=document.profile_drag if stations is None else stations.profile_drag,
             zero_lift_rad=document.zero_lift_rad,
             cm0=document.cm0,
             twist_rad=document.twist_rad,
             section=document.section,
-            elastic_axis_offset_m=document.elastic_axis_offset_m,
+            elastic_axis_offset_m=document.elastic_axis_offset_m if stations is None else stations.elastic_m,
             mass_axis_offset_m=document.mass_axis_offset_m,
+            stations=stations,
         )
 
     @property
@@ -130,11 +137,6 @@ class Surface(Shown):
         return self.elastic_axis_x_m * self.chord_W
 
     @property
-    def mass_arm_W(self) -> Array:
-        """A section's centre of mass (3,) from the elastic axis, m."""
-        return (self.mass_axis_x_m - self.elastic_axis_x_m) * self.chord_W
-
-    @property
     def elastic_axis_x_m(self) -> float:
         """The elastic axis ahead of mid-chord, along the chord; the offset itself is positive aft."""
         return -self.elastic_axis_offset_m
@@ -152,6 +154,8 @@ class Surface(Shown):
     @property
     def mean_chord_m(self) -> float:
         """Area over span."""
+        if self.stations is not None:
+            return self.stations.mean_chord_m
         return 0.5 * (self.root_chord_m + self.tip_chord_m)
 
     @property
@@ -162,6 +166,8 @@ class Surface(Shown):
     def chord_at(self, distance_m: ArrayLike) -> Array:
         """Chord (m) at a distance from the root along the mid-chord line, shape of the input."""
         fraction = np.asarray(distance_m, dtype=np.float64) / self.length_m
+        if self.stations is not None:
+            return self.stations.between(fraction, self.stations.chord_m)
         return self.root_chord_m + (self.tip_chord_m - self.root_chord_m) * fraction
 
     def twist_at(self, distance_m: ArrayLike) -> Array:
@@ -175,16 +181,75 @@ class Surface(Shown):
     def section_at(self, distance_m: ArrayLike) -> SectionProperties:
         """Section properties at distances from the root, shape (stations,)."""
         chord = np.atleast_1d(self.chord_at(distance_m))
-        if self.section is not None:
-            return given_section(self.section, chord)
-        return solid_box(self.material, chord * math.cos(self.sweep_rad), self.thickness_m)
+        base = _uniform_section(self, chord)
+        if self.stations is None:
+            return base
+        return self.stations.of_section(np.atleast_1d(distance_m) / self.length_m, base)
 
-    def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array]:
-        """Axial and shear stiffness, N, each (stations,), at distances from the root.
+    def aft_at(self, distance_m: ArrayLike) -> Array:
+        """Mid-chord (m) aft of the root's, at distances from the root, shape of the input."""
+        share = np.asarray(distance_m, dtype=np.float64) / self.length_m
+        if self.stations is None:
+            return np.zeros_like(share)
+        return self.stations.between(share, self.stations.aft_m)
 
-        For the solid box they are E A and 5/6 G A (Timoshenko's factor of a rectangle). Explicit section
-        properties do not include them; they are then those of the rectangle of this thickness with the same
-        flap stiffness, 12 EI_flap / thickness^2. Both are far too stiff to matter, but a beam needs them.
+    def mass_arm_at(self, distance_m: ArrayLike) -> Array:
+        """The centres of mass ahead of the elastic axis along the chord, m, shape of the input.
+
+        distance_m : from the root.
+        """
+        share = np.asarray(distance_m, dtype=np.float64) / self.length_m
+        if self.stations is None:
+            return np.full_like(share, self.mass_axis_x_m - self.elastic_axis_x_m)
+        return -self.stations.between(share, self.stations.mass_aft_m) - self.elastic_axis_x_m
+
+    def drag_share_at(self, distance_m: ArrayLike) -> Array:
+        """Profile drag coefficient over ``profile_drag`` at distances from the root, shape of the input."""
+        share = np.asarray(distance_m, dtype=np.float64) / self.length_m
+        if self.stations is None or self.stations.drag_share is None:
+            return np.ones_like(share)
+        return self.stations.between(share, self.stations.drag_share)
+
+    @property
+    def breaks_m(self) -> Array:
+        """Distances from the root between which all properties are smooth: from 0 to the end, m."""
+        if self.stations is None:
+            return np.array([0.0, self.length_m])
+        return np.concatenate([[0.0], self.stations.kinks, [1.0]]) * self.length_m
+
+    def point_mass_arm_W(self, mass: PointMass, distance_m: float = 0.0) -> Array:
+        """A point mass (3,) in W from the elastic axis at a distance from the root, undeformed, m."""
+        along = mass.at * self.length_m
+        aft = mass.aft_m + float(self.aft_at(along))
+        beside = np.array([0.0, self.span_sign * (along - distance_m), -mass.up_m])
+        return np.asarray(beside - (aft + self.elastic_axis_x_m) * self.chord_W)
+
+    def axial_at(self, distance_m: ArrayLike) -> tuple[Array, Array, Array]:
+        """Axial stiffness and shear stiffness along chord and normal, N, each (stations,).
+
+        For the solid box they are E A and 5/6 G A (Timoshenko's factor of a rectangle). Where a section does
+        not give its axial stiffness, it is that of the rectangle of this thickness with the same flap
+        stiffness, 12 EI_flap / thickness^2; shear follows from it. Both are far too stiff to matter, but a
+        beam needs them.
         """
         axial = 12.0 * self.section_at(distance_m).ei_flap / self.thickness_m**2
-        return axial, SHEAR_FACTOR * axial / (2.0 * (1.0 + self.material.poisson_ratio))
+        given = self.section
+        if given is not None and given.ea_n is not None:
+            axial = np.full_like(axial, given.ea_n)
+        if self.stations is not None:
+            share = np.atleast_1d(np.asarray(distance_m, dtype=np.float64)) / self.length_m
+            known = self.stations.axial(share)
+            axial = axial if known is None else known
+        chord = normal = SHEAR_FACTOR * axial / (2.0 * (1.0 + self.material.poisson_ratio))
+        if given is not None and given.ga_chord_n is not None:
+            chord = normal = np.full_like(axial, given.ga_chord_n)
+        if given is not None and given.ga_normal_n is not None:
+            normal = np.full_like(axial, given.ga_normal_n)
+        return axial, chord, normal
+
+
+def _uniform_section(of: Surface | documents.Surface, chord: Array) -> SectionProperties:
+    """Section properties at given chords (stations,), as they are without rows along the span."""
+    if of.section is not None:
+        return given_section(of.section, chord)
+    return solid_box(of.material, chord * math.cos(of.sweep_rad), of.thickness_m)

@@ -199,7 +199,7 @@ def trimmed_flight(
     """What flies a sample's plan, its constants with the trim's thrust, its trimmed state (p, rows)."""
     flown = case.plan.flown(model)
     constants = lane_constants(flown, batch, case.plan.grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
+    constants.set_thrust(*found.acting_B)
     return flown, constants, trimmed_state(flown, batch, case.plan, found, psi=float(case.sample.psi[0]))
 
 

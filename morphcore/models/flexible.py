@@ -24,14 +24,17 @@ from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
-from morphcore.multibody.beam import GAUSS, Beams, Section, make_beams
+from morphcore.models.links import POINTS, WEIGHTS
+from morphcore.models.lumps import beam_lumps, moved_inertia, surface_lumps
+from morphcore.models.span_quadrature import span_points
+from morphcore.multibody.beam import GAUSS, GAUSS_WEIGHTS, Beams, Section, make_beams
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-INERTIA_POINTS = 400  # midpoints along a rigid surface's span; mass and inertia converge quadratically
+KINK = 1e-9  # of an element: nearer to its ends, a kink of the surface's properties is at the node
 
 
 @dataclass(frozen=True)
@@ -87,14 +90,18 @@ def flexible_model(
         place = _section_places(surface, part, node, len(ends), count)
         places.append(place[:2])
         riders.append(_riders(surface, part, flight, place[2]))
+        on_points, on_nodes = beam_lumps(surface, count)
         for e in range(count):
             ends.append([node + e, node + e + 1])
             rest.append([0.0, 0.0, 0.0, 0.0, surface.span_sign * surface.length_m / count, 0.0])
-            sections.append(beam_sections(surface, stations[e] + GAUSS * surface.length_m / count))
+            sections.append(element_sections(surface, stations[e], surface.length_m / count, on_points[e]))
             damping.append(surface.material.stiffness_damping_s)
         if count == 0:
             bodies.append(node)
             inertia.append(rigid_surface_inertia(surface))
+        for number in np.flatnonzero(on_nodes.any(axis=(1, 2))):
+            bodies.append(node + int(number))
+            inertia.append(on_nodes[number])
         node += count + 1
         if flight.apparent_mass:
             apparent.append(_apparent_at(surface, flight, stations))
@@ -131,14 +138,54 @@ def beam_sections(surface: Surface, distance_m: Array) -> list[Section]:
     Axes of W: x across the elastic axis, y along it, z normal.
     """
     properties = surface.section_at(distance_m)
-    axial, shear = surface.axial_at(distance_m)
+    axial, shear_x, shear_z = surface.axial_at(distance_m)
+    arm = surface.mass_arm_at(distance_m)
     sections = []
     for i in range(distance_m.size):
         stiffness = np.diag(
-            [properties.ei_flap[i], properties.gj[i], properties.ei_edge[i], shear[i], axial[i], shear[i]]
+            [properties.ei_flap[i], properties.gj[i], properties.ei_edge[i], shear_x[i], axial[i], shear_z[i]]
         )
-        sections.append(Section(stiffness, section_inertia(properties, i, surface.mass_arm_W)))
+        sections.append(Section(stiffness, section_inertia(properties, i, arm[i] * surface.chord_W)))
     return sections
+
+
+def element_sections(surface: Surface, start_m: float, length_m: float, lumps: Array) -> list[Section]:
+    """Sections at the Gauss points of the element from a distance from the root on, with its point masses.
+
+    Where the surface's properties have kinks within the element, each Gauss point stands for the stretch of
+    the length of its weight: it gets the mean compliance of that stretch, and its mass with rigid arms. Mass,
+    centre and inertia are then exact for any rows.
+
+    Parameters
+    ----------
+    lumps : ndarray, shape (3, 6, 6)
+        Spatial inertia of the point masses on each Gauss point (`beam_lumps`).
+    """
+    points = start_m + GAUSS * length_m
+    kinks = surface.breaks_m[1:-1] - start_m
+    if np.any((kinks > KINK * length_m) & (kinks < (1.0 - KINK) * length_m)):
+        ends = start_m + length_m * np.array([0.0, *np.cumsum(GAUSS_WEIGHTS)[:-1], 1.0])
+        ends[-1] = min(ends[-1], surface.length_m)
+        every, width = span_points(surface, ends, POINTS, WEIGHTS)
+        sections = []
+        for point, stations, weight in zip(points, every, width, strict=True):
+            share = (weight / weight.sum())[:, None, None]
+            of = beam_sections(surface, stations)
+            arms = np.zeros((stations.size, 3))
+            arms[:, 1] = surface.span_sign * (stations - point)
+            mass = moved_inertia(np.stack([section.mass for section in of]), arms)
+            compliance = np.linalg.inv(np.stack([section.stiffness for section in of]))
+            stiffness = np.linalg.inv((share * compliance).sum(axis=0))
+            sections.append(Section(stiffness, (share * mass).sum(axis=0)))
+    else:
+        sections = beam_sections(surface, points)
+    if not lumps.any():
+        return sections
+    spread = GAUSS_WEIGHTS[:, None, None] * length_m
+    return [
+        Section(section.stiffness, section.mass + lump)
+        for section, lump in zip(sections, lumps / spread, strict=True)
+    ]
 
 
 def section_inertia(properties: SectionProperties, station: int, arm_W: Array) -> Array:
@@ -170,13 +217,14 @@ def fuselage_inertia(fuselage: Fuselage) -> Array:
 
 def rigid_surface_inertia(surface: Surface) -> Array:
     """Spatial inertia (6, 6) of an unbent surface about its root node, in W."""
-    width = surface.length_m / INERTIA_POINTS
-    distance = (np.arange(INERTIA_POINTS) + 0.5) * width
+    distance, width = span_points(surface, np.array([0.0, surface.length_m]), POINTS, WEIGHTS)
+    distance, width = distance.ravel(), width.ravel()
     properties = surface.section_at(distance)
-    total = np.zeros((6, 6))
+    ahead = surface.mass_arm_at(distance)
+    total = surface_lumps(surface)
     for i, y in enumerate(distance):
-        along = np.array([0.0, surface.span_sign * y, 0.0])
-        total += width * section_inertia(properties, i, surface.mass_arm_W + along)
+        arm_W = ahead[i] * surface.chord_W + np.array([0.0, surface.span_sign * y, 0.0])
+        total += width[i] * section_inertia(properties, i, arm_W)
     return total
 
 
@@ -206,7 +254,9 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
     control = np.tile(middle, part.chordwise)
     semichord = 0.5 * np.tile(part.strip_chord_m, part.chordwise)
     middle_W = np.zeros((strips, 3))
-    middle_W[:, 1] = surface.span_sign * 0.5 * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])
+    middles = 0.5 * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])
+    middle_W -= surface.aft_at(middles)[:, None] * surface.chord_W
+    middle_W[:, 1] += surface.span_sign * middles
     return Riders(
         sections=origin_W.shape[0],
         corner=corner,
@@ -215,13 +265,11 @@ def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Ar
         control_arm=part.control_points_W.reshape(-1, 3) - axis - origin_W[control],
         drag=middle,
         drag_arm=middle_W - axis - origin_W[middle],
-        drag_area=surface.profile_drag * part.panel_area_m2.sum(axis=0),
+        drag_area=surface.profile_drag * part.panel_area_m2.sum(axis=0) * surface.drag_share_at(middles),
         moment_area=surface.cm0 * _chord_squared(surface, part),
         control_chord=np.tile(surface.chord_W[:2], (control.size, 1)),
         drag_chord=np.tile(surface.chord_W[:2], (strips, 1)),
-        slope=np.tile(
-            surface.slope_at(0.5 * (part.strip_edges_m[1:] + part.strip_edges_m[:-1])), part.chordwise
-        ),
+        slope=np.tile(surface.slope_at(middles), part.chordwise),
         lag_time=semichord / flight.airspeed_m_s / np.array([[JONES_B1], [JONES_B2]]),
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.surface import Surface
+from morphcore.models.span_quadrature import span_points
 
 Array = NDArray[np.float64]
 
@@ -35,16 +36,15 @@ def link_masses(surface: Surface, edges: Array) -> Array:
     Mass (kg), first moments m x and m y (kg m), and the elements xx, yy, zz, xy of the inertia matrix (kg
     m^2).
     """
-    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    weight = 0.5 * length * WEIGHTS
+    start = edges[:, :-1, None]
+    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
     section = surface.section_at(stations.ravel())
     mass, ix, iy, iz = (
         value.reshape(stations.shape) * weight
         for value in (section.mass, section.inertia_x, section.inertia_y, section.inertia_z)
     )
-    x, aside, _ = surface.mass_arm_W
-    y = surface.span_sign * (stations - start) + aside
+    ahead = surface.mass_arm_at(stations)
+    x, y = ahead * surface.chord_W[0], surface.span_sign * (stations - start) + ahead * surface.chord_W[1]
     return np.stack(
         [
             mass.sum(-1),
@@ -120,9 +120,8 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
     compliance : ndarray, shape (3, p, n - 1, points)
         Flap, torsion, edgewise: weight times (L - y) over EI or GJ; the sum over points is the integral.
     """
-    start, length = ends[:, :-1, None], np.diff(ends, axis=1)[..., None]
-    stations = start + length * 0.5 * (BEAM_POINTS + 1)
-    moment = 0.5 * length * BEAM_WEIGHTS * (surface.length_m - stations)
+    stations, weight = span_points(surface, ends, BEAM_POINTS, BEAM_WEIGHTS)
+    moment = weight * (surface.length_m - stations)
     section = surface.section_at(stations.ravel())
     stiffness = np.stack([section.ei_flap, section.gj, section.ei_edge]).reshape(3, *stations.shape)
     return stations, moment / stiffness
@@ -161,18 +160,21 @@ def strip_overlap(surface: Surface, lattice: SurfaceLattice, edges: Array) -> tu
 
 
 def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
-    """Planform area (particles, n) of each link in m^2 and the y of its centroid in link axes, m."""
-    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    chord = surface.chord_at(stations) * surface.chord_W[0] * 0.5 * length * WEIGHTS
+    """Planform area (particles, n) of each link in m^2 and the y of its centroid in link axes, m.
+
+    Where the profile drag varies along the span, the area is weighted by it (`Surface.drag_share_at`).
+    """
+    start = edges[:, :-1, None]
+    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
+    chord = surface.chord_at(stations) * surface.chord_W[0] * weight * surface.drag_share_at(stations)
     area = chord.sum(-1)
     return area, surface.span_sign * (chord * (stations - start)).sum(-1) / area
 
 
 def moment_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     """Integral of the chord squared (particles, n) over each link in m^3, and the y of its centroid, m."""
-    start, length = edges[:, :-1, None], np.diff(edges, axis=1)[..., None]
-    stations = start + length * 0.5 * (POINTS + 1)
-    squared = surface.chord_at(stations) ** 2 * surface.chord_W[0] * 0.5 * length * WEIGHTS
+    start = edges[:, :-1, None]
+    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
+    squared = surface.chord_at(stations) ** 2 * surface.chord_W[0] * weight
     total = squared.sum(-1)
     return total, surface.span_sign * (squared * (stations - start)).sum(-1) / total

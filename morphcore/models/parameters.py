@@ -47,8 +47,9 @@ from morphcore.models.links import (
     strip_overlap,
     twist_slopes,
 )
+from morphcore.models.lumps import FLAT_ROWS, LUMP_ROWS, link_lumps
 from morphcore.models.transforms import Linear, Log, Shares, Transform
-from morphcore.multibody.kernels.articulated import L_APPARENT, L_MASS, L_OFFSET
+from morphcore.multibody.kernels.articulated import L_APPARENT, L_MASS, L_OFFSET, L_UP
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -263,6 +264,10 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
     surface, edges = rows.surface, link_edges(division, rows.surface.length_m)
     particles = division.shape[0]
     rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] = link_masses(surface, edges)
+    if surface.point_masses:
+        lumps = link_lumps(surface, edges)
+        rows.links[:, :, L_MASS : L_MASS + MASS_ROWS] += lumps[..., :FLAT_ROWS]
+        rows.links[:, :, L_UP : L_UP + LUMP_ROWS - FLAT_ROWS] = lumps[..., FLAT_ROWS:]
     rows.links[:, 1:, L_OFFSET] = surface.span_sign * np.diff(edges, axis=1)[:, :-1]
     rows.links[:, :, L_DRAG], rows.links[:, :, L_DRAG_Y] = drag_areas(surface, edges)
     rows.links[:, :, L_SLOPE : L_TURN_Y + 1] = twist_slopes(surface, edges)

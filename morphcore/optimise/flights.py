@@ -104,7 +104,7 @@ class MorphFlights:
         with naming_obstacles(partial(chain_obstacle, model, batch)):
             found = trim(self.model, batch, waiting, start=start).require()
         self.constants = lane_constants(self.model, batch, self.grid.step_s)
-        self.constants.set_thrust(found.force_B, found.moment_B)
+        self.constants.set_thrust(*found.acting_B)
         self.state = trimmed_state(self.model, batch, waiting, found)
 
     def fly(self, schedules: Sequence[Schedule], *, torque: bool, stop: Stop | None = None) -> Flown:

@@ -52,7 +52,7 @@ def chain_flight(
     flown = plan.flown(model)
     found = trim(flown, batch, plan, start=start).require()
     constants = lane_constants(flown, batch, grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
+    constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)
     rows, chunks, states = JOINTS + flown.coordinates, [], []
     wanted = flown.state_rows if "loads" in parts else rows

@@ -49,7 +49,7 @@ def flexible_flight(
     flight = FlexibleFlight(model)
     with one_blas_thread():
         path, trim = start_flexible(flight, schedules, grid, wind_N[0], start)
-    flight.thrust = np.concatenate([trim.moment_B, trim.force_B])
+    flight.thrust = np.concatenate([trim.moment_B + trim.thrust_moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
     run = FlexibleRun(flight, path, grid, wind_N, begin)
     for first in range(0, grid.steps, CHUNK_STEPS):
@@ -79,6 +79,7 @@ def flexible_flight(
             q_joint=np.zeros((1, 0)),
             converged=np.array([True]),
             residual=np.array([trim.residual]),
+            thrust_moment_B=trim.thrust_moment_B[None],
         ),
     )
     yield 1.0, record

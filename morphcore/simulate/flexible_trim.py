@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
+from morphcore.geometry.propulsion import thrust_direction_B, thrust_moment_B
 from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried, node_forces
 from morphcore.multibody.strain_poses import StrainPoses
 from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
@@ -28,7 +29,8 @@ LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an a
 class FlexibleTrim:
     """A start: angle of attack (rad), constant force (N) and moment (N m) in B, and the state.
 
-    residual : the remaining imbalance as a displacement, rad and m.
+    residual : the remaining imbalance as a displacement, rad and m. thrust_moment_B : as in
+    `simulate.trim.Trim`.
     """
 
     alpha: float
@@ -36,6 +38,7 @@ class FlexibleTrim:
     moment_B: Array
     state: FlexibleState
     residual: float
+    thrust_moment_B: Array
 
 
 class _Balance:
@@ -123,7 +126,9 @@ class _Balance:
         if self.given is not None:
             # the wings move with the fuselage as one: its acceleration follows from the sum of all forces
             at_rest = self.loads(poses, np.zeros_like(V), A)
-            thrust = np.concatenate([self.given.moment_B, self.given.force_B])
+            propulsion = flight.model.aircraft.propulsion
+            acting_B = self.given.moment_B + thrust_moment_B(propulsion, self.given.force_B)
+            thrust = np.concatenate([acting_B, self.given.force_B])
             defect = thrust - self.total(poses, demands)
             A = self._rigid(poses, np.asarray(np.linalg.solve(self._inertia(poses, at_rest), defect)))
             demands += self.loads(poses, V, A) - self.loads(poses, V, np.zeros_like(V))
@@ -160,9 +165,9 @@ class _Balance:
         strained = change + share * (self.flexibility @ required[..., None])[..., 0]
         if self.given is not None:
             return strained.ravel()
-        alpha = x[count]
+        line_B = thrust_direction_B(model.aircraft.propulsion, x[count])
         total = self.total(state.poses, demands)
-        normal = -np.sin(alpha) * total[3] + np.cos(alpha) * total[5]
+        normal = -line_B[2] * total[3] + line_B[0] * total[5]
         return np.append(strained, normal / (model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE))
 
 
@@ -191,11 +196,14 @@ def trim_flexible(
     with np.errstate(over="ignore", invalid="ignore"):
         root = _equilibrium(balance)
     state, demands = balance.state(root.x)
-    given = balance.given
+    given, propulsion = balance.given, flight.model.aircraft.propulsion
     if given is not None:
-        return FlexibleTrim(given.alpha_rad, given.force_B, given.moment_B, state, root.size)
+        of_thrust_B = thrust_moment_B(propulsion, given.force_B)
+        return FlexibleTrim(given.alpha_rad, given.force_B, given.moment_B, state, root.size, of_thrust_B)
     total = balance.total(state.poses, demands)
-    return FlexibleTrim(float(root.x[-1]), total[3:].copy(), total[:3].copy(), state, root.size)
+    of_thrust_B = thrust_moment_B(propulsion, total[3:])
+    moment_B = total[:3] - of_thrust_B
+    return FlexibleTrim(float(root.x[-1]), total[3:].copy(), moment_B, state, root.size, of_thrust_B)
 
 
 def _equilibrium(balance: _Balance) -> Root:

@@ -157,7 +157,7 @@ def _attitudes(
     """Euler angles (steps + 1, 3) at the grid times."""
     flown = plan.flown(model)
     constants = lane_constants(flown, batch, plan.grid.step_s)
-    constants.set_thrust(found.force_B, found.moment_B)
+    constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)
     chunks = [
         chunk.rows[..., 0] for chunk in fly_batch(flown, plan, constants, state, record_rows=4, stop=stop)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler
+from morphcore.geometry.propulsion import Propulsion, thrust_force_B, thrust_moment_B
 from morphcore.models.equivalent import (
     ChainModel,
     LaneConstants,
@@ -49,8 +50,10 @@ class Trim(Shown):
     alpha : (p,) rad; force_B : (p, 3) N and moment_B : (p, 3) N m, constant in flight, in B at the reference
     point;
     q_joint : (p, coordinates) rad; converged : (p,) whether Newton's iteration arrived; residual : (p,) the
-    last step, rad; share : (p,) of the joints' flexibility up to which the equilibrium was followed. Without
-    a trim, angles are those at that share, or where the iteration ended if that is none.
+    last step, rad; thrust_moment_B : (p, 3) N m, moment of the thrust about the reference point by the
+    aircraft's line of thrust; moment_B acts beyond it; share : (p,) of the joints' flexibility up to which
+    the equilibrium was followed. Without a trim, angles are those at that share, or where the iteration ended
+    if that is none.
     """
 
     alpha: Array
@@ -59,7 +62,13 @@ class Trim(Shown):
     q_joint: Array
     converged: NDArray[np.bool_]
     residual: Array
+    thrust_moment_B: Array
     share: Array = field(default_factory=lambda: np.ones(1))
+
+    @property
+    def acting_B(self) -> tuple[Array, Array]:
+        """Constant force (p, 3), N, and all of the constant moment (p, 3), N m, about the reference point."""
+        return self.force_B, self.moment_B + self.thrust_moment_B
 
     def require(self) -> Trim:
         """Return itself if every parameter set is trimmed; otherwise raise TrimNotFound."""
@@ -86,7 +95,8 @@ def trim(
     """Find the equilibrium at the plan's first hinge angles, with the hinges held.
 
     With ``start="trim"`` the unknowns are the angle of attack, a constant force along the flight path and
-    across it, a constant moment, and the joint angles: the aircraft then flies straight and level. With
+    across it, a constant moment, and the joint angles: the aircraft then flies straight and level. If the
+    aircraft has a line of thrust, the force along the path is a thrust along it instead. With
     ``"given"`` angle of attack, force and moment are those of the flight's start and only the joints settle
     (their accelerations vanish). Where Newton's method from straight joints does not arrive, the equilibrium
     is followed from stiff joints to their own stiffness, unless ``follow`` is False.
@@ -214,7 +224,11 @@ def _trim_slab(
         repeated = np.repeat(np.arange(particles), points.shape[1])
         flat = points.reshape(-1, n + 6)
         lane_rows = rows[repeated]
-        lane_rows[:, FORCE_C : FORCE_C + 3], lane_rows[:, FORCE_C + 3 : FORCE_C + 6] = _thrust(flat, n, given)
+        force_B, moment_B = _thrust(flat, n, given, model.aircraft.propulsion)
+        lane_rows[:, FORCE_C : FORCE_C + 3] = force_B
+        lane_rows[:, FORCE_C + 3 : FORCE_C + 6] = moment_B + thrust_moment_B(
+            model.aircraft.propulsion, force_B
+        )
         blocks = to_lanes(lane_rows)
         lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), flat.shape[0])
         state = _state(model, batch.select(repeated), plan, flat[:, n], flat[:, :n])
@@ -243,10 +257,12 @@ def _trim_slab(
         moving &= (residual >= ANGLE_TOLERANCE) & np.isfinite(residual)
         if not np.any(moving):
             break
-    force_B, moment_B = _thrust(x, n, given)
+    force_B, moment_B = _thrust(x, n, given, model.aircraft.propulsion)
+    of_thrust_B = thrust_moment_B(model.aircraft.propulsion, force_B)
     # forward differences limit the last digits: nearly converged is good enough
     converged = residual < 1e3 * ANGLE_TOLERANCE
-    return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, np.where(converged, 1.0, 0.0))
+    share = converged.astype(np.float64)
+    return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, of_thrust_B, share)
 
 
 def _solve(jacobian: Array, right: Array) -> Array:
@@ -266,10 +282,10 @@ def _solve_one(matrix: Array, right: Array) -> Array:
         return np.asarray(np.linalg.pinv(matrix) @ right)
 
 
-def _thrust(points: Array, n: int, given: object) -> tuple[Array, Array]:
-    """Constant force and moment in B of each row of unknowns."""
+def _thrust(points: Array, n: int, given: object, propulsion: Propulsion | None) -> tuple[Array, Array]:
+    """Constant force in B, and moment beyond that of the thrust, of each row of unknowns."""
     if given is not None:
         count = points.shape[0]
         return np.tile(given.force_B, (count, 1)), np.tile(given.moment_B, (count, 1))  # type: ignore[attr-defined]
     alpha, along, across = points[:, n], points[:, n + 1], points[:, n + 2]
-    return np.stack([along * np.cos(alpha), across, along * np.sin(alpha)], axis=1), points[:, n + 3 : n + 6]
+    return thrust_force_B(propulsion, alpha, along, across), points[:, n + 3 : n + 6]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from morphdata.aircraft import Surface
+from morphdata.aircraft import Aircraft, Surface
 from morphdata.drive_keys import resolved
 from morphdata.drives import SIDES, Hinge, drive_name, shown_drives
 from morphdata.identifiable import corrections, on_request
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
+from morphdata.masses import reflected_masses
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.samples import InlineSample
 from morphdata.vehicle import paired_by_reflection
@@ -71,7 +72,7 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
     profile drag and the coefficients of its sections.
     """
     model, surfaces = request.model, request.aircraft.surfaces
-    groups = _mirror_groups(surfaces)
+    groups = _mirror_groups(request.aircraft)
     if model.aero_coefficients is None:
         bounded = () if model.bounds is None else model.bounds.given()
         left_out = {name for name in on_request() if name not in bounded}
@@ -85,10 +86,15 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
     return 7 * (links - 1) * sets + len(searched) + of_pairs * (groups - 1)
 
 
-def _mirror_groups(surfaces: Sequence[Surface]) -> int:
-    """Count the flexible surfaces, with mirror images counted once."""
-    nameless = [_plainly(each) for each in surfaces if each.flexible]
-    return len(paired_by_reflection(nameless, [_reflection(each) for each in nameless]))
+def _mirror_groups(aircraft: Aircraft) -> int:
+    """Count the flexible surfaces, with mirror images and what they carry counted once."""
+    flexible = [each for each in aircraft.surfaces if each.flexible]
+    carried = [reflected_masses(aircraft.point_masses or [], each.name) for each in flexible]
+    nameless = [(_plainly(each), own) for each, (own, _) in zip(flexible, carried, strict=True)]
+    reflections = [
+        (_reflection(each), images) for (each, _), (_, images) in zip(nameless, carried, strict=True)
+    ]
+    return len(paired_by_reflection(nameless, reflections))
 
 
 def _reflection(surface: Surface) -> Surface:

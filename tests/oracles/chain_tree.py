@@ -166,13 +166,38 @@ def slice_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Arra
     stations = start_m + 0.5 * (end_m - start_m) * (points + 1.0)
     lengths = 0.5 * (end_m - start_m) * weights
     section = surface.section_at(stations)
-    from_axis = surface.mass_axis_x_m - surface.elastic_axis_x_m
+    from_axis = surface.mass_arm_at(stations)
     about_centres = np.stack([section.inertia_x, section.inertia_y, section.inertia_z], axis=1)
     total: Array = np.zeros((6, 6))
     for i in range(SLICES):
-        centre = origin_W + np.array([from_axis, surface.span_sign * (stations[i] - start_m), 0.0])
+        centre = origin_W + np.array([from_axis[i], surface.span_sign * (stations[i] - start_m), 0.0])
         total += lengths[i] * spatial_inertia(float(section.mass[i]), centre, np.diag(about_centres[i]))
-    return np.asarray(total)
+    return np.asarray(total + carried_inertia(surface, start_m, end_m, origin_W))
+
+
+def carried_inertia(surface: Surface, start_m: float, end_m: float, origin_W: Array) -> Array:
+    """Spatial inertia (6, 6) of the point masses between two distances, as in `slice_inertia`.
+
+    A mass near a joint counts on both sides of it, by the area under the parabola 3/4 (1 - u^2), u = -1..1
+    over 1 per cent of the span either way, that lies on each side.
+    """
+    total: Array = np.zeros((6, 6))
+    for mass in surface.point_masses:
+        at = mass.at * surface.span_m
+        low, high = ((end - at) / (0.01 * surface.span_m) for end in (start_m, end_m))
+        low = -1.0 if start_m == 0.0 else min(max(low, -1.0), 1.0)
+        high = 1.0 if end_m == surface.span_m else min(max(high, -1.0), 1.0)
+        area = 0.75 * (high - low) - 0.25 * (high**3 - low**3)
+        arm = np.array(
+            [
+                surface.elastic_axis_offset_m - mass.aft_m - float(surface.aft_at(at)),
+                surface.span_sign * (at - start_m),
+                -mass.up_m,
+            ]
+        )
+        inertia = np.array(mass.inertia).reshape(3, 3)
+        total += area * spatial_inertia(mass.mass_kg, origin_W + arm, inertia)
+    return total
 
 
 def _root(surface: Surface) -> Array:

@@ -124,6 +124,9 @@ def clamped_modes(beams: Beams, count: int) -> tuple[Array, Array]:
         for (a, b), block in zip(beams.ends, work.tangents, strict=True):
             index = np.concatenate([6 * a + np.arange(6), 6 * b + np.arange(6)])
             matrix[np.ix_(index, index)] += block
+    for node, inertia in zip(beams.bodies, beams.inertia, strict=True):
+        own = slice(6 * node, 6 * node + 6)
+        mass[own, own] += inertia
     free = (6 * np.sort(beams.ends[:, 1])[:, None] + np.arange(6)).ravel()
     omega2, vectors = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
     shapes = np.zeros((count, size))
