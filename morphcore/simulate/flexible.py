@@ -23,6 +23,7 @@ from morphcore.models.flexible import FlexibleModel
 from morphcore.multibody.beam import (
     GAUSS,
     GAUSS_SERIES,
+    Beams,
     BeamWorkspace,
     NodePoses,
     Sections,
@@ -166,9 +167,14 @@ class FlexibleFlight:
             path.acceleration[row], poses.R, poses.x, V, A, self._v,
         )  # fmt: skip
 
-    def structure(self, poses: NodePoses, V: Array, A: Array, wind_N: Array = STILL_AIR) -> Array:
-        """Forces (n, 6) that structure, inertia, apparent mass and weight require at the nodes."""
-        out = node_forces(self.model.beams, self.work, poses, V, A, self.gravity_N)
+    def structure(
+        self, poses: NodePoses, V: Array, A: Array, wind_N: Array = STILL_AIR, beams: Beams | None = None
+    ) -> Array:
+        """Forces (n, 6) that structure, inertia, apparent mass and weight require at the nodes.
+
+        ``beams``: others than the model's, on the same nodes.
+        """
+        out = node_forces(beams or self.model.beams, self.work, poses, V, A, self.gravity_N)
         apparent_forces(self.model.apparent, poses.R, V, A, wind_N, self.work.v, out)
         return out
 

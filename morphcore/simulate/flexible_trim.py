@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.propulsion import thrust_direction_B, thrust_moment_B
-from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried, node_forces
+from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried
 from morphcore.multibody.strain_poses import StrainPoses
 from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
@@ -71,8 +71,7 @@ class _Balance:
 
     def loads(self, poses: NodePoses, V: Array, A: Array) -> Array:
         """Forces (n, 6) that inertia and weight require at the nodes."""
-        flight = self.flight
-        return node_forces(self.loose, flight.work, poses, V, A, flight.gravity_N)
+        return self.flight.structure(poses, V, A, beams=self.loose)
 
     def longest(self, step: Array) -> float:
         """Share of a step of the unknowns that may be taken at once."""
