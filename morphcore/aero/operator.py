@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ from morphcore.aero.kernels.loads import (
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
+from morphcore.geometry.mirror import mirror_groups
 from morphcore.geometry.surface import Surface
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 
@@ -83,6 +85,15 @@ class AircraftLattice:
         heights = {surface.position_m[2] for surface in surfaces}
         oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
         return turns or len(heights) > 1 or not oblong
+
+    @cached_property
+    def paired(self) -> NDArray[np.bool_]:
+        """Whether each surface has a mirror image, (s,)."""
+        surfaces = self.aircraft.surfaces
+        if self.images:
+            return np.ones(len(surfaces), dtype=np.bool_)
+        pairs = [group for group in mirror_groups(surfaces) if len(group) > 1]
+        return np.isin(np.arange(len(surfaces)), [number for group in pairs for number in group])
 
     def more_rows(self, strip: int) -> int:
         """First of the further rows of a strip; -1 if there are none."""
@@ -187,10 +198,20 @@ def _at_points(poses: Sequence[tuple[Array, Array]], groups: Sequence[Sequence[A
 def _references(
     lattice: AircraftLattice, poses: Sequence[tuple[Array, Array]], circulation: Array
 ) -> list[Array]:
-    """Circulations (rings,) for each surface in a uniform flow normal to it: its chordwise distribution."""
+    """Circulations (rings,) for each surface in a uniform flow normal to it: its chordwise distribution.
+
+    Other surfaces meet that flow by the cosine between the normals. Mirror images meet it alike, as in an
+    aircraft of which only one half is computed.
+    """
     counts = [part.spanwise for part in lattice.lattices]
-    normals = np.repeat([R_BW[:, 2] for R_BW, _ in poses], counts, axis=0)
-    return [(circulation[:, ::2] * (normals @ R_BW[:, 2])).sum(axis=1) for R_BW, _ in poses]
+    normals = np.stack([R_BW[:, 2] for R_BW, _ in poses])
+    references = []
+    for normal, paired in zip(normals, lattice.paired, strict=True):
+        met = normals @ normal
+        if paired:
+            met = np.where(lattice.paired, np.maximum(met, (normals * ACROSS) @ normal), met)
+        references.append((circulation[:, ::2] * np.repeat(met, counts)).sum(axis=1))
+    return references
 
 
 def _boundary(lattice: AircraftLattice) -> Array:
