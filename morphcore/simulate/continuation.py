@@ -30,8 +30,9 @@ FIRST_SHARE = 1e-3  # of a continuation: gives the curve's direction
 FIRST_LENGTH = 0.25  # of its next step, along the curve
 LONGEST = 0.5
 SMALLEST = 1e-4
+ASIDE, SMALL = 0.5, 0.05  # a root may lie so far from its guess: share of the unknowns' change, and besides
 EASY = 3  # linear solves of a root after which the next step is twice as long
-MAX_SOLVES = 300  # of one continuation
+MAX_SOLVES = 200  # of one continuation
 
 
 @dataclass
@@ -185,13 +186,14 @@ def _follow(
 class Continued:
     """Where a continuation ended: the root of the largest share that it reached, and all linear solves.
 
-    arrived : whether the share is 1.
+    arrived : whether the share is 1. path : shares and unknowns of all roots on the way.
     """
 
     root: Root
     share: float
     solves: int
     arrived: bool
+    path: list[tuple[float, Array]] = field(default_factory=list)
 
 
 def continue_root(residual: Callable[[Array, float], Array], start: Array, rules: Rules) -> Continued:
@@ -231,12 +233,14 @@ def continue_root(residual: Callable[[Array, float], Array], start: Array, rules
         step = moved - z
         distance = _norm(step)
         # a root far from the straight line may lie on another curve
-        if not found.arrived or distance > 2.0 * length or not 0.0 < moved[-1] <= 1.0:
+        aside = ASIDE * _norm(ahead[:-1] - z[:-1]) + SMALL
+        if not found.arrived or _norm(moved - ahead) > aside or not 0.0 < moved[-1] <= 1.0:
             length *= 0.25
             if length < SMALLEST:
                 break
             continue
         z, line = moved, step / distance
+        best.path.append((float(z[-1]), z[:-1]))
         length = min(LONGEST, distance * (2.0 if found.solves <= EASY else 1.0))
         if z[-1] > best.share:
             best.root, best.share, best.arrived = replace(found, x=z[:-1]), float(z[-1]), last

@@ -15,7 +15,7 @@ from morphcore.multibody.strain_poses import StrainPoses
 from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.trim import StartMode
-from morphcore.simulate.trim_limits import STALL_RAD, Limit, lost, no_lift
+from morphcore.simulate.trim_limits import STALL_RAD, Limit, is_sound, lost, no_lift
 
 Array = NDArray[np.float64]
 
@@ -231,11 +231,21 @@ def _limit(balance: _Balance, found: Continued) -> Limit:
     model = balance.flight.model
     if not found.root.arrived:
         return no_lift(*balance.lift_coefficients(STALL_RAD), model.flight.airspeed_m_s)
-    R = balance.state(found.root.x)[0].poses.R
-    turns = [
-        float(np.arccos(np.clip(0.5 * (np.trace(R[root].T @ R[tip]) - 1.0), -1.0, 1.0)))
-        for root, tip in zip(model.roots, model.tips, strict=True)
-    ]
+    alpha, turns = _shape(balance, found.root.x)
     most = int(np.argmax(turns))
-    alpha = float(found.root.x[-1]) if balance.given is None else balance.given.alpha_rad
-    return lost(found.share, alpha, (f"the tip of {model.aircraft.surfaces[most].name!r}", turns[most]))
+    sound = [share for share, x in found.path if _is_sound(balance, x)]
+    bent = f"the tip of {model.aircraft.surfaces[most].name!r}"
+    return lost(found.share, alpha, (bent, turns[most]), max(sound, default=0.0))
+
+
+def _is_sound(balance: _Balance, x: Array) -> bool:
+    alpha, turns = _shape(balance, x)
+    return is_sound(alpha, max(turns))
+
+
+def _shape(balance: _Balance, x: Array) -> tuple[float, list[float]]:
+    """Angle of attack and the turn of each surface's tip against its root, rad."""
+    state, model = balance.state(x)[0], balance.flight.model
+    turned = [state.poses.R[a].T @ state.poses.R[b] for a, b in zip(model.roots, model.tips, strict=True)]
+    alpha = float(x[-1]) if balance.given is None else balance.given.alpha_rad
+    return alpha, [float(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))) for R in turned]

@@ -38,23 +38,28 @@ def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
     )
 
 
-def lost(share: float, alpha: float, bent: tuple[str, float]) -> Limit:
+def lost(share: float, alpha: float, bent: tuple[str, float], sound: float = 0.0) -> Limit:
     """The equilibrium was followed from rigid wings to a ``share`` of their flexibility.
 
     Parameters
     ----------
     alpha : angle of attack there, rad. bent : the surface or joint that is bent most, and by how much, rad.
+    sound : the largest share on the way where no wing stalls or folds, if it is known.
     """
     if share <= 0.0:
-        return Limit(
-            "even wings a thousand times as stiff bend away", "check the unit of the stiffness, and the loads"
-        )
-    stiffer = 1.0 / share
+        return Limit("even wings a thousand times as stiff bend away", "check the unit of the stiffness")
     found = (
         f"followed from rigid wings, the equilibrium ends at {100.0 * share:.3g} per cent of their "
         f"flexibility, {shape(alpha, bent)}"
     )
-    return Limit(found, f"wings {_rounded_up(stiffer)} times as stiff have a trim")
+    if sound > 0.0:
+        return Limit(found, f"wings {_rounded_up(1.0 / sound)} times as stiff trim below both limits")
+    return Limit(found, f"wings {_rounded_up(1.0 / share)} times as stiff have a trim")
+
+
+def is_sound(alpha: float, turn: float) -> bool:
+    """Whether an angle of attack and the largest turn of a tip, rad, are below both limits."""
+    return abs(alpha) <= STALL_RAD and turn <= BENT_RAD
 
 
 def chain_limit(share: float, alpha: float, q_joint: Array) -> Limit:
