@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from morphcore.aero.kernels.loads import OUTPUTS
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.control_slopes import ControlSlopes, control_slopes
 from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
 from morphcore.geometry.surface import Surface
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
@@ -46,6 +47,7 @@ class AircraftLattice:
 
     images : mirror images of the surfaces if these are one half of a symmetric aircraft. They induce
     velocities but have no outputs of their own. table : rings of the surfaces, then of the images.
+    slopes : of the control surfaces.
     """
 
     aircraft: Aircraft
@@ -55,6 +57,27 @@ class AircraftLattice:
     table: RingTable
     strip0: tuple[int, ...]
     strips: int
+    slopes: ControlSlopes
+
+    @property
+    def control0(self) -> tuple[int, ...]:
+        """By surface, the input of its first strip's velocity along the chord; -1 without controls."""
+        first, out = 2 * self.strips, []
+        for surface, part in zip(self.aircraft.surfaces, self.lattices, strict=True):
+            out.append(first if surface.controls else -1)
+            first += part.spanwise if surface.controls else 0
+        return tuple(out)
+
+    @property
+    def control_columns(self) -> NDArray[np.int64]:
+        """(m,) input that the loads of each part of the controls multiply: u_x of its strip."""
+        shift = np.concatenate(
+            [
+                np.full(part.spanwise, first - strip0)
+                for first, strip0, part in zip(self.control0, self.strip0, self.lattices, strict=True)
+            ]
+        )
+        return np.asarray(self.slopes.strip + shift[self.slopes.strip], dtype=np.int64)
 
     @property
     def rings(self) -> int:
@@ -66,8 +89,13 @@ class AircraftLattice:
         """Rows and columns of the operator, padded to whole tiles."""
         return (
             -(-OUTPUTS * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
-            -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
+            -(-(2 * self.strips + self._chordwise_inputs) // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
+
+    @property
+    def _chordwise_inputs(self) -> int:
+        every = zip(self.aircraft.surfaces, self.lattices, strict=True)
+        return sum(part.spanwise for surface, part in every if surface.controls)
 
 
 @dataclass(frozen=True)
@@ -76,11 +104,13 @@ class LatticeOperator:
 
     matrix : (rows, columns) as ``operator_shape``. strips : (strips, 3): x of the trailing edge and of the
     centre of circulation of each strip from the link axis (the elastic axis), m; slope dx/dy of its trailing
-    edge in link axes.
+    edge in link axes. controls : (rows, m) columns of the parts of the controls, `ControlSlopes`, for unit
+    deflection; see `AircraftLattice.control_columns`.
     """
 
     matrix: Array
     strips: Array
+    controls: Array
 
 
 def aircraft_lattice(
@@ -99,6 +129,7 @@ def aircraft_lattice(
         ring_table(lattices + reflected),
         strip0,
         sum(lattice.spanwise for lattice in lattices),
+        control_slopes([surface.controls for surface in aircraft.surfaces], lattices, strip0),
     )
 
 
@@ -148,13 +179,20 @@ def lattice_operator(
 
 
 def _boundary(lattice: AircraftLattice) -> Array:
-    """Normal velocity at the control points (rings, inputs) from D0 and D1 of every strip."""
-    out = np.zeros((lattice.rings, 2 * lattice.strips))
+    """Normal velocity at the control points (rings, inputs) for unit inputs.
+
+    These are D0 and D1 of every strip, then u_x of every part of the controls.
+    """
+    slopes, motions = lattice.slopes, 2 * lattice.strips
+    out = np.zeros((lattice.rings, motions + slopes.parts))
     ring = 0
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
     ):
         x = part.control_points_W[..., 0] - surface.elastic_axis_x_m
+        for k in np.flatnonzero((slopes.strip >= strip0) & (slopes.strip < strip0 + part.spanwise)):
+            rings = ring + slopes.strip[k] - strip0 + part.spanwise * np.arange(part.chordwise)
+            out[rings, motions + k] = slopes.slope[k]
         for i in range(part.chordwise):
             for j in range(part.spanwise):
                 out[ring, 2 * (strip0 + j)] = 1.0
@@ -167,7 +205,8 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
     rows, columns = lattice.operator_shape
     matrix = np.zeros((rows, columns))
     strips = np.zeros((lattice.strips, 3))
-    uniform = circulation[:, ::2].sum(axis=1)  # every strip at the same incidence
+    motions, controls = 2 * lattice.strips, np.zeros((rows, lattice.slopes.parts))
+    uniform = circulation[:, :motions:2].sum(axis=1)  # every strip at the same incidence
     inputs = circulation.shape[1]
     ring = 0
     side0 = lattice.rings
@@ -194,13 +233,36 @@ def _reduced(lattice: AircraftLattice, circulation: Array, downwash: Array) -> L
         chordwise_share = reference / reference[-1]
 
         row = OUTPUTS * strip0 + OUTPUTS * np.arange(part.spanwise)
-        matrix[row, :inputs] = gamma[-1] * width[:, None]
-        matrix[row + 1, :inputs] = np.einsum("ijn,ij->jn", gamma, area)
-        matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, area * centre_x)
-        matrix[row + 3, :inputs] = np.einsum("ijn,ij->jn", front, bound)
+        found = np.zeros((part.spanwise, OUTPUTS, inputs))
+        found[:, 0] = gamma[-1] * width[:, None]
+        found[:, 1] = np.einsum("ijn,ij->jn", gamma, area)
+        found[:, 2] = np.einsum("ijn,ij->jn", gamma, area * centre_x)
+        found[:, 3] = np.einsum("ijn,ij->jn", front, bound)
         jump = part.span_sign * np.diff(side, axis=1)
-        matrix[row + 4, :inputs] = np.einsum("ijn,ij->jn", jump, chordwise_share * length) / width[:, None]
+        found[:, 4] = np.einsum("ijn,ij->jn", jump, chordwise_share * length) / width[:, None]
+        if lattice.slopes.parts:
+            found[:, 3, motions:] += _exchanged(
+                gamma[..., motions:], front[..., :motions:2], bound, reference
+            )
+        for output in range(OUTPUTS):
+            matrix[row + output, :motions] = found[:, output, :motions]
+            controls[row + output] = found[:, output, motions:]
         strips[strip0 : strip0 + part.spanwise, 0] = middle_x[-1]
         strips[strip0 : strip0 + part.spanwise, 1] = np.sum(bound * middle_x[:-1], axis=0)
         strips[strip0 : strip0 + part.spanwise, 2] = np.diff(edge_x[-1]) / (part.span_sign * width)
-    return LatticeOperator(matrix, strips)
+    return LatticeOperator(matrix, strips, controls)
+
+
+def _exchanged(gamma: Array, front: Array, bound: Array, reference: Array) -> Array:
+    """What the induced velocity (strips, m) of controls lacks for the right force along the chord.
+
+    A flap's circulation is distributed along the chord unlike that of uniform incidence (the weights
+    ``bound``), and meets other velocities of it than the mean: without this a deflection in two dimensions
+    would have a drag or thrust in proportion to the incidence. gamma : (rows, strips, m) of the controls;
+    front : (rows, strips, strips) induced velocities of unit incidence; reference : (rows, strips) its rings.
+    """
+    induced = front.sum(axis=2)
+    mean = np.sum(bound * induced, axis=0)
+    of_edges = np.diff(gamma, axis=0, prepend=0.0)
+    met = np.einsum("ijm,ij->jm", of_edges, induced) - gamma[-1] * mean[:, None]
+    return np.asarray(met / reference[-1][:, None])

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from morphcore.geometry.control import Control
 from morphcore.geometry.hinge import Hinge, hinge_arms
 from morphcore.geometry.section import SectionProperties, given_section, solid_box
 from morphcore.shown import Shown
@@ -45,6 +46,7 @@ class Surface(Shown):
     section: Section | None
     elastic_axis_offset_m: float
     mass_axis_offset_m: float
+    controls: tuple[Control, ...] = ()
 
     @classmethod
     def of(cls, document: documents.Surface) -> Surface:
@@ -66,7 +68,15 @@ class Surface(Shown):
             section=document.section,
             elastic_axis_offset_m=document.elastic_axis_offset_m,
             mass_axis_offset_m=document.mass_axis_offset_m,
+            controls=tuple(
+                Control.of(control, document.side, control.name) for control in document.all_controls
+            ),
         )
+
+    @property
+    def moved_parts(self) -> tuple[Hinge | Control, ...]:
+        """What drives move: its hinges, then its controls."""
+        return (*self.hinges, *self.controls)
 
     @property
     def span_sign(self) -> float:

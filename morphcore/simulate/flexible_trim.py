@@ -57,6 +57,7 @@ class _Balance:
         self.rest = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
         poses, V, A = self.rest.copy(), first, first.copy()
         flight.follow(poses, V, A, path, 0)
+        flight.lattice.deflect(path.deflection[0])
         for root, tip in zip(model.roots, model.tips, strict=True):
             poses.R[root : tip + 1] = poses.R[root]
             poses.x[root : tip + 1] = poses.x[root] + model.rest_W[root : tip + 1] @ poses.R[root].T

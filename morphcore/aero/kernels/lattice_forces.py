@@ -15,6 +15,16 @@ def place_lattice(parts, place, stream_B):
     normal_influence(parts, place)
 
 
+@entry_kernel
+def deflect(parts, place, deflection):
+    """Set the slopes of the panels for the deflections (c,) of all control surfaces, trailing edge down."""
+    for p in range(place.slope.size):
+        total = 0.0
+        for c in range(deflection.size):
+            total += deflection[c] * parts.control_slope[c, p]
+        place.slope[p] = total
+
+
 @kernel
 def rider_velocity(R, twist, arm, out):
     """Velocity (3,) in B of a point at ``arm`` on a section of axes R (3, 3) and ``twist`` (6,)."""
@@ -43,8 +53,10 @@ def add_rider_force(R, arm, fx, fy, fz, out):
 def blocked_flow(parts, place, twists, wind_B, out):
     """Normal velocity (r,) that the circulations have to induce at the control points, m/s.
 
-    ``twists`` (k, 6) of the sections in their axes; wind_B (3,).
+    ``twists`` (k, 6) of the sections in their axes; wind_B (3,). A panel with a slope also meets the velocity
+    along its section's chord (x, forward); its normal is on the lifting side, hence the sign.
     """
+    controlled = parts.control_slope.shape[0] > 0
     for p in range(out.size):
         k = parts.control[p]
         velocity = place.control_velocity[p]
@@ -52,6 +64,11 @@ def blocked_flow(parts, place, twists, wind_B, out):
         total = 0.0
         for i in range(3):
             total += place.normals[i, p] * (velocity[i] - wind_B[i])
+        if controlled:
+            along = 0.0
+            for i in range(3):
+                along += place.R_BS[k, i, 0] * (velocity[i] - wind_B[i])
+            total -= place.slope[p] * along
         out[p] = total
 
 

@@ -34,7 +34,7 @@ class LatticeParts(NamedTuple):
     whose circulation runs along the line, and the one against it; r for none. line_core : core radius, m, to
     the fourth, "smoothed" squared. ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on :
     sections and places of riders, as in `moving_lattice.Riders`. stretch : 1 / beta of Goethert's rule.
-    density : kg/m^3.
+    density : kg/m^3. control_slope : (c, r) slopes of the panels per unit deflection of each control surface.
     """
 
     line_start: IntArray
@@ -54,6 +54,7 @@ class LatticeParts(NamedTuple):
     smoothed: bool
     stretch: float
     density: float
+    control_slope: Array
 
 
 class LatticePlace(NamedTuple):
@@ -63,7 +64,7 @@ class LatticePlace(NamedTuple):
     points : (3, r + e) control points and the edges' middles, stretched. distances : (c, r + e). normals,
     tilted : (3, r). influence : (r + 1, r) normal velocity, ring by point. row : (r + e,). strength :
     (e + l,). induced : (3, e), of the circulations summed (r,). corner_velocity, control_velocity,
-    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3).
+    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). slope : (r,) of the panels, trailing edge down.
     """
 
     R_BS: Array
@@ -84,6 +85,7 @@ class LatticePlace(NamedTuple):
     control_velocity: Array
     drag_velocity: Array
     force: Array
+    slope: Array
 
 
 def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePlace:
@@ -108,6 +110,7 @@ def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePl
         control_velocity=np.zeros((rings, 3)),
         drag_velocity=np.zeros(3),
         force=np.zeros((corners, 3)),
+        slope=np.zeros(rings),
     )
 
 

@@ -34,7 +34,7 @@ JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, CONTROL0 = 0, 1, 2, 3, 4, 5, 6
 
 
 @kernel
@@ -88,6 +88,31 @@ def strip_inputs(lanes, surface, ranges, overlap, effective, inputs):
                 weight = part[0, l]
                 out[0, l] += weight * (motion[0, l] + part[1, l] * motion[1, l])
                 out[1, l] -= weight * motion[2, l]
+
+
+@kernel
+def control_inputs(lanes, surface, k, ranges, overlap, link, twist, inputs):
+    """Add what link ``k`` gives to the velocity along the chord of each strip, one row each from CONTROL0.
+
+    The operator's columns of these inputs hold the deflections, lagged beforehand.
+    """
+    if not_in_lanes(overlap, lanes) or not_in_lanes(link, lanes) or not_in_lanes(twist, lanes):
+        return
+    if not_in_lanes(inputs, lanes):
+        return
+    control0 = surface[CONTROL0]
+    if k == 0:
+        for j in range(control0, control0 + surface[STRIPS]):
+            row = inputs[j]
+            for l in range(len(lanes)):
+                row[l] = 0.0
+    number = surface[LINK0] + k
+    for j in range(ranges[number, 0], ranges[number, 1]):
+        pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
+        part = overlap[pair : pair + 2]
+        out = inputs[control0 + j]
+        for l in range(len(lanes)):
+            out[l] += part[0, l] * link[L_LIFT, l] * (twist[3, l] - part[1, l] * twist[2, l])
 
 
 @kernel
