@@ -26,6 +26,8 @@ LARGEST_ALPHA_RAD = np.radians(15.0)
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
+# A plain flap loses its linear lift to separation at about this deflection (Abbott & von Doenhoff 1959).
+LARGEST_DEFLECTION_RAD = np.radians(20.0)
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
@@ -137,6 +139,25 @@ def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
             )
         )
     return found
+
+
+def deflection_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
+    """Controls beyond the linear range of a flap at any of some angles (k, h + c) of hinges and controls."""
+    furthest = {
+        control.drive: float(np.abs(column).max(initial=0.0))
+        for control, column in zip(aircraft.controls, angles.T[len(aircraft.hinges) :], strict=True)
+    }
+    return [
+        ResultWarning(
+            "large_deflection",
+            f"the control {drive} is deflected by {deflection:.2f} rad",
+            "its air loads are linear in the deflection: a real flap separates at about "
+            f"{LARGEST_DEFLECTION_RAD:.2f} rad; trust the result only up to that deflection",
+            "/aircraft/surfaces",
+        )
+        for drive, deflection in furthest.items()
+        if deflection > LARGEST_DEFLECTION_RAD
+    ]
 
 
 def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:

@@ -37,7 +37,14 @@ from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
-from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
+from morphcore.validity import (
+    ResultWarning,
+    air_motion,
+    air_warnings,
+    deflection_warnings,
+    overlap_warnings,
+    steep_warning,
+)
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
@@ -262,6 +269,7 @@ def _warnings(
         *air_warnings(flight, [("the flight", "/flight", motion)]),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *overlap_warnings(aircraft, record.angles),
+        *deflection_warnings(aircraft, record.angles),
     )
 
 

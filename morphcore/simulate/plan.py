@@ -262,16 +262,9 @@ def common_path(
     chosen = None if drives is None else tuple(drives)
     path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
     angles = path_angles(model.aircraft, chosen, path)
-    deflected = np.stack(
-        [
-            path if _moves(part, chosen) else np.full_like(path, part.angle_rad)
-            for part in model.aircraft.controls
-        ]
-        or [np.zeros((path.size, 0))],
-        axis=-1,
-    ).reshape(path.size, -1)
     still = np.zeros_like(angles)
-    motion = _Motion(angles, still, still, deflections(model.aircraft, deflected))
+    deflected = deflections(model.aircraft, path_controls(model.aircraft, chosen, path))
+    motion = _Motion(angles, still, still, deflected)
     if may_halve:
         model, motion = _halved(model, motion)
     mach = model.flight.mach or 0.0
@@ -294,6 +287,14 @@ def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Arr
     angles = np.empty((angle_rad.size, len(aircraft.hinges)))
     for column, hinge in enumerate(aircraft.hinges):
         angles[:, column] = angle_rad if _moves(hinge, drives) else hinge.angle_rad
+    return angles
+
+
+def path_controls(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
+    """Angles (k, c) of all controls' drives, like `path_angles`; None moves hinges alone."""
+    angles = np.empty((angle_rad.size, len(aircraft.controls)))
+    for column, control in enumerate(aircraft.controls):
+        angles[:, column] = angle_rad if _moves(control, drives) else control.angle_rad
     return angles
 
 
