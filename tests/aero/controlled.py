@@ -96,7 +96,7 @@ def chain_loads(document: Document, alpha: float, angles: dict[str, float], latt
     loads = lane_loads(model, physical_guess(model), plan, state[0])
     total = np.zeros(6)
     for each, wrench in zip(aircraft.surfaces, loads.wrench, strict=True):
-        origin = np.array(each.position_m) + [each.elastic_axis_x_m, 0.0, 0.0]
+        origin = np.add(each.position_m, (each.elastic_axis_x_m, 0.0, 0.0))
         total[:3] += wrench[:3] + np.cross(origin, wrench[3:])
         total[3:] += wrench[3:]
     return total

@@ -36,7 +36,7 @@ def derivative(kind: str, document: dict, drive: str, lattice: Lattice, alpha: f
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 8])
 @pytest.mark.parametrize("chord_fraction", [0.05, 0.2, 0.25, 0.37, 0.9])
 def test_the_strip_has_glauerts_lift_and_moment(rows, chord_fraction):
-    """The lattice of 1/4 and 3/4 points in two dimensions, solved here vortex by vortex, gives Glauert's flap."""
+    """The lattice in two dimensions, solved vortex by vortex, has the loads of Glauert's flap."""
     vortex, point = (np.arange(rows) + 0.25) / rows, (np.arange(rows) + 0.75) / rows
     induced = 1.0 / (2.0 * np.pi * np.subtract.outer(point, vortex))
     gamma = np.linalg.solve(induced, flap_weights(rows, chord_fraction))
@@ -57,7 +57,7 @@ def test_flap_effectiveness_is_glauerts():
 
 
 def test_weights_are_continuous():
-    """Weights change by no more than in proportion to the chord fraction's square root, and the loads to the ends."""
+    """Neither the weights, over the chord fraction, nor the loads, over the ends, jump."""
     fractions = np.linspace(0.05, 0.9, 2001)
     weights = np.stack([flap_weights(4, float(fraction)) for fraction in fractions])
     assert np.abs(np.diff(weights, axis=0)).max() < 5e-3
@@ -75,7 +75,7 @@ def test_weights_are_continuous():
 @pytest.mark.parametrize("kind", ["chain", "beam"])
 @pytest.mark.parametrize("rows", [1, 2, 4])
 def test_high_aspect_ratio_flap_against_glauert(kind, rows):
-    """Of a full-span flap at aspect ratio 800: CL per rad over that of incidence is Glauert's tau, within 0.5 %.
+    """At aspect ratio 800, CL per rad over that of incidence is Glauert's tau, within 0.5 per cent.
 
     The ratio does not depend on the aspect ratio in lifting-line theory. Of the moment about the quarter
     chord, which incidence does not have, the value itself within 2 per cent.

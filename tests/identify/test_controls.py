@@ -42,7 +42,7 @@ def measured(name: str, model: object = "flexible", **schedules: object) -> Traj
 
 
 def test_a_flight_with_an_elevator_is_identified() -> None:
-    """Two links repeat pulls, pushes and a morph of the flexible aircraft: less than 1 % of the rigid model's J.
+    """Two links repeat the flexible aircraft's flights: J below 1 per cent of the rigid model's.
 
     A third flight, held out, has ailerons too.
     """

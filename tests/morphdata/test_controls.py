@@ -108,7 +108,7 @@ def request(**schedules: Document) -> Document:
 
 
 def test_schedules_of_controls() -> None:
-    """A schedule by the word moves both sides; what the aircraft lacks, and angles beyond the limits, are refused."""
+    """A word moves both sides; what the aircraft lacks, and angles beyond the limits, are refused."""
     parsed = SimulateRequest.parse(request(elevator={"kind": "hold", "angle_rad": 0.1}))
     assert set(parsed.schedules.by_drive(parsed.aircraft.drives)) == {"elevator_left", "elevator_right"}
     with pytest.raises(InvalidInput) as caught:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from morphcore import simulate
+from morphcore import load_aircraft, load_flight, simulate
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import chain_model, physical_guess
@@ -16,15 +18,18 @@ from morphcore.simulate.schedule import ConstantRate, Hold, Quadratic, Spline
 from morphcore.simulate.time_grid import time_grid
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.lattice import Lattice, VortexCore
+from morphdata.schedules import load_schedules
 from tests.aero.controlled import WING, flight_document, tailed
 
 LATTICE = Lattice(chordwise=2, spanwise=6)
+EXAMPLE = Path(__file__).parents[2] / "examples" / "controls"
 PULL = ConstantRate(0.0, -0.04, 0.1, 0.05, 0.02)
 ROLL = ConstantRate(0.0, 0.03, 0.15, 0.1, 0.02)
 SWEEP = Quadratic(0.0, 0.2, 0.3)
 
 
 def document(*, flexible=True, hinged=True):
+    """The tailed aircraft."""
     return AircraftDocument.parse(tailed(flexible=flexible, hinged=hinged))
 
 
@@ -57,7 +62,7 @@ def test_mirror_images(model, law):
 
 @pytest.mark.parametrize("model", ["rigid", 3, "flexible"])
 def test_symmetric_controls_fly_straight(model):
-    """An elevator moves the attitude in pitch alone, and the trajectory has the columns of both its drives."""
+    """An elevator moves the attitude in pitch alone; the trajectory has the columns of both its drives."""
     result = flown({"elevator": PULL}, model=model)
     trajectory = result.trajectory
     assert np.abs(trajectory.euler[:, ::2]).max() < 1e-9
@@ -79,7 +84,7 @@ def test_half_the_aircraft_stands_for_a_symmetric_deflection(model):
 
 
 def test_what_may_halve():
-    """Symmetric deflections and resting ailerons may; ailerons may not, even with equal drives, unless alike."""
+    """Symmetric deflections and resting ailerons may; ailerons may not, unless both go down."""
     aircraft = Aircraft.of(document())
     model = chain_model(aircraft, Flight.of(flight_document()), 2, LATTICE)
     grid = time_grid(0.01 * np.arange(31))
@@ -210,3 +215,30 @@ def test_mistakes():
     beyond = Spline(np.array([0.0, 0.2]), np.array([0.0, 0.7]))
     with pytest.raises(InvalidInput, match=r"control elevator_right .* -0\.5\.\.0\.5 rad"):
         flown({"elevator": beyond})
+
+
+@pytest.mark.parametrize("model", ["rigid", 2])
+def test_the_step_stays_of_second_order(model):
+    """Halving the step of a flight with a moving elevator and ailerons divides its error by about four."""
+    pull = ConstantRate(0.0, -0.04, 0.3, 0.05, 0.15)  # without corners in the deflection's rate
+    schedules = {"elevator": pull, "aileron": ConstantRate(0.0, 0.02, 0.3, 0.05, 0.15)}
+    found = [
+        flown(schedules, model=model, step_s=step_s).trajectory.euler
+        for step_s in (0.01, 0.005, 0.0025, 0.000625)
+    ]
+    errors = [np.abs(euler - found[-1]).max() for euler in found[:-1]]
+    assert errors[0] < 1e-3
+    assert errors[0] / errors[1] > 3.0
+    assert errors[1] / errors[2] > 3.0
+
+
+def test_the_example_flies():
+    """The documents in examples/controls fly along their schedule, and stay in range."""
+    aircraft, flight = load_aircraft(EXAMPLE / "aircraft.json"), load_flight(EXAMPLE / "flight.json")
+    result = simulate(
+        aircraft, flight, load_schedules(EXAMPLE / "schedule.csv"), duration_s=1.0, lattice=LATTICE
+    )
+    assert min(np.ptp(angle) for angle in result.trajectory.euler.T) > 1e-3
+    assert not result.warnings
+    far = simulate(aircraft, flight, {"elevator": Hold(0.4)}, duration_s=0.05, lattice=LATTICE)
+    assert "large_deflection" in [warning.code for warning in far.warnings]
