@@ -19,6 +19,7 @@ from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.overlap import overlapping_surfaces
 from morphdata.atmosphere import standard_atmosphere
+from morphdata.drives import without_side
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,11 @@ LARGEST_APPARENT_SHARE = 0.1  # of a wing's mass: it then lowers the frequency o
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
+UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the incidence
 LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
+# A plain flap loses its linear lift to separation at about this deflection (Abbott & von Doenhoff 1959).
+LARGEST_DEFLECTION_RAD = np.radians(20.0)
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
@@ -165,6 +169,25 @@ def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
     return found
 
 
+def deflection_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
+    """Controls beyond the linear range of a flap at any of some angles (k, h + c) of hinges and controls."""
+    furthest = {
+        control.drive: float(np.abs(column).max(initial=0.0))
+        for control, column in zip(aircraft.controls, angles.T[len(aircraft.hinges) :], strict=True)
+    }
+    return [
+        ResultWarning(
+            "large_deflection",
+            f"the control {drive} is deflected by {deflection:.2f} rad",
+            "its air loads are linear in the deflection: a real flap separates at about "
+            f"{LARGEST_DEFLECTION_RAD:.2f} rad; trust the result only up to that deflection",
+            "/aircraft/surfaces",
+        )
+        for drive, deflection in furthest.items()
+        if deflection > LARGEST_DEFLECTION_RAD
+    ]
+
+
 def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
     """A pitch angle near or beyond the vertical, where Euler angles become degenerate."""
     steepest = float(np.abs(theta).max())
@@ -187,11 +210,17 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
 def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[ResultWarning]:
     """A pitching moment (3,), N m, that only a constant moment balances although a drive could.
 
-    Only drives of incidence count: those whose hinges turn about y of B.
+    Only drives of incidence count, those whose hinges turn about y of B, and controls that deflect alike on
+    both sides of surfaces that lift.
     """
     if flight.trim_drive is not None:
         return []
     able = {hinge.drive: None for hinge in aircraft.hinges if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
+    opposed = {without_side(control.drive) for control in aircraft.controls if control.sign < 0.0}
+    for surface in aircraft.surfaces:
+        if abs(surface.dihedral_rad) < UPRIGHT_RAD:
+            words = (without_side(control.drive) for control in surface.controls)
+            able |= {word: None for word in words if word not in opposed}
     area = sum(surface.area_m2 for surface in aircraft.surfaces)
     chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
     coefficient = moment_B[1] / (flight.dynamic_pressure_pa * area * chord)

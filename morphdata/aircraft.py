@@ -9,6 +9,14 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field
 
 from morphdata.base import Document, Length, Position, Text
+from morphdata.controls import (
+    Control,
+    Controls,
+    control_drives,
+    control_faults,
+    control_names,
+    overlap_faults,
+)
 from morphdata.drives import MAX_HINGES, Drive, Hinge, Side, drive_faults, drive_name, drives_of
 from morphdata.faults import Fault
 from morphdata.inertia import Inertia, inertia_faults
@@ -161,8 +169,8 @@ class Surface(Document):
     tip_chord_m: Chord | None = None
     sweep_rad: Annotated[float, Field(ge=-MAX_SWEEP_RAD, le=MAX_SWEEP_RAD)] = Field(
         default=0.0,
-        description="Sweep of the mid-chord line, aft, in the plane of the surface; chords stay parallel to the "
-        "root's. `span_m` is measured across the root chord: the mid-chord line is span / cos(sweep) long.",
+        description="Sweep of the mid-chord line, aft, in the plane of the surface; chords stay parallel to "
+        "the root's. `span_m` is measured across the root chord: that line is span / cos(sweep) long.",
     )
     dihedral_rad: Annotated[float, Field(ge=-MAX_DIHEDRAL_RAD, le=MAX_DIHEDRAL_RAD)] = Field(
         default=0.0, description="Tip up; pi / 2 makes a vertical fin."
@@ -210,6 +218,9 @@ class Surface(Document):
             "the surface's own. Places across the chord are linear in m.",
         )
     )
+    controls: Controls | None = Field(
+        default=None, description="Trailing-edge control surfaces, side by side along the span."
+    )
 
     @property
     def root_and_tip_chord_m(self) -> tuple[float, float]:
@@ -234,6 +245,11 @@ class Surface(Document):
     def all_hinges(self) -> tuple[Hinge, ...]:
         """Hinges from the fuselage outward; empty for a fixed surface."""
         return tuple(self.hinges or ()) if self.hinge is None else (self.hinge,)
+
+    @property
+    def all_controls(self) -> tuple[Control, ...]:
+        """Its control surfaces, in the document's order."""
+        return tuple(self.controls or ())
 
     def hinge_pointer(self, number: int) -> str:
         """Return the JSON pointer of a hinge."""
@@ -275,6 +291,7 @@ class Surface(Document):
                 "/hinge",
                 "Add a hinge, or position_m for a fixed surface.",
             )
+        yield from overlap_faults(self.all_controls)
 
 
 class Aircraft(Document):
@@ -296,16 +313,22 @@ class Aircraft(Document):
 
     @property
     def drives(self) -> dict[str, Drive]:
-        """The drives, by name."""
-        return drives_of(
+        """The drives, by name: those of hinges, then those of controls."""
+        hinges = drives_of(
             (drive_name(hinge, surface.side), surface, (number, place), hinge)
             for number, surface in enumerate(self.surfaces)
             for place, hinge in enumerate(surface.all_hinges)
         )
+        controls = control_drives(
+            (name, self.surfaces[at[0]], at, self.surfaces[at[0]].all_controls[at[1]])
+            for at, name in control_names(self.surfaces).items()
+        )
+        return hinges | controls
 
     def faults(self) -> Iterator[Fault]:
         """Check that surface names are unique and that each drive turns equal hinges."""
         yield from drive_faults(self.surfaces)
+        yield from control_faults(self.surfaces)
         names: set[str] = set()
         for number, surface in enumerate(self.surfaces):
             if surface.name in names:

@@ -138,7 +138,10 @@ def _meant(key: str, drives: Mapping[str, Drive]) -> tuple[list[str], Fault | No
     side = key.removeprefix(f"{WORDS['z']}_")
     if key != BOTH and side not in SIDES:
         return [], _unknown(key, drives)
-    candidates = [drive for drive in drives.values() if key == BOTH or drive.side == side]
+    # `left` and `sweep_left` in their old meaning are hinges: a control has its own name
+    candidates = [drive for drive in drives.values() if drive.hinges and (key == BOTH or drive.side == side)]
+    if not candidates and any(drive.controls for drive in drives.values()):
+        return [], _unknown(key, drives)
     if len({drive.word for drive in candidates}) > 1:
         return [], Fault(
             "ambiguous_drive",
@@ -157,7 +160,9 @@ def _unknown(key: str, drives: Mapping[str, Drive]) -> Fault:
         "unknown_drive",
         f"The aircraft has no drive {key[:SHOWN_KEY]!r}.",
         f"/{escaped(key)}"[:MAX_POINTER],
-        f"{guess}Its drives are {shown_names(drives)}." if drives else "None of its surfaces has a hinge.",
+        f"{guess}Its drives are {shown_names(drives)}."
+        if drives
+        else "None of its surfaces has a hinge or a control.",
     )
 
 

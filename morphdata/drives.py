@@ -142,7 +142,7 @@ class Hinged(OfSide, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A prescribed input: the hinges turned by one history.
+    """A prescribed input: the hinges, or the control surfaces, turned by one history.
 
     Attributes
     ----------
@@ -154,11 +154,13 @@ class Drive:
     surfaces : tuple of str
         Names of the surfaces it moves, in the aircraft's order.
     hinges : tuple of (int, int)
-        Number of the surface and of the hinge on it, each from 0.
+        Number of the surface and of the hinge on it, each from 0; none of a control.
     low, high : float
         Range that all its hinges allow, rad.
     held : float
         Angle of its hinges if no history is given, rad.
+    controls : tuple of (int, int)
+        Number of the surface and of the control on it, each from 0; none of a hinge.
     """
 
     name: str
@@ -169,6 +171,7 @@ class Drive:
     low: float
     high: float
     held: float
+    controls: tuple[tuple[int, int], ...] = ()
 
     def fault(self, angle_rad: float, pointer: str, furthest_rad: float = 0.0) -> Fault | None:
         """Return the fault of an angle of the drive; None if it is in range.
@@ -177,7 +180,8 @@ class Drive:
         """
         if self.low - ANGLE_TOLERANCE_RAD <= angle_rad <= self.high + ANGLE_TOLERANCE_RAD:
             return None
-        of = "Its hinge on" if len(self.surfaces) == 1 else "Its hinges on"
+        part = "control" if self.controls else "hinge"
+        of = f"Its {part} on" if len(self.surfaces) == 1 else f"Its {part}s on"
         hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
         hint += f"from {self.low:g} to {self.high:g} rad."
         if max(abs(angle_rad), abs(furthest_rad)) > math.pi:
@@ -187,7 +191,7 @@ class Drive:
             "sweep_out_of_range" if self.word == WORDS["z"] else "angle_out_of_range",
             f"{self.name} is {angle_rad:g} rad.",
             pointer,
-            f"{hint} Correct the angle, or the hinge's min_rad and max_rad.",
+            f"{hint} Correct the angle, or the {part}'s min_rad and max_rad.",
         )
 
 

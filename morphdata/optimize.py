@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Angle, Document, Result
+from morphdata.controls import unmotorised
 from morphdata.drive_keys import resolved, shown_names
 from morphdata.drives import Drive
 from morphdata.execution import Request
@@ -327,6 +328,13 @@ class OptimizeRequest(Request):
         for name in ("initial_rad", "final_rad"):
             angle, at = getattr(self.morph, name), f"/morph/{name}"
             yield from islice(filter(None, (drives[each].fault(angle, at) for each in moved)), 1)
+        if self.limits.max_hinge_torque_nm is not None and (controls := unmotorised(drives, moved)):
+            yield Fault(
+                "no_hinge_torque",
+                f"The hinge moment of the control {controls[0]!r} is not computed.",
+                "/limits/max_hinge_torque_nm",
+                "Leave it out: only hinges have a limit of their torque.",
+            )
 
     def _time_faults(self) -> Iterator[Fault]:
         morph, limits = self.morph, self.limits

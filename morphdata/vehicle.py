@@ -64,8 +64,13 @@ def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -
 
 
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:
-    """Check that there is a wing that is both hinged and flexible."""
-    if not any(surface.flexible and surface.all_hinges for surface in aircraft.surfaces):
+    """Check that there is a wing that is both hinged and flexible, or flexible where a control moves."""
+    flexible = [surface for surface in aircraft.surfaces if surface.flexible]
+    if any(surface.controls for surface in aircraft.surfaces):
+        if not flexible:
+            hint = "Do not set the wing's flexible to false."
+            yield Fault(code, "No surface is flexible.", "/aircraft/surfaces", hint)
+    elif not any(surface.all_hinges for surface in flexible):
         yield Fault(
             code,
             "No surface is both hinged and flexible.",

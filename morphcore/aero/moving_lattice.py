@@ -13,7 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, section_forces
+from morphcore.aero.kernels.lattice_forces import (
+    blocked_flow,
+    deflect,
+    place_lattice,
+    section_forces,
+)
 from morphcore.aero.kernels.lattice_place import LatticeParts, lattice_place
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.aero.vlm import RingTable, prandtl_glauert
@@ -31,8 +36,9 @@ class Riders:
     strip's drag. corner_arm, control_arm, drag_arm : (.., 3) their positions in section axes, m. drag_area :
     (t,) profile drag coefficient times area, m^2. moment_area : (t,) cm0 times the integral of the chord
     squared, m^3. control_chord, drag_chord : (r, 2), (t, 2) x and y of the unit vector of the chord, forward,
-    in section axes, at control points and strips. slope : (r,) of the mean line, nose up (twist less zero-lift angle). lag_time : (2, r) both
-    time constants of Jones' function, s.
+    in section axes, at control points and strips. slope : (r,) of the mean line, nose up (twist less
+    zero-lift angle). lag_time : (2, r) both time constants of Jones' function, s. control_slope : (c, r)
+    slopes of the panels per unit deflection of each control; None: no control.
     """
 
     sections: int
@@ -48,6 +54,7 @@ class Riders:
     drag_chord: Array
     slope: Array
     lag_time: Array
+    control_slope: Array | None = None
 
 
 class MovingLattice:
@@ -76,6 +83,10 @@ class MovingLattice:
         self.at.R_BS[:], self.at.x_B[:] = R_BS, x_B
         place_lattice(self.parts, self.at, stream_B)
         self._factors = None
+
+    def deflect(self, deflection: Array) -> None:
+        """Set the deflections (c,) of all control surfaces, trailing edge down, rad."""
+        deflect(self.parts, self.at, deflection)
 
     def circulation(self, twists: Array, wind_B: Array) -> Array:
         """Circulations (r,), m^2/s, without lag, for twists (k, 6) of the sections in their own axes."""
@@ -121,9 +132,11 @@ def lattice_parts(
         moment_area=riders.moment_area / prandtl_glauert(mach),
         control_chord=riders.control_chord,
         drag_chord=riders.drag_chord,
+        slope=riders.slope,
         smoothed=core.law == "smoothed",
         stretch=1.0 / prandtl_glauert(mach),
         density=float(density),
+        control_slope=np.zeros((0, table.rings)) if riders.control_slope is None else riders.control_slope,
     )
 
 

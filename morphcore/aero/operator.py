@@ -44,6 +44,7 @@ from morphcore.aero.kernels.loads import (
 )
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.control_slopes import ControlSlopes, control_slopes
 from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
 from morphcore.geometry.mirror import mirror_groups
 from morphcore.geometry.surface import Surface
@@ -62,6 +63,7 @@ class AircraftLattice:
 
     images : mirror images of the surfaces if these are one half of a symmetric aircraft. They induce
     velocities but have no outputs of their own. table : rings of the surfaces, then of the images.
+    slopes : of the control surfaces.
     """
 
     aircraft: Aircraft
@@ -71,6 +73,27 @@ class AircraftLattice:
     table: RingTable
     strip0: tuple[int, ...]
     strips: int
+    slopes: ControlSlopes
+
+    @property
+    def control0(self) -> tuple[int, ...]:
+        """By surface, the input of its first strip's velocity along the chord; -1 without controls."""
+        first, out = 2 * self.strips, []
+        for surface, part in zip(self.aircraft.surfaces, self.lattices, strict=True):
+            out.append(first if surface.controls else -1)
+            first += part.spanwise if surface.controls else 0
+        return tuple(out)
+
+    @property
+    def control_columns(self) -> NDArray[np.int64]:
+        """(m,) input that the loads of each part of the controls multiply: u_x of its strip."""
+        shift = np.concatenate(
+            [
+                np.full(part.spanwise, first - strip0)
+                for first, strip0, part in zip(self.control0, self.strip0, self.lattices, strict=True)
+            ]
+        )
+        return np.asarray(self.slopes.strip + shift[self.slopes.strip], dtype=np.int64)
 
     @property
     def rings(self) -> int:
@@ -104,8 +127,13 @@ class AircraftLattice:
         """Rows and columns of the operator, padded to whole tiles."""
         return (
             -(-(OUTPUTS + MORE_OUTPUTS * self.has_more_outputs) * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
-            -(-2 * self.strips // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
+            -(-(2 * self.strips + self._chordwise_inputs) // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
+
+    @property
+    def _chordwise_inputs(self) -> int:
+        every = zip(self.aircraft.surfaces, self.lattices, strict=True)
+        return sum(part.spanwise for surface, part in every if surface.controls)
 
 
 @dataclass(frozen=True)
@@ -113,11 +141,13 @@ class LatticeOperator:
     """One reduced operator.
 
     matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS), columns as listed in
-    aero/kernels/loads.py.
+    aero/kernels/loads.py. controls : (rows, m) columns of the parts of the controls, `ControlSlopes`, for
+    unit deflection; see `AircraftLattice.control_columns`.
     """
 
     matrix: Array
     strips: Array
+    controls: Array
 
 
 def aircraft_lattice(
@@ -136,6 +166,7 @@ def aircraft_lattice(
         ring_table(lattices + reflected),
         strip0,
         sum(lattice.spanwise for lattice in lattices),
+        control_slopes([surface.controls for surface in aircraft.surfaces], lattices, strip0),
     )
 
 
@@ -177,7 +208,7 @@ def lattice_operator(
         return np.asarray(induced[:, :rings] + induced[:, rings:] if lattice.images else induced)
 
     induced = along(normal)
-    circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
+    circulation = np.asarray(np.linalg.solve(induced[:rings], _boundary(lattice)), dtype=np.float64)
     flow = [induced[rings:] @ circulation]
     if lattice.has_more_outputs:
         flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
@@ -210,18 +241,26 @@ def _references(
         met = normals @ normal
         if paired:
             met = np.where(lattice.paired, np.maximum(met, (normals * ACROSS) @ normal), met)
-        references.append((circulation[:, ::2] * np.repeat(met, counts)).sum(axis=1))
+        uniform = circulation[:, : 2 * lattice.strips : 2]  # every strip at the same incidence
+        references.append((uniform * np.repeat(met, counts)).sum(axis=1))
     return references
 
 
 def _boundary(lattice: AircraftLattice) -> Array:
-    """Normal velocity at the control points (rings, inputs) from D0 and D1 of every strip."""
-    out = np.zeros((lattice.rings, 2 * lattice.strips))
+    """Normal velocity at the control points (rings, inputs) for unit inputs.
+
+    These are D0 and D1 of every strip, then u_x of every part of the controls.
+    """
+    slopes, motions = lattice.slopes, 2 * lattice.strips
+    out = np.zeros((lattice.rings, motions + slopes.parts))
     ring = 0
     for surface, part, strip0 in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, strict=True
     ):
         x = part.control_points_W[..., 0] / part.cos_sweep - surface.elastic_axis_x_m
+        for k in np.flatnonzero((slopes.strip >= strip0) & (slopes.strip < strip0 + part.spanwise)):
+            rings = ring + slopes.strip[k] - strip0 + part.spanwise * np.arange(part.chordwise)
+            out[rings, motions + k] = slopes.slope[k]
         for i in range(part.chordwise):
             for j in range(part.spanwise):
                 out[ring, 2 * (strip0 + j)] = 1.0
@@ -238,9 +277,10 @@ def _reduced(
     flow : normal velocity (points, inputs); if it has further outputs, also those along x and y of W.
     references : (rings,) for each surface.
     """
-    matrix = np.zeros(lattice.operator_shape)
+    motions = 2 * lattice.strips
     strips = np.zeros((lattice.strips, STRIP_COLUMNS))
     inputs = circulation.shape[1]
+    loads = np.zeros((lattice.operator_shape[0], inputs))
     ring, side0 = 0, lattice.rings
     for surface, part, strip0, uniform in zip(
         lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, references, strict=True
@@ -258,19 +298,25 @@ def _reduced(
         edges = _edges(surface, part, reference / reference[-1])
 
         row = OUTPUTS * strip0 + OUTPUTS * np.arange(part.spanwise)
-        matrix[row, :inputs] = gamma[-1] * edges.width[:, None]
-        matrix[row + 1, :inputs] = np.einsum("ijn,ij->jn", gamma, edges.area)
-        matrix[row + 2, :inputs] = np.einsum("ijn,ij->jn", gamma, edges.area * edges.centre_x)
-        matrix[row + 3, :inputs] = edges.summed(on_edges[0], edges.front[..., 1], edges.side[..., 1])
-        matrix[row + 4, :inputs] = -edges.summed(on_edges[0], edges.front[..., 0], edges.side[..., 0])
+        loads[row] = gamma[-1] * edges.width[:, None]
+        loads[row + 1] = np.einsum("ijn,ij->jn", gamma, edges.area)
+        loads[row + 2] = np.einsum("ijn,ij->jn", gamma, edges.area * edges.centre_x)
+        loads[row + 3] = edges.summed(on_edges[0], edges.front[..., 1], edges.side[..., 1])
+        loads[row + 4] = -edges.summed(on_edges[0], edges.front[..., 0], edges.side[..., 0])
+        if lattice.slopes.parts:
+            loads[row + 3, motions:] += _exchanged(
+                gamma[..., motions:], on_edges[0][0][..., :motions:2], edges, reference
+            )
         if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
-            matrix[more, :inputs] = edges.summed(
-                on_edges[1], edges.front[..., 1], edges.side[..., 1]
-            ) - edges.summed(on_edges[2], edges.front[..., 0], edges.side[..., 0])
-            matrix[more + 1, :inputs] = edges.moment(on_edges[0])
+            loads[more] = edges.summed(on_edges[1], edges.front[..., 1], edges.side[..., 1]) - edges.summed(
+                on_edges[2], edges.front[..., 0], edges.side[..., 0]
+            )
+            loads[more + 1] = edges.moment(on_edges[0])
         strips[strip0 : strip0 + part.spanwise] = edges.columns(surface.chord_W)
-    return LatticeOperator(matrix, strips)
+    matrix = np.zeros(lattice.operator_shape)
+    matrix[:, :motions] = loads[:, :motions]
+    return LatticeOperator(matrix, strips, loads[:, motions:].copy())
 
 
 @dataclass(frozen=True)
@@ -280,8 +326,8 @@ class _Edges:
     corners : (chordwise + 1, spanwise, 2, 3) of the rings, at the root and tip side of each strip. front :
     (chordwise, spanwise, 3) and side : (chordwise, spanwise, 2, 3) edges, in the sense of the lifting
     circulation but for the root side. area, centre_x : (chordwise, spanwise) of the rings. share : the same,
-    of each ring's circulation in that of the strip's last ring, and bound : on each front. width : (spanwise,)
-    along the axis. sign : of the span.
+    of each ring's circulation in that of the strip's last ring, and bound : on each front. width :
+    (spanwise,) along the axis. sign : of the span.
     """
 
     corners: Array
@@ -344,3 +390,18 @@ def _edges(surface: Surface, part: SurfaceLattice, share: Array) -> _Edges:
         width=width,
         sign=part.span_sign,
     )
+
+
+def _exchanged(gamma: Array, front: Array, edges: _Edges, reference: Array) -> Array:
+    """What the induced velocity (strips, m) of controls lacks for the right force along the chord.
+
+    A flap's circulation is distributed along the chord unlike that of uniform incidence (the weights
+    ``bound``), and meets other velocities of it than the mean: without this a deflection in two dimensions
+    would have a drag or thrust in proportion to the incidence. gamma : (rows, strips, m) of the controls;
+    front : (rows, strips, strips) induced velocities of unit incidence; reference : (rows, strips) its rings.
+    """
+    induced = front.sum(axis=2) * edges.front[..., 1] / edges.width
+    mean = np.sum(edges.bound * induced, axis=0)
+    of_edges = np.diff(gamma, axis=0, prepend=0.0)
+    met = np.einsum("ijm,ij->jm", of_edges, induced) - gamma[-1] * mean[:, None]
+    return np.asarray(met / reference[-1][:, None])

@@ -26,6 +26,10 @@ from 0 here (in MATLAB files from 1).
 ``hinges``
     ``surface_index`` (h,); ``drive`` (h,) name of what moves it; ``position_m`` (h, 3) and ``axis`` (h, 3)
     unit vector of a positive angle's right-handed rotation, in B; ``min_rad``, ``max_rad`` (h,).
+``controls``
+    Only of an aircraft with control surfaces: ``surface_index`` (c,); ``drive`` (c,); ``from``, ``to`` (c,)
+    shares of the span; ``chord_fraction`` (c,); ``sign`` (c,), 1 if a positive angle moves the trailing edge
+    down; ``min_rad``, ``max_rad``; ``angle_rad`` (c,) held in the reference trim.
 ``fuselage``
     ``mass_kg`` (), ``centre_of_mass_m`` (3,), ``inertia_kg_m2`` (3, 3) about it, in B.
 ``trim``
@@ -92,6 +96,7 @@ def model_tables(file: ModelFile, chain: ChainModel, batch: ParameterBatch, foun
         "links": _links(chain, batch),
         "joints": _joints(chain, batch),
         "hinges": _hinges(chain.aircraft),
+        **({"controls": _controls(chain.aircraft)} if chain.aircraft.controls else {}),
         "fuselage": {
             "mass_kg": np.array(chain.aircraft.fuselage.mass_kg),
             "centre_of_mass_m": np.array(chain.aircraft.fuselage.centre_of_mass_B),
@@ -200,6 +205,21 @@ def _hinges(aircraft: Aircraft) -> Table:
         "axis": np.array([hinge.axis_B for hinge in hinges]).reshape(-1, 3),
         "min_rad": np.array([hinge.min_rad for hinge in hinges]),
         "max_rad": np.array([hinge.max_rad for hinge in hinges]),
+    }
+
+
+def _controls(aircraft: Aircraft) -> Table:
+    controls = aircraft.controls
+    counts = [len(surface.controls) for surface in aircraft.surfaces]
+    columns = {
+        "from": "start",
+        "to": "stop",
+        **{name: name for name in ("chord_fraction", "sign", "min_rad", "max_rad", "angle_rad")},
+    }
+    return {
+        "surface_index": np.repeat(np.arange(len(counts)), counts),
+        "drive": np.array([control.drive for control in controls], dtype=np.str_),
+        **{name: np.array([getattr(control, own) for control in controls]) for name, own in columns.items()},
     }
 
 

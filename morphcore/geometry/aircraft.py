@@ -10,12 +10,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.control import Control
 from morphcore.geometry.hinge import Hinge
 from morphcore.geometry.point_mass import masses_on, rigid_body
 from morphcore.geometry.propulsion import Propulsion
 from morphcore.geometry.surface import Surface
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
+from morphdata.controls import control_drives, control_names
 from morphdata.drives import Drive, drives_of
 from morphdata.flight import Flight as FlightDocument
 from morphdata.inertia import inertia_matrix
@@ -79,8 +81,8 @@ class Aircraft(Shown):
         """Return the aircraft that a document describes."""
         masses = document.point_masses or []
         surfaces = tuple(
-            replace(Surface.of(surface), point_masses=masses_on(surface.name, masses))
-            for surface in document.surfaces
+            replace(_named(Surface.of(surface), n, document), point_masses=masses_on(surface.name, masses))
+            for n, surface in enumerate(document.surfaces)
         )
         propulsion = None if document.propulsion is None else Propulsion.of(document.propulsion)
         return cls(document.name, Fuselage.of(document.fuselage).carrying(masses), surfaces, propulsion)
@@ -98,12 +100,27 @@ class Aircraft(Shown):
 
     @cached_property
     def drives(self) -> dict[str, Drive]:
-        """Names of the drives, in the order of the hinges."""
-        return drives_of(
+        """Names of the drives, in the order of the hinges, then of the controls."""
+        hinges = drives_of(
             (hinge.drive, surface, (number, place), hinge)
             for number, surface in enumerate(self.surfaces)
             for place, hinge in enumerate(surface.hinges)
         )
+        return hinges | control_drives(
+            (control.drive, surface, (number, place), control)
+            for number, surface in enumerate(self.surfaces)
+            for place, control in enumerate(surface.controls)
+        )
+
+    @cached_property
+    def controls(self) -> tuple[Control, ...]:
+        """The controls of all surfaces, surface by surface."""
+        return tuple(control for surface in self.surfaces for control in surface.controls)
+
+    @property
+    def moved_parts(self) -> tuple[Hinge | Control, ...]:
+        """What drives move, in the order of schedules: all hinges, then all controls."""
+        return (*self.hinges, *self.controls)
 
 
 @dataclass(frozen=True)
@@ -154,6 +171,15 @@ class Flight(Shown):
     def dynamic_pressure_pa(self) -> float:
         """q_dyn = rho V^2 / 2."""
         return 0.5 * self.air_density_kg_m3 * self.airspeed_m_s**2
+
+
+def _named(surface: Surface, number: int, document: documents.Aircraft) -> Surface:
+    """A surface whose controls have the names of their drives in the whole aircraft."""
+    names = control_names(document.surfaces)
+    named = tuple(
+        replace(control, drive=names[number, place]) for place, control in enumerate(surface.controls)
+    )
+    return replace(surface, controls=named) if named else surface
 
 
 def _vector(values: list[float]) -> Array:

@@ -23,13 +23,16 @@ Array = NDArray[np.float64]
 class Mirror:
     """Indices of an aircraft's surfaces: ``own`` of one half, ``image`` of their images in the same order.
 
-    ``own_hinges`` and ``image_hinges`` are indices of their hinges among all hinges of the aircraft.
+    ``own_hinges`` and ``image_hinges`` are indices of their hinges among all hinges of the aircraft, and
+    ``own_controls`` and ``image_controls`` those of their controls among all controls.
     """
 
     own: tuple[int, ...]
     image: tuple[int, ...]
     own_hinges: tuple[int, ...]
     image_hinges: tuple[int, ...]
+    own_controls: tuple[int, ...] = ()
+    image_controls: tuple[int, ...] = ()
 
     def spread(self, values: Array) -> Array:
         """Columns (k, s) of all surfaces from those of one half, (k, s / 2), when both sides move alike."""
@@ -76,11 +79,16 @@ def mirror_of(aircraft: Aircraft, flight: Flight) -> Mirror | None:
         return None
     own, image = (tuple(group[side] for group in groups) for side in (0, 1))
     columns = aircraft.hinge_columns
+    first = np.cumsum([0, *(len(surface.controls) for surface in aircraft.surfaces)]).tolist()
     return Mirror(
         own,
         image,
         *(
             tuple(k for number in side for k in range(columns[number].start, columns[number].stop))
+            for side in (own, image)
+        ),
+        *(
+            tuple(k for number in side for k in range(first[number], first[number + 1]))
             for side in (own, image)
         ),
     )

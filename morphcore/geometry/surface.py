@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from morphcore.geometry.control import Control
 from morphcore.geometry.hinge import Hinge, hinge_arms
 from morphcore.geometry.point_mass import PointMass
 from morphcore.geometry.section import SectionProperties, given_section, solid_box
@@ -67,6 +68,7 @@ class Surface(Shown):
     mass_axis_offset_m: float
     stations: SpanStations | None = None
     point_masses: tuple[PointMass, ...] = ()
+    controls: tuple[Control, ...] = ()
 
     @classmethod
     def of(cls, document: documents.Surface) -> Surface:
@@ -96,7 +98,15 @@ class Surface(Shown):
             elastic_axis_offset_m=document.elastic_axis_offset_m if stations is None else stations.elastic_m,
             mass_axis_offset_m=document.mass_axis_offset_m,
             stations=stations,
+            controls=tuple(
+                Control.of(control, document.side, control.name) for control in document.all_controls
+            ),
         )
+
+    @property
+    def moved_parts(self) -> tuple[Hinge | Control, ...]:
+        """What drives move: its hinges, then its controls."""
+        return (*self.hinges, *self.controls)
 
     @property
     def span_sign(self) -> float:

@@ -30,7 +30,7 @@ from morphcore.models.equivalent import (
 )
 from morphcore.models.kernels.layout import OMEGA, POSITION
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
+from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules, part_name
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import choose_step
@@ -105,7 +105,7 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
     """Motion of every hinge out of a sample; refuses angles beyond a hinge's range."""
     followed = followed_flight(aircraft, sample, pointer)
     for surface in aircraft.surfaces:
-        for hinge in surface.hinges:
+        for hinge in surface.moved_parts:
             if hinge.drive not in followed:
                 continue
             key, schedule = followed[hinge.drive]
@@ -114,7 +114,7 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
             if bad.size:
                 unit = f"; are they degrees? Then name the column {key}_deg"
                 raise InvalidInput(
-                    f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the hinge of {surface.name}",
+                    f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the {part_name(hinge)} of {surface.name}",
                     pointer=f"{pointer}/{key}_rad/{bad[0]}",
                     hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad"
                     + unit * bool(np.abs(angle).max() > np.pi),
@@ -181,7 +181,8 @@ def shared_trims(
     """Each case with its trim; samples that begin in the same shape and wind share one."""
     known: dict[tuple[float, ...], Trim] = {}
     for case in cases:
-        key = tuple(np.round(np.concatenate([case.plan.angles[0], case.plan.wind_N[0]]), 9))
+        plan = case.plan
+        key = tuple(np.round(np.concatenate([plan.angles[0], plan.first_deflections, plan.wind_N[0]]), 9))
         if key not in known:
             known[key] = trim(
                 case.plan.flown(model),

@@ -22,6 +22,7 @@ from morphcore.validity import (
     AirMotion,
     ResultWarning,
     air_warnings,
+    deflection_warnings,
     error_warning,
     light_wing_warnings,
     overlap_warnings,
@@ -92,7 +93,9 @@ def fit_warnings(
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
     found += light_wing_warnings(aircraft, run.model.flight)
-    found += overlap_warnings(aircraft, np.concatenate([_angles(fit, aircraft) for fit in fits]))
+    angles = np.concatenate([_angles(fit, aircraft) for fit in fits])
+    found += overlap_warnings(aircraft, angles)
+    found += deflection_warnings(aircraft, angles)
     return tuple(found)
 
 
@@ -151,7 +154,7 @@ def _of_bounds(
 
 
 def _angles(fit: SampleFit, aircraft: Aircraft) -> np.ndarray:
-    """Angles (k, h) of all hinges along a sample."""
+    """Angles (k, h + c) of all hinges, then of all controls, along a sample."""
     sample = fit.case.sample
     schedules = hinge_schedules(aircraft, followed_flight(aircraft, sample))
     angles = np.empty((sample.time_s.size, len(schedules)))

@@ -103,8 +103,9 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 7) first link, links, first strip, strips, first overlap pair of each surface, whether
-        it also represents its mirror image, and the first of its further outputs of the lattice, or -1.
+    surfaces : (s, 8) first link, links, first strip, strips, first overlap pair of each surface, whether
+        it also represents its mirror image, the first of its further outputs of the lattice (or -1), and the
+        first input of its controls (-1 without).
     """
 
     aircraft: Aircraft
@@ -302,10 +303,12 @@ def _chain_model(
 ) -> ChainModel:
     lattices = aircraft_lattice(aircraft, lattice, images)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0 in zip(aircraft.surfaces, lattices.lattices, lattices.strip0, strict=True):
+    for surface, part, strip0, control0 in zip(
+        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control0, strict=True
+    ):
         count = links_per_wing if surface.flexible else 1
         more = lattices.more_rows(strip0)
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more])
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, control0])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))

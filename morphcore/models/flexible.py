@@ -9,7 +9,7 @@ to the nodes by virtual work.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from morphcore.aero.moving_lattice import Riders
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.frames import skew
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
+from morphcore.geometry.control_slopes import panel_slopes
 from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.section import SectionProperties
@@ -105,6 +106,7 @@ def flexible_model(
         node += count + 1
         if flight.apparent_mass:
             apparent.append(_apparent_at(surface, flight, stations))
+    slopes = panel_slopes(parts.slopes, len(aircraft.controls), parts.lattices)
     beams = make_beams(
         np.array(ends).reshape(-1, 2), rest, sections, damping, bodies=bodies, inertia=inertia, nodes=node
     )
@@ -116,7 +118,7 @@ def flexible_model(
         roots=np.array(roots, dtype=np.int64),
         tips=np.array(tips, dtype=np.int64),
         rest_W=np.concatenate(rest_W),
-        riders=_joined(riders),
+        riders=replace(_joined(riders), control_slope=slopes),
         element=np.concatenate([element for element, _ in places]),
         fraction=np.concatenate([fraction for _, fraction in places]),
         apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],

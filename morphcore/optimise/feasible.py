@@ -11,6 +11,7 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+from morphdata.controls import unmotorised
 from morphdata.optimize import Limits, Morph
 
 OVERSHOOT = 0.5  # of the change: how far a schedule that may reverse may go beyond either end
@@ -25,7 +26,13 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
     InvalidInput : there is no hinge, the drive is ambiguous, or a hinge does not reach the angles.
     """
     drives = morph_drives(aircraft, morph)
-    hinges = [hinge for hinge in aircraft.hinges if hinge.drive in drives]
+    hinges = [part for part in aircraft.moved_parts if part.drive in drives]
+    if limits.max_hinge_torque_nm is not None and (names := unmotorised(aircraft.drives, drives)):
+        raise InvalidInput(
+            f"the hinge moment of the control {names[0]} is not computed",
+            pointer="/limits/max_hinge_torque_nm",
+            hint="leave it out: only hinges have a limit of their torque",
+        )
     minimum, maximum = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
     for name in ("initial_rad", "final_rad"):
         angle = getattr(morph, name)

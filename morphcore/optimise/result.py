@@ -204,8 +204,9 @@ def schedule_result(
     flights: dict[str, dict[str, ComparedFlight | None]] = {}
     benches = {model: case.flights(model) for model in ("rigid", "equivalent")}
     for model, bench in benches.items():
-        flown = bench.fly(list(named.values()), torque=judged)
-        flights[model] = {name: _compared(flown, i, judged=judged) for i, name in enumerate(named)}
+        torque = judged and bool(bench.moved.any())  # controls have no motors
+        flown = bench.fly(list(named.values()), torque=torque)
+        flights[model] = {name: _compared(flown, i, judged=torque) for i, name in enumerate(named)}
     flights["flexible"] = {item.schedule: _verified(item.euler) for item in state.verified}
     searched = tuple(
         sorted((f for f in state.found if f.model == "equivalent"), key=lambda item: item.duration_s)

@@ -10,11 +10,12 @@ import numpy as np
 from morphcore.optimise.case import MorphCase
 from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.state import OptimisationState
-from morphcore.simulate.plan import path_angles
+from morphcore.simulate.plan import path_angles, path_controls
 from morphcore.simulate.schedule import Schedule
 from morphcore.validity import (
     ResultWarning,
     air_warnings,
+    deflection_warnings,
     documents,
     light_wing_warnings,
     overlap_warnings,
@@ -39,7 +40,10 @@ def schedule_warnings(
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
     found += light_wing_warnings(case.aircraft, case.flight)
     path = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)
-    found += overlap_warnings(case.aircraft, path_angles(case.aircraft, case.drives, path))
+    angles = path_angles(case.aircraft, case.drives, path)
+    found += overlap_warnings(case.aircraft, angles)
+    controls = path_controls(case.aircraft, case.drives, path)
+    found += deflection_warnings(case.aircraft, np.concatenate([angles, controls], axis=1))
     verified: list[dict[str, Any]] = []
     for item in state.verified:
         name = item.schedule.replace("_", " ")

@@ -14,6 +14,7 @@ from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
 from morphcore.models.kinematics import link_poses, tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.control_motion import control_angles
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
@@ -84,6 +85,7 @@ def chain_flight(
         if loads is not None and loads.hinge_torque is not None:
             loads = replace(loads, hinge_torque=model.mirror.spread_hinges(loads.hinge_torque))
         found = replace(found, q_joint=whole_joints(model, found.q_joint))
+    angles = np.concatenate([angles, control_angles(model.aircraft, schedules, grid.times_s[at])], axis=1)
     record = FlightRecord(
         euler=euler_from_quaternion(quaternion),
         omega_B=history[:, OMEGA:VELOCITY],

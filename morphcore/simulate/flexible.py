@@ -10,7 +10,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from morphcore.multibody.beam import (
 )
 from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.multibody.kernels.beam import apparent_forces
+from morphcore.simulate.control_motion import control_angles, deflections
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
     INVERSE_WANTED,
@@ -74,7 +75,8 @@ class HingePath:
 
     R_BW : (k, s, 3, 3); origin_B : (k, s, 3) root nodes, m. The twist of a root relative to the fuselage is
     ``axis rate`` in W: for one hinge its screw (k, s, 6) and its rate (k, s), for several their sum and 1;
-    acceleration : (k, s, 6) its time derivative. angle : (k, h) of all hinges, rad.
+    acceleration : (k, s, 6) its time derivative. angle : (k, h) of all hinges, rad. controls, deflection :
+    (k, c) angles of all controls' drives, and their deflections, trailing edge down, rad.
     """
 
     R_BW: Array
@@ -83,17 +85,19 @@ class HingePath:
     rate: Array
     acceleration: Array
     angle: Array
+    controls: Array = field(default_factory=lambda: np.zeros((1, 0)))
+    deflection: Array = field(default_factory=lambda: np.zeros((1, 0)))
 
 
 def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGrid) -> HingePath:
-    """Motion of all hinges on a grid, with one schedule for each in the order of `Aircraft.hinges`.
+    """Motion of all hinges on a grid, with one schedule for each in the order of `Aircraft.moved_parts`.
 
     Accelerations are central differences of the rates over two steps: at a corner of a sampled rate, the
     impulse of the hinge keeps its size and its time.
     """
     times, h, aircraft = grid.times_s, grid.step_s, model.aircraft
     angle, rate, acceleration = np.zeros((3, times.size, len(aircraft.hinges)))
-    for column, schedule in enumerate(schedules):
+    for column, schedule in enumerate(schedules[: len(aircraft.hinges)]):
         motion = schedule.motion(times)
         late, early = schedule.motion(times + h).rate, schedule.motion(times - h).rate
         angle[:, column], rate[:, column] = motion.angle, motion.rate
@@ -104,7 +108,9 @@ def hinge_path(model: FlexibleModel, schedules: Sequence[Schedule], grid: TimeGr
         for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
     ]
     R_BW, origin_B, axis, rates, changes = (np.stack(column, axis=1) for column in zip(*parts, strict=True))
-    return HingePath(R_BW, origin_B, axis, rates, changes, angle)
+    controls = control_angles(aircraft, schedules, times)
+    deflection = deflections(aircraft, controls)
+    return HingePath(R_BW, origin_B, axis, rates, changes, angle, controls, deflection)
 
 
 def _root_path(
@@ -321,6 +327,7 @@ class FlexibleRun:
             rate=path.rate,
             acceleration=path.acceleration,
             wind_N=np.array(wind_N, dtype=np.float64),
+            deflection=path.deflection,
         )
         self._rule = rule.coefficients(model.riders.lag_time)
         self._state, self._trial = _state_arrays(state), _state_arrays(state)
@@ -412,6 +419,7 @@ def set_in_motion(
         wing = slice(root, tip + 1)
         V[wing] = carried(poses, root, V[root], wing)
     circulation = state.circulation
+    flight.lattice.deflect(path.deflection[0])
     for iteration in range(MAX_ITERATIONS):
         flight.follow(poses, V, A, path, 0)
         demands = flight.structure(poses, V, A, wind_N)

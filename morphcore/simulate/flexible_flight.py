@@ -68,7 +68,7 @@ def flexible_flight(
         velocity_N=history[:, 6:9],
         position_N=history[:, 9:12],
         wind_N=wind_N[at],
-        angles=path.angle[at],
+        angles=np.concatenate([path.angle[at], path.controls[at]], axis=1),
         tips_z=history[:, 12:],
         tips_twist=np.arcsin(np.clip(sines, -1.0, 1.0)) if "twist" in parts else None,
         loads=Loads(records[:, 21:24]) if "loads" in parts else None,

@@ -42,6 +42,7 @@ from morphcore.validity import (
     ResultWarning,
     air_motion,
     air_warnings,
+    deflection_warnings,
     light_wing_warnings,
     overlap_warnings,
     steep_warning,
@@ -279,6 +280,7 @@ def _warnings(
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
+        *deflection_warnings(aircraft, record.angles),
     )
 
 
@@ -296,7 +298,7 @@ def _cell(value: float) -> str:
 def _trim_angles(aircraft: Aircraft, flight: Flight, record: FlightRecord) -> dict[str, float]:
     """Angles of the trim drive at the start, rad, by name."""
     columns = trim_columns(aircraft, flight.trim_drive)
-    return {aircraft.hinges[k].drive: float(record.angles[0, k]) for k in columns}
+    return {aircraft.moved_parts[k].drive: float(record.angles[0, k]) for k in columns}
 
 
 def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:

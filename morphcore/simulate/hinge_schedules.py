@@ -9,6 +9,8 @@ import numpy as np
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.control import Control
+from morphcore.geometry.hinge import Hinge
 from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
@@ -100,27 +102,32 @@ def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> T
 
 
 def hinge_schedules(aircraft: Aircraft, followed: Followed) -> list[Schedule]:
-    """Return the schedule of every hinge, in order; hinges that nothing moves hold their angle."""
+    """Return the schedules of all hinges, then of all controls; what nothing moves holds its angle."""
     return [
-        followed[hinge.drive][1] if hinge.drive in followed else Hold(hinge.angle_rad)
-        for hinge in aircraft.hinges
+        followed[part.drive][1] if part.drive in followed else Hold(part.angle_rad)
+        for part in aircraft.moved_parts
     ]
 
 
+def part_name(part: Hinge | Control) -> str:
+    """Return what a drive moves, for messages."""
+    return "control" if isinstance(part, Control) else "hinge"
+
+
 def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, pointer: str) -> None:
-    """Raise InvalidInput if a drive leaves the range of one of its hinges at times (k,), s."""
+    """Raise InvalidInput if a drive leaves the range of one of its hinges or controls at times (k,), s."""
     for surface in aircraft.surfaces:
-        for hinge in surface.hinges:
+        for hinge in surface.moved_parts:
             if hinge.drive not in followed:
                 continue
             key, schedule = followed[hinge.drive]
             angle = schedule.motion(times_s).angle
             outside = hinge.beyond_range(angle)
             if outside.size:
-                row = outside[0]
+                row, kind = outside[0], part_name(hinge)
                 raise InvalidInput(
-                    f"the hinge {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} rad at "
+                    f"the {kind} {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} rad at "
                     f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} rad",
                     pointer=f"{pointer}/{key}",
-                    hint="lower the angles, or widen the hinge's range; a spline can go beyond its knots",
+                    hint=f"lower the angles, or widen the {kind}'s range; a spline can go beyond its knots",
                 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,35 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
+class ControlTable(Shown):
+    """Loads of the controls at the nodes, and their deflections in time (m parts, `ControlSlopes`).
+
+    matrices : (nodes, rows, m) for unit deflection. columns : (m,) of the operator that each adds to.
+    deflection : (steps + 1, m) at each grid time, trailing edge down, lagged.
+    """
+
+    matrices: Array
+    columns: NDArray[np.int64]
+    deflection: Array
+
+
+@dataclass(frozen=True, repr=False)
 class OperatorTable(Shown):
     """Reduced lattice operators at nodes along the morph, interpolated by local cubics in the path length.
 
     matrices : (nodes, rows, columns); strips : (nodes, strips, 3); position : (steps + 1,) of each grid time
-    among the nodes, in node spacings.
+    among the nodes, in node spacings. controls : None without control surfaces.
     """
 
     matrices: Array
     strips: Array
     position: Array
+    controls: ControlTable | None = None
+
+    def at(self, rows: slice | NDArray[np.int64]) -> OperatorTable:
+        """The table at some of the grid times."""
+        controls = self.controls and replace(self.controls, deflection=self.controls.deflection[rows])
+        return replace(self, position=self.position[rows], controls=controls)
 
     def between(self, first: int, last: int) -> tuple[Array, Array]:
         """Operators (k, rows, columns) and strips (k, strips, 3) at the grid times first..last - 1."""
@@ -38,7 +57,13 @@ class OperatorTable(Shown):
             # Lagrange's cubic through four neighbours
             cubic = [np.prod([(s - j) / (i - j) for j in range(4) if j != i], axis=0) for i in range(4)]
             weights = np.stack(cubic, axis=1)
-        return _blended(self.matrices, weights, base), _blended(self.strips, weights, base)
+        operators = _blended(self.matrices, weights, base)
+        if self.controls is not None:
+            loads = _blended(self.controls.matrices, weights, base)
+            loads *= self.controls.deflection[first:last, None, :]
+            for part, column in enumerate(self.controls.columns):  # two controls may share a strip
+                operators[:, :, column] += loads[:, :, part]
+        return operators, _blended(self.strips, weights, base)
 
 
 def _blended(nodes: Array, weights: Array, base: NDArray[np.int64]) -> Array:

@@ -12,12 +12,19 @@ from numpy.typing import NDArray
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.control import Control
 from morphcore.geometry.hinge import Hinge, hinged_pose
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.hinges import relative_motion
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_ROTATION, H_TWIST, HINGE_ROWS
 from morphcore.shown import Shown
-from morphcore.simulate.operator_table import OperatorTable
+from morphcore.simulate.control_motion import (
+    control_angles,
+    deflections,
+    lagged_deflections,
+    of_every_part,
+)
+from morphcore.simulate.operator_table import ControlTable, OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.time_grid import STEP_S, TimeGrid
 from morphcore.simulate.trim import StartMode
@@ -92,7 +99,6 @@ class FlightPlan(Shown):
         if rest or every % 2:
             raise ValueError(f"{grid.steps} steps and their middles are not among {self.grid.steps}")
         own, between = slice(None, None, every), slice(every // 2, None, every)
-        position = self.table.position
         return replace(
             self,
             grid=grid,
@@ -101,13 +107,13 @@ class FlightPlan(Shown):
             accelerations=self.accelerations[own],
             hinges=np.ascontiguousarray(self.hinges[own]),
             wind_N=np.ascontiguousarray(self.wind_N[own]),
-            table=replace(self.table, position=position[own]),
+            table=self.table.at(own),
             middle=Middles(
                 self.angles[between],
                 self.rates[between],
                 np.ascontiguousarray(self.hinges[between]),
                 np.ascontiguousarray(self.wind_N[between]),
-                replace(self.table, position=position[between]),
+                self.table.at(between),
             ),
         )
 
@@ -120,7 +126,7 @@ class FlightPlan(Shown):
             accelerations=self.accelerations[rows],
             hinges=np.ascontiguousarray(self.hinges[rows]),
             wind_N=np.ascontiguousarray(self.wind_N[rows]),
-            table=replace(self.table, position=self.table.position[rows]),
+            table=self.table.at(rows),
         )
 
     @cached_property
@@ -136,6 +142,12 @@ class FlightPlan(Shown):
     def surface_accelerations(self) -> Array:
         """(steps + 1, s, 6) of the surfaces relative to the fuselage at the grid times, in W."""
         return surface_accelerations(self.aircraft, self.angles, self.rates, self.accelerations)
+
+    @property
+    def first_deflections(self) -> Array:
+        """(m,) of the controls' parts at the first grid time, for which a flight is trimmed."""
+        controls = self.table.controls
+        return np.zeros(0) if controls is None else controls.deflection[0]
 
     def at_rest(self) -> FlightPlan:
         """The plan's first moment with its hinges held: where a flight is trimmed."""
@@ -155,7 +167,7 @@ def flight_plan(
     start: StartMode = "trim",
     wake_alpha: float | None = None,
 ) -> FlightPlan:
-    """Prepare a flight: one schedule for each of the aircraft's hinges.
+    """Prepare a flight: one schedule for each of the aircraft's hinges, then one for each control, or none.
 
     The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad; None: that of the start
     at the first hinge angles (`wake.nominal_start`), where also the trim drive is. With ``wake_alpha`` or
@@ -166,46 +178,54 @@ def flight_plan(
     parameters.
     """
     times = grid.halves_s
+    schedules = of_every_part(model.aircraft, schedules)
     if wake_alpha is None:
         begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
         schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
-    motion = _motion(schedules, times)
+    motion = _motion(model.aircraft, schedules, times)
     if may_halve and air_velocity_N is None:
         model, motion = _halved(model, motion)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
-    table = _operator_table(model, motion.angles, node_spacing_rad, wake_alpha)
+    table = _operator_table(model, motion, node_spacing_rad, wake_alpha, 0.5 * grid.step_s)
     return _plan(model, grid, motion, table, wind_N)
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """Angles, rates and accelerations (k, h) of all hinges, rad, rad/s, rad/s^2."""
+    """Angles, rates and accelerations (k, h) of all hinges, rad, rad/s, rad/s^2.
+
+    deflected : (k, c) deflections of all controls, trailing edge down, rad.
+    """
 
     angles: Array
     rates: Array
     accelerations: Array
+    deflected: Array
 
-    def columns(self, chosen: Sequence[int]) -> _Motion:
-        """The motion of some of the hinges."""
+    def columns(self, chosen: Sequence[int], controls: Sequence[int]) -> _Motion:
+        """The motion of some of the hinges and controls."""
         kept = list(chosen)
-        return _Motion(self.angles[:, kept], self.rates[:, kept], self.accelerations[:, kept])
+        own = self.angles[:, kept], self.rates[:, kept], self.accelerations[:, kept]
+        return _Motion(*own, self.deflected[:, list(controls)])
 
 
-def _motion(schedules: Sequence[Schedule], times: Array) -> _Motion:
-    of_hinges = np.zeros((3, times.size, len(schedules)))
-    for column, schedule in enumerate(schedules):
+def _motion(aircraft: Aircraft, schedules: Sequence[Schedule], times: Array) -> _Motion:
+    of_hinges = np.zeros((3, times.size, len(aircraft.hinges)))
+    for column, schedule in enumerate(schedules[: len(aircraft.hinges)]):
         motion = schedule.motion(times)
         of_hinges[:, :, column] = motion.angle, motion.rate, motion.acceleration
-    return _Motion(*of_hinges)
+    angles, rates, accelerations = of_hinges
+    deflected = deflections(aircraft, control_angles(aircraft, schedules, times))
+    return _Motion(angles, rates, accelerations, deflected)
 
 
 def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart:
-    """The start (`wake.nominal_start`) of a plan whose schedules begin at angles (h,), rad."""
+    """The start (`wake.nominal_start`) of a plan whose schedules begin at angles (h + c,), rad."""
     return nominal_start(model, angles, start, _instant)
 
 
 def _instant(model: ChainModel, angles: Array, wake_alpha: float) -> FlightPlan:
-    """A plan of one short step with everything held at angles (h,), rad."""
+    """A plan of one short step with everything held at angles (h + c,), rad."""
     held = [Hold(float(angle)) for angle in angles]
     return flight_plan(model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha)
 
@@ -219,7 +239,8 @@ class CommonPath:
 
     low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
     hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
-    as in ``FlightPlan``. begin : the start for which the lattice was tabulated.
+    as in ``FlightPlan``. begin : the start for which the lattice was tabulated. controls : as in
+    ``ControlTable``; None without control surfaces.
     """
 
     low_rad: float
@@ -229,6 +250,7 @@ class CommonPath:
     strips: Array
     halved: bool
     begin: NominalStart
+    controls: Array | None = None
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies the plans: the given one, or one half of it."""
@@ -255,11 +277,12 @@ class CommonPath:
                 hint=f"this path's range is {self.low_rad:g}..{self.high_rad:g} rad",
             )
         position = share * (self.matrices.shape[0] - 1)
-        table = OperatorTable(self.matrices, self.strips, position)
         flown = self.flown(model)
         schedules = path_schedules(flown.aircraft, self.drives, schedule)
         schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
-        return _plan(flown, grid, _motion(schedules, grid.halves_s), table)
+        moved = _motion(flown.aircraft, schedules, grid.halves_s)
+        controls = _control_table(flown, self.controls, moved, 0.5 * grid.step_s)
+        return _plan(flown, grid, moved, OperatorTable(self.matrices, self.strips, position, controls))
 
 
 def common_path(
@@ -286,21 +309,27 @@ def common_path(
     chosen = None if drives is None else tuple(drives)
     path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
     angles = path_angles(model.aircraft, chosen, path)
-    motion = _Motion(angles, np.zeros_like(angles), np.zeros_like(angles))
+    still = np.zeros_like(angles)
+    deflected = deflections(model.aircraft, path_controls(model.aircraft, chosen, path))
+    motion = _Motion(angles, still, still, deflected)
     begin = NominalStart(wake_alpha) if wake_alpha is not None else None
     if begin is None:
-        refuse_moved_trim(model, [_moves(hinge, chosen) for hinge in model.aircraft.hinges], start)
-        first = path_angles(
-            model.aircraft, chosen, np.array([low_rad if initial_rad is None else initial_rad])
+        refuse_moved_trim(model, [_moves(part, chosen) for part in model.aircraft.moved_parts], start)
+        at = np.array([low_rad if initial_rad is None else initial_rad])
+        first = np.concatenate(
+            [path_angles(model.aircraft, chosen, at)[0], path_controls(model.aircraft, chosen, at)[0]]
         )
-        begin = start_at(model, first[0], start)
+        begin = start_at(model, first, start)
         if begin.drive_rad is not None:
-            angles[:, trim_columns(model.aircraft, model.flight.trim_drive)] = begin.drive_rad
+            columns = trim_columns(model.aircraft, model.flight.trim_drive)
+            angles[:, columns[columns < angles.shape[1]]] = begin.drive_rad
     if may_halve:
         model, motion = _halved(model, motion)
     mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha)
+    # a path of controls alone has one lattice
+    rows = motion.angles if np.ptp(motion.angles, axis=0).any() else motion.angles[:1]
     operators = [
-        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake) for row in motion.angles
+        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake) for row in rows
     ]
     return CommonPath(
         low_rad,
@@ -310,6 +339,7 @@ def common_path(
         np.stack([item.strips for item in operators]),
         bool(model.lattice.images),
         begin,
+        _stacked_controls(operators),
     )
 
 
@@ -321,13 +351,24 @@ def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Arr
     return angles
 
 
+def path_controls(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
+    """Angles (k, c) of all controls' drives, like `path_angles`; None moves hinges alone."""
+    angles = np.empty((angle_rad.size, len(aircraft.controls)))
+    for column, control in enumerate(aircraft.controls):
+        angles[:, column] = angle_rad if _moves(control, drives) else control.angle_rad
+    return angles
+
+
 def path_schedules(aircraft: Aircraft, drives: Sequence[str] | None, schedule: Schedule) -> list[Schedule]:
-    """A schedule for each hinge: the given one for the moving drives (None: all), a held angle for others."""
-    return [schedule if _moves(hinge, drives) else Hold(hinge.angle_rad) for hinge in aircraft.hinges]
+    """A schedule for each hinge, then for each control.
+
+    The given one for the moving drives (None: those of all hinges), a held angle for the others.
+    """
+    return [schedule if _moves(part, drives) else Hold(part.angle_rad) for part in aircraft.moved_parts]
 
 
-def _moves(hinge: Hinge, drives: Sequence[str] | None) -> bool:
-    return drives is None or hinge.drive in drives
+def _moves(part: Hinge | Control, drives: Sequence[str] | None) -> bool:
+    return isinstance(part, Hinge) if drives is None else part.drive in drives
 
 
 def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
@@ -346,9 +387,7 @@ def _plan(
     hinges = surface_rows(model.aircraft, motion.angles, motion.rates)
     if wind_N is None:
         wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
-    own, between = (
-        replace(table, position=table.position[part]) for part in (slice(0, None, 2), slice(1, None, 2))
-    )
+    own, between = (table.at(part) for part in (slice(0, None, 2), slice(1, None, 2)))
     return FlightPlan(
         grid,
         model.aircraft,
@@ -375,9 +414,10 @@ def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
     if mirror is None or half is None:
         return model, motion
     own, image = (motion.angles[:, list(side)] for side in (mirror.own_hinges, mirror.image_hinges))
-    if np.abs(own - image).max(initial=0.0) > ALIKE_RAD:
+    up, down = (motion.deflected[:, list(side)] for side in (mirror.own_controls, mirror.image_controls))
+    if max(np.abs(own - image).max(initial=0.0), np.abs(up - down).max(initial=0.0)) > ALIKE_RAD:
         return model, motion
-    return half, motion.columns(mirror.own_hinges)
+    return half, motion.columns(mirror.own_hinges, mirror.own_controls)
 
 
 def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
@@ -420,8 +460,25 @@ def _nodes(length_rad: float, spacing_rad: float) -> int:
     return max(4, int(np.ceil(length_rad / spacing_rad)) + 1)
 
 
-def _operator_table(model: ChainModel, angles: Array, spacing: float, wake_alpha: float) -> OperatorTable:
-    mach, wake = model.flight.mach or 0.0, wake_direction(wake_alpha)
+def _stacked_controls(operators: Sequence[LatticeOperator]) -> Array | None:
+    controls = np.stack([item.controls for item in operators])
+    return controls if controls.shape[2] else None
+
+
+def _control_table(
+    model: ChainModel, controls: Array | None, motion: _Motion, spacing_s: float
+) -> ControlTable | None:
+    if controls is None:
+        return None
+    lagged = lagged_deflections(model.aircraft, model.flight.airspeed_m_s, motion.deflected, spacing_s)
+    lattice = model.lattice
+    return ControlTable(controls, lattice.control_columns, lagged[:, lattice.slopes.control])
+
+
+def _operator_table(
+    model: ChainModel, motion: _Motion, spacing: float, wake_alpha: float, spacing_s: float
+) -> OperatorTable:
+    mach, angles, wake = model.flight.mach or 0.0, motion.angles, wake_direction(wake_alpha)
     moved = np.abs(np.diff(angles, axis=0))
     # a surface turns by no more than all its hinges together
     turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
@@ -443,5 +500,8 @@ def _operator_table(model: ChainModel, angles: Array, spacing: float, wake_alpha
         operators = [operator(row) for row in rows]
         position = travelled / nodes[1]
     return OperatorTable(
-        np.stack([item.matrix for item in operators]), np.stack([item.strips for item in operators]), position
+        np.stack([item.matrix for item in operators]),
+        np.stack([item.strips for item in operators]),
+        position,
+        _control_table(model, _stacked_controls(operators), motion, spacing_s),
     )

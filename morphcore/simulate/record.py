@@ -39,9 +39,9 @@ class FlightRecord:
     """A flown flight at its output times (k times, s surfaces).
 
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
-    point; wind_N : (k, 3) m/s of the air there; angles : (k, h) of all hinges, rad; tips_z : (k, s) tips
-    below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the tips relative to
-    their roots, nose up, rad, and loads : both None unless requested (`Part`).
+    point; wind_N : (k, 3) m/s of the air there; angles : (k, h + c) of all hinges, then of all controls, rad;
+    tips_z : (k, s) tips below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the
+    tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`).
     """
 
     euler: Array
@@ -81,8 +81,8 @@ def recorded_trajectory(
 ) -> Trajectory:
     """The trajectory with the angles of all drives and some further columns."""
     drives: dict[str, Array] = {}
-    for column, hinge in enumerate(aircraft.hinges):  # all hinges of a drive turn together
-        drives.setdefault(hinge.drive, record.angles[:, column].copy())
+    for column, part in enumerate(aircraft.moved_parts):  # all hinges of a drive turn together
+        drives.setdefault(part.drive, record.angles[:, column].copy())
     phi, theta, psi = record.euler.T.copy()
     trajectory = Trajectory(
         name="simulated",

@@ -258,10 +258,9 @@ def _trim_slab(
         if not np.any(moving):
             break
     force_B, moment_B = _thrust(x, n, given, model.aircraft.propulsion)
-    of_thrust_B = thrust_moment_B(model.aircraft.propulsion, force_B)
     # forward differences limit the last digits: nearly converged is good enough
     converged = residual < 1e3 * ANGLE_TOLERANCE
-    share = converged.astype(np.float64)
+    of_thrust_B, share = thrust_moment_B(model.aircraft.propulsion, force_B), converged.astype(np.float64)
     return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, of_thrust_B, share)
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
-# a plan of one instant for hinge angles (h,), rad, and the angle of attack of its wake, rad
+# a plan of one instant for angles (h + c,) of all hinges and controls, rad, and the wake's angle of attack
 Instant = Callable[[ChainModel, Array, float], "FlightPlan"]
 
 TOLERANCE_RAD = (
@@ -81,7 +81,9 @@ def trim_drives(aircraft: Aircraft, name: str | None) -> tuple[Drive, ...]:
 
 def trim_columns(aircraft: Aircraft, name: str | None) -> NDArray[np.int64]:
     """Numbers of the schedules of the trim drive among those of the aircraft."""
-    found = [k for k, part in enumerate(aircraft.hinges) if name in (part.drive, without_side(part.drive))]
+    found = [
+        k for k, part in enumerate(aircraft.moved_parts) if name in (part.drive, without_side(part.drive))
+    ]
     return np.array(found, dtype=np.int64)
 
 
@@ -116,7 +118,7 @@ def trimmed_schedules(
     if begin.drive_rad is None:
         return out
     for column in trim_columns(model.aircraft, model.flight.trim_drive):
-        part, own = model.aircraft.hinges[column], schedules[column]
+        part, own = model.aircraft.moved_parts[column], schedules[column]
         out[column] = Shifted(own, begin.drive_rad - float(own.motion(times_s[:1]).angle[0]))
         angle = out[column].motion(times_s).angle
         outside = part.beyond_range(angle)
@@ -145,14 +147,14 @@ def refuse_moved_trim(model: ChainModel, moves: Sequence[bool], start: StartMode
     for column in trim_columns(model.aircraft, model.flight.trim_drive):
         if moves[column]:
             raise InvalidInput(
-                f"the morph moves {model.aircraft.hinges[column].drive}, which is the flight's trim drive",
+                f"the morph moves the flight's trim drive, {model.aircraft.moved_parts[column].drive}",
                 pointer="/flight/trim_drive",
                 hint="trim with another drive, or move others",
             )
 
 
 def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: Instant) -> NominalStart:
-    """Find the start at the first angles (h,), rad, of all schedules, those of the trim drive being free.
+    """Find the start at the first angles (h + c,), rad, of all schedules, those of the trim drive being free.
 
     With ``start="given"`` the angle of attack is the flight's, and no drive is moved. The result is kept with
     the model.

@@ -83,7 +83,7 @@ def of_aerosandbox(
                 )
                 sections.append((leading_B * [-1.0, 1.0, -1.0], chord, np.degrees(each.incidence_rad)))
             if each.side == "left":  # their wings run from left to right
-                sections = sections[::-1]
+                sections.reverse()
             wings.append(_wing(asb, sections))
         plane = asb.Airplane(wings=wings, xyz_ref=[0, 0, 0], s_ref=1.0, c_ref=1.0, b_ref=1.0)
         result = asb.VortexLatticeMethod(

@@ -50,9 +50,7 @@ def wings(**more: Any) -> list[dict[str, Any]]:
 
 TAIL = pair("tail", 1.0, (0.3, 0.3), position_m=[-3.0, 0.0, -0.2], sweep_rad=0.3, dihedral_rad=-0.2)
 # above the wake, whose direction differs between the models: along the body, along the stream
-HIGH_TAIL = pair(
-    "tail", 1.0, (0.3, 0.3), position_m=[-3.0, 0.0, -0.8], sweep_rad=0.3, dihedral_rad=0.2
-)
+HIGH_TAIL = pair("tail", 1.0, (0.3, 0.3), position_m=[-3.0, 0.0, -0.8], sweep_rad=0.3, dihedral_rad=0.2)
 FIN = surface(
     "fin", "right", 0.9, (0.5, 0.3), position_m=[-2.8, 0.0, -0.2], dihedral_rad=1.5708, sweep_rad=0.5,
     flexible=True, profile_drag=0.01,
@@ -173,9 +171,7 @@ def test_a_swept_beam_bends_along_its_axis(sweep_rad: float) -> None:
     span, chord, thickness, push = 2.5, 0.4, 0.05, 1.0
     heavy = 1e9
     shape = aircraft(*pair("wing", span, (chord, chord), sweep_rad=sweep_rad, flexible=True))
-    shape = replace(
-        shape, fuselage=replace(shape.fuselage, mass_kg=heavy, inertia_B=heavy * np.eye(3))
-    )
+    shape = replace(shape, fuselage=replace(shape.fuselage, mass_kg=heavy, inertia_B=heavy * np.eye(3)))
     assert example_flight().start is not None
     mass = sum(float(s.section_at(np.zeros(1)).mass[0]) * s.length_m for s in shape.surfaces)
     assert mass == pytest.approx(2 * 500.0 * span * chord * thickness, rel=1e-12)

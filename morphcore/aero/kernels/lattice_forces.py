@@ -15,6 +15,16 @@ def place_lattice(parts, place, stream_B):
     normal_influence(parts, place)
 
 
+@entry_kernel
+def deflect(parts, place, deflection):
+    """Set the slopes of the panels: their own, and those of the deflections (c,) of all controls."""
+    for p in range(place.slope.size):
+        total = parts.slope[p]
+        for c in range(deflection.size):
+            total += deflection[c] * parts.control_slope[c, p]
+        place.slope[p] = total
+
+
 @kernel
 def rider_velocity(R, twist, arm, out):
     """Velocity (3,) in B of a point at ``arm`` on a section of axes R (3, 3) and ``twist`` (6,)."""
@@ -43,9 +53,9 @@ def add_rider_force(R, arm, fx, fy, fz, out):
 def blocked_flow(parts, place, twists, wind_B, out):
     """Normal velocity (r,) that the circulations have to induce at the control points, m/s.
 
-    A slope of the mean line tilts the normal (towards -z of the section) aft, to first order, which takes
-    the slope times the velocity along the section's chord. ``twists`` (k, 6) of the sections in their axes;
-    wind_B (3,).
+    A slope (of the mean line, or of a deflected control) tilts the normal (towards -z of the section) aft, to
+    first order, which takes the slope times the velocity along the section's chord. ``twists`` (k, 6) of the
+    sections in their axes; wind_B (3,).
     """
     for p in range(out.size):
         k = parts.control[p]

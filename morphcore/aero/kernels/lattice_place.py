@@ -33,9 +33,9 @@ class LatticeParts(NamedTuple):
     Lines : (e + l,) bound edges, then legs; ``line_end`` of a leg is -1. line_plus, line_minus : the ring
     whose circulation runs along the line, and the one against it; r for none. line_core : core radius, m, to
     the fourth, "smoothed" squared. ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on :
-    sections and places of riders, as in `moving_lattice.Riders`. moment_area : (t,) cm0 times the
-    integral of the chord squared, m^3. stretch : 1 / beta of Goethert's rule.
-    density : kg/m^3.
+    sections and places of riders, as in `moving_lattice.Riders`. moment_area : (t,) cm0 times the integral of
+    the chord squared, m^3. slope : (r,) of the mean line, nose up. stretch : 1 / beta of Goethert's rule.
+    density : kg/m^3. control_slope : (c, r) slopes of the panels per unit deflection of each control surface.
     """
 
     line_start: IntArray
@@ -55,9 +55,11 @@ class LatticeParts(NamedTuple):
     moment_area: Array
     control_chord: Array
     drag_chord: Array
+    slope: Array
     smoothed: bool
     stretch: float
     density: float
+    control_slope: Array
 
 
 class LatticePlace(NamedTuple):
@@ -67,8 +69,8 @@ class LatticePlace(NamedTuple):
     points : (3, r + e) control points and the edges' middles, stretched. distances : (c, r + e). normals,
     tilted : (3, r). influence : (r + 1, r) normal velocity, ring by point. row : (r + e,). strength :
     (e + l,). induced : (3, e), of the circulations summed (r,). corner_velocity, control_velocity,
-    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). slope : (r,) of the mean line at each control point,
-    nose up, which may change from one step to the next.
+    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). slope : (r,) at each control point, of the mean line
+    and of deflected controls, nose up or trailing edge down.
     """
 
     R_BS: Array

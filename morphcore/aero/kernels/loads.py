@@ -3,8 +3,8 @@
 The lattice is fixed on the undeformed surface; its strips ride on the links. A strip that spans a joint
 belongs to both links in proportion to its width on each (``overlap``), so that loads are continuous in the
 division lengths. The operator maps the normal velocity of the strips (two inputs each: at the link axis, and
-its slope along the chord, which is oblique in link axes on a swept surface) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
-follow (see aero/operator.py for their derivation):
+its slope along the chord, which is oblique in link axes on a swept surface) to five outputs each, from which
+the Kutta-Joukowski forces on all bound edges follow (see aero/operator.py for their derivation):
 
     0  g = Gamma dy       circulation at the trailing edge times strip width, m^3/s
     1  S = sum Gamma_i A_i              vortex moment of the strip's rings, m^4/s
@@ -13,7 +13,8 @@ follow (see aero/operator.py for their derivation):
     4  w_y   the same for the chordwise edges, m/s
 
 Both are sums over all bound edges, by their components along y and x, per circulation and width of the
-strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all strips:
+strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all
+strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
@@ -39,7 +40,7 @@ STRIP_COLUMNS = 7
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
 # (1/m); what the link's yaw rate adds to v_z (m) and to omega_x (see ``sloped``); cm0 times the integral of
-# the chord squared (m^3), and the y of its centroid (m); unit vector of the chords, forward, and y over x of it
+# the chord squared (m^3), and the y of its centroid (m); unit vector of the chords, forward, and its y over x
 L_DRAG, L_DRAG_Y = 8, 9
 L_SLOW_DECAY, L_SLOW_WEIGHT, L_FAST_DECAY, L_FAST_WEIGHT = 10, 11, 12, 13
 L_LIFT, L_CENTRE = 14, 15
@@ -50,7 +51,7 @@ JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0 = 0, 1, 2, 3, 4, 5, 6
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0, CONTROL0 = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 @inlined
@@ -127,6 +128,33 @@ def strip_inputs(lanes, surface, ranges, strips, overlap, effective, inputs):
                 weight = part[0, l]
                 out[0, l] += weight * (motion[0, l] + part[1, l] * motion[1, l])
                 out[1, l] += weight * (cy * motion[1, l] - cx * motion[2, l])
+
+
+@kernel
+def control_inputs(lanes, surface, k, ranges, overlap, link, twist, inputs):
+    """Add what link ``k`` gives to the velocity along the chord of each strip, one row each from CONTROL0.
+
+    The operator's columns of these inputs hold the deflections, lagged beforehand.
+    """
+    if not_in_lanes(overlap, lanes) or not_in_lanes(link, lanes) or not_in_lanes(twist, lanes):
+        return
+    if not_in_lanes(inputs, lanes):
+        return
+    control0 = surface[CONTROL0]
+    if k == 0:
+        for j in range(control0, control0 + surface[STRIPS]):
+            row = inputs[j]
+            for l in range(len(lanes)):
+                row[l] = 0.0
+    number = surface[LINK0] + k
+    for j in range(ranges[number, 0], ranges[number, 1]):
+        pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
+        part = overlap[pair : pair + 2]
+        out = inputs[control0 + j]
+        for l in range(len(lanes)):
+            forward = twist[3, l] - part[1, l] * twist[2, l]
+            along = link[L_CHORD_X, l] * forward + link[L_CHORD_Y, l] * twist[4, l]
+            out[l] += part[0, l] * link[L_LIFT, l] * along
 
 
 @kernel

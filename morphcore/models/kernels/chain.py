@@ -7,9 +7,11 @@ accelerations from root to tips. Rows as in layout.py.
 from __future__ import annotations
 
 from morphcore.aero.kernels.loads import (
+    CONTROL0,
     LINK0,
     LINKS,
     PAIRED,
+    control_inputs,
     lagged_motion,
     lane_product,
     link_wrench,
@@ -200,6 +202,15 @@ def accelerations(
     effective = scratch[w_effective : w_effective + 3 * links]
     for s in range(surfaces.shape[0]):
         strip_inputs(lanes, surfaces[s], ranges, strips, overlap, effective, inputs)
+        if surfaces[s, CONTROL0] >= 0:
+            for k in range(surfaces[s, LINKS]):
+                link = surfaces[s, LINK0] + k
+                control_inputs(
+                    lanes, surfaces[s], k, ranges, overlap,
+                    constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                    scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
+                    inputs,
+                )  # fmt: skip
     lane_product(lanes, operator, inputs, outputs)
     for s in range(surfaces.shape[0]):
         for k in range(surfaces[s, LINKS]):

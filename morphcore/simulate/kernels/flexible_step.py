@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.lattice_forces import blocked_flow, place_lattice, section_forces
+from morphcore.aero.kernels.lattice_forces import blocked_flow, deflect, place_lattice, section_forces
 from morphcore.aero.kernels.lattice_place import refine
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.jit import entry_kernel, inlined
@@ -100,7 +100,7 @@ class Structure(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Prescribed motion of all hinges, `simulate.flexible.HingePath`, and wind_N (k, 3) at its times."""
+    """Prescribed motion of hinges and controls, `simulate.flexible.HingePath`, and wind_N (k, 3)."""
 
     R_BW: Array
     origin_B: Array
@@ -108,6 +108,7 @@ class Path(NamedTuple):
     rate: Array
     acceleration: Array
     wind_N: Array
+    deflection: Array
 
 
 class Rule(NamedTuple):
@@ -355,6 +356,7 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
             for j in range(3):
                 wind_B[i] += trial.R[0, j, i] * path.wind_N[row, j]
         if iteration == 0:
+            deflect(parts, place, path.deflection[row])
             _place(structure, parts, place, trial, scratch, wind_B)
         section_twists(
             structure.ends, structure.section_element, structure.section_blocks, trial.V, scratch.twists
