@@ -48,7 +48,8 @@ class ResultWarning:
 class AirMotion:
     """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
-    The incidence is the angle of attack of the body, or of the surface whose hinges incline it furthest.
+    The incidence is the angle of attack of the body, or of the surface that its own incidence and hinges
+    incline furthest.
     """
 
     time_s: Array
@@ -61,7 +62,8 @@ def air_motion(
 ) -> AirMotion:
     """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
-    A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream.
+    A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream; of a
+    surface's own incidence counts what its dihedral leaves in the vertical.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
@@ -69,9 +71,10 @@ def air_motion(
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
     across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
     inclined = [
-        sum(angles[:, k] * across[k] for k in range(own.start, own.stop))
-        for own in aircraft.hinge_columns
-        if across[own].any()
+        surface.incidence_rad * np.cos(surface.dihedral_rad)
+        + sum(angles[:, k] * across[k] for k in range(own.start, own.stop))
+        for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
+        if across[own].any() or surface.incidence_rad
     ]
     incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]

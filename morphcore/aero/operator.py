@@ -177,7 +177,7 @@ def lattice_operator(
         return np.asarray(induced[:, :rings] + induced[:, rings:] if lattice.images else induced)
 
     induced = along(normal)
-    circulation = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
+    circulation: Array = np.linalg.solve(induced[:rings], _boundary(lattice))  # (rings, inputs)
     flow = [induced[rings:] @ circulation]
     if lattice.has_more_outputs:
         flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
@@ -280,8 +280,8 @@ class _Edges:
     corners : (chordwise + 1, spanwise, 2, 3) of the rings, at the root and tip side of each strip. front :
     (chordwise, spanwise, 3) and side : (chordwise, spanwise, 2, 3) edges, in the sense of the lifting
     circulation but for the root side. area, centre_x : (chordwise, spanwise) of the rings. share : the same,
-    of each ring's circulation in that of the strip's last ring, and bound : on each front. width : (spanwise,)
-    along the axis. sign : of the span.
+    of each ring's circulation in that of the strip's last ring, and bound : on each front. width :
+    (spanwise,) along the axis. sign : of the span.
     """
 
     corners: Array
@@ -310,9 +310,7 @@ class _Edges:
         """Moment about z (spanwise, inputs) of the forces that a normal velocity makes in the plane."""
         front = 0.5 * (self.corners[:-1, :, 0] + self.corners[:-1, :, 1])
         side = 0.5 * (self.corners[:-1] + self.corners[1:])
-        return self.summed(
-            flow, np.sum(front * self.front, axis=-1), np.sum(side * self.side, axis=-1)
-        )
+        return self.summed(flow, np.sum(front * self.front, axis=-1), np.sum(side * self.side, axis=-1))
 
     def columns(self, chord_W: Array) -> Array:
         """Columns (spanwise, STRIP_COLUMNS) of the strips."""

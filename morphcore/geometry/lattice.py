@@ -19,8 +19,7 @@ CONTROL_POINT = 0.75  # of panel chord (Katz & Plotkin 2001, section 12.3; James
 
 @dataclass(frozen=True)
 class SurfaceLattice:
-    """Panels, vortex rings and control points of one surface, uniformly spaced; panels of swept surfaces are
-    oblique.
+    """Panels, vortex rings and control points of one surface, uniformly spaced; oblique if it is swept.
 
     Row i = 0..chordwise-1 counts from the leading edge, strip j = 0..spanwise-1 from the root to the tip, on
     either side. Positions are in the surface's wing axes W (origin root mid-chord, x forward, y right, z

@@ -64,9 +64,7 @@ def torques_and_rates(
         operators, strips = plan.table.between(part.start, part.stop)
         screws = np.concatenate(
             [
-                hinge_screws(
-                    surface.hinges, surface.root_arms_B, plan.angles[part, own], surface.rest_R_BW
-                )
+                hinge_screws(surface.hinges, surface.root_arms_B, plan.angles[part, own], surface.rest_R_BW)
                 for surface, own in zip(surfaces, hinges_of, strict=True)
             ],
             axis=1,

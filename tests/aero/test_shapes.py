@@ -105,7 +105,7 @@ def of_links(shape: Aircraft, twist_B: Array) -> Array:
 
 
 def assert_close(found: Loads, expected: Loads, share: float) -> None:
-    """Each force and moment within a share of itself; what should vanish within a hundredth of that of lift."""
+    """Each force and moment within a share of itself; what should vanish within a hundredth of lift's."""
     tiny = 0.01 * share * abs(expected.force[2])
     np.testing.assert_allclose(found.force, expected.force, rtol=share, atol=tiny)
     np.testing.assert_allclose(found.moment, expected.moment, rtol=share, atol=tiny)
@@ -143,7 +143,13 @@ def test_links_against_aerosandbox(name: str, alpha: float, beta: float) -> None
 CLOSE = aircraft(
     *pair("wing", 2.0, (0.6, 0.3), sweep_rad=-0.4, dihedral_rad=0.5, elastic_axis_offset_m=0.06),
     *pair(
-        "tail", 1.2, (0.4, 0.4), sweep_rad=0.6, dihedral_rad=-0.6, incidence_rad=0.1, position_m=[-1.2, 0.0, 0.2]
+        "tail",
+        1.2,
+        (0.4, 0.4),
+        sweep_rad=0.6,
+        dihedral_rad=-0.6,
+        incidence_rad=0.1,
+        position_m=[-1.2, 0.0, 0.2],
     ),
     surface("fin", "left", 0.8, (0.5, 0.2), sweep_rad=0.7, dihedral_rad=1.4, position_m=[-0.8, 0.1, -0.3]),
 )
@@ -154,9 +160,9 @@ CLOSE = aircraft(
 def test_links_against_all_edges(name: str, omega: tuple[float, float, float]) -> None:
     """Every surface's six loads are those of all edges of the lattice, in sideslip, with rates.
 
-    Within 0.1 per cent of the lift and of lift times span without rates, 0.3 per cent at a roll, pitch and yaw
-    rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 2.5 per cent, the tail's pitch
-    moment, because what is induced in its plane acts at the strips' centres.
+    Within 0.1 per cent of the lift (moments: times a metre) without rates, 0.3 per cent at a roll, pitch, yaw
+    rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 2.5 per cent, the
+    tail's pitch moment, because what is induced in its plane acts at the strips' centres.
     """
     shape = CLOSE if name == "close" else SHAPES[name]
     twist = np.concatenate([omega, velocity(0.08, 0.05)])
@@ -190,7 +196,9 @@ def test_aerodynamic_centre_moves_along_the_chord() -> None:
     model = chain_model(SHAPES["swept"], FLIGHT, 1)
     twist = np.concatenate([np.zeros(3), velocity(0.08, 0.1)])
     plain, shifted = dragless(model), dragless(model, ac_offset_m=np.array([0.02]))
-    base, moved = (lane_loads(model, b, *settled(model, b, np.zeros(0), twist)).wrench for b in (plain, shifted))
+    base, moved = (
+        lane_loads(model, b, *settled(model, b, np.zeros(0), twist)).wrench for b in (plain, shifted)
+    )
     for each, before, after in zip(model.aircraft.surfaces, base, moved, strict=True):
         expected = np.cross(0.02 * each.chord_W, before[3:])
         np.testing.assert_allclose(after[:3] - before[:3], expected, rtol=0.0, atol=1e-12)
@@ -198,7 +206,7 @@ def test_aerodynamic_centre_moves_along_the_chord() -> None:
 
 
 def test_lattice_of_a_swept_surface() -> None:
-    """Chords lie along the root's, the area is span times mean chord, the mid-chord line span / cos(sweep)."""
+    """Chords lie along the root's, the area is span times mean chord, its mid line span / cos(sweep)."""
     for each in SHAPES["swept"].surfaces:
         part = surface_lattice(each, DEFAULT_LATTICE.chordwise, DEFAULT_LATTICE.spanwise)
         R_BW, r_B = surface_pose(each)
@@ -207,7 +215,9 @@ def test_lattice_of_a_swept_surface() -> None:
         root = chords[0] / np.linalg.norm(chords[0])
         np.testing.assert_allclose(root, [np.cos(0.05), 0.0, -np.sin(0.05)], atol=1e-15)
         np.testing.assert_allclose(np.cross(chords, root), 0.0, atol=1e-15)
-        np.testing.assert_allclose(np.linalg.norm(chords, axis=1), each.chord_at(part.strip_edges_m), rtol=1e-14)
+        np.testing.assert_allclose(
+            np.linalg.norm(chords, axis=1), each.chord_at(part.strip_edges_m), rtol=1e-14
+        )
         tip = 0.5 * (corners_B[0, -1] + corners_B[-1, -1])
         assert tip[1] == pytest.approx(each.span_sign * 3.0, rel=1e-14)
         assert np.linalg.norm(tip) == pytest.approx(3.0 / np.cos(0.5), rel=1e-14)

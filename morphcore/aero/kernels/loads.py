@@ -3,17 +3,17 @@
 The lattice is fixed on the undeformed surface; its strips ride on the links. A strip that spans a joint
 belongs to both links in proportion to its width on each (``overlap``), so that loads are continuous in the
 division lengths. The operator maps the normal velocity of the strips (two inputs each: at the link axis, and
-its slope along the chord, which is oblique in link axes on a swept surface) to five outputs each, from which the Kutta-Joukowski forces on all bound edges
-follow (see aero/operator.py for their derivation):
+its slope along the chord, which is oblique in link axes on a swept surface) to five outputs each, from which
+the Kutta-Joukowski forces on all bound edges follow (see aero/operator.py for their derivation):
 
     0  g = Gamma dy       circulation at the trailing edge times strip width, m^3/s
     1  S = sum Gamma_i A_i              vortex moment of the strip's rings, m^4/s
     2  X = sum Gamma_i A_i x_i          its chordwise moment, m^5/s
-    3  w_x   induced normal velocity weighted by the bound spanwise circulation, m/s
-    4  w_y   the same for the chordwise edges, m/s
+    3  w_x   induced normal velocity weighted by the bound circulation along y, m/s
+    4  w_y   the same for that along x, m/s
 
-Both are sums over all bound edges, by their components along y and x, per circulation and width of the
-strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all strips:
+Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces are oblongs in
+one plane, two more outputs of each strip follow those of all strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
