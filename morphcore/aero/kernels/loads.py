@@ -32,9 +32,9 @@ from morphcore.lanes import not_in_lanes
 OUTPUTS, MORE_OUTPUTS = 5, 2
 # columns of the table of strips, in link axes about each strip's middle on the link axis (the elastic axis),
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
-# lifting circulation, per width of the strip; unit vector of the chord, forward
-EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y = 0, 1, 2, 3, 4, 5, 6
-STRIP_COLUMNS = 7
+# lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x
+EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7
+STRIP_COLUMNS = 8
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward)
@@ -168,7 +168,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         out = outputs[OUTPUTS * strip : OUTPUTS * strip + OUTPUTS]
         edge, centre = strips[strip, EDGE_X], strips[strip, CENTRE_X]
         ex, ey, aside = strips[strip, EDGE_DX], strips[strip, EDGE_DY], strips[strip, EDGE_Y]
-        skew = strips[strip, CHORD_Y] / strips[strip, CHORD_X]
+        slope = strips[strip, CHORD_SLOPE]
         behind = centre - edge
         for l in range(len(lanes)):
             wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
@@ -181,7 +181,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
             forward, across = ey * suction, ex * suction
             back = g * (wy * behind + out[3, l])
             sums[0, l] -= edge_y * lift + moment * twist[4, l] + weight * out[2, l] * wz
-            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * skew
+            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * slope
             sums[2, l] += y * back - edge_y * forward - edge * across
             sums[3, l] += forward - back
             sums[4, l] += moment * wx - across - g * out[4, l]
@@ -191,7 +191,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
             for l in range(len(lanes)):
                 g = part[0, l] * out[0, l]
                 normal = g * more[0, l]
-                sums[0, l] += (part[1, l] + centre * skew) * normal
+                sums[0, l] += (part[1, l] + centre * slope) * normal
                 sums[1, l] -= centre * normal
                 sums[2, l] += g * more[1, l]
                 sums[5, l] += normal
