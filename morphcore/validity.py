@@ -56,7 +56,7 @@ class ResultWarning:
 class AirMotion:
     """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
-    The incidence is that of the body, or of the section which hinges and twist incline furthest.
+    The incidence is that of the body, or of the section that incidence, hinges and twist incline furthest.
     """
 
     time_s: Array
@@ -70,21 +70,20 @@ def air_motion(
     """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
     A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream, twist its
-    tip once more.
+    tip once more; of a surface's own incidence counts what its dihedral leaves in the vertical.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
     air_B = np.einsum("kij,ki->kj", R_NB, air_N)
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
     across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
-    inclined = [
-        sum(angles[:, k] * across[k] for k in range(own.start, own.stop))
-        for own in aircraft.hinge_columns
-        if across[own].any()
-    ]
+    inclined = []
     for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
+        root = surface.incidence_rad * np.cos(surface.dihedral_rad) + angles[:, own] @ across[own]
+        if across[own].any() or surface.incidence_rad:
+            inclined.append(root)
         if surface.twist_rad:
-            inclined.append(surface.twist_rad + angles[:, own] @ across[own])
+            inclined.append(root + surface.twist_rad)
     incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
     return AirMotion(time_s, furthest, np.asarray(np.linalg.norm(air_N, axis=1)))

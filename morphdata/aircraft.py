@@ -170,7 +170,8 @@ class Surface(Document):
     sweep_rad: Annotated[float, Field(ge=-MAX_SWEEP_RAD, le=MAX_SWEEP_RAD)] = Field(
         default=0.0,
         description="Sweep of the mid-chord line, aft, in the plane of the surface; chords stay parallel to "
-        "the root's. `span_m` is measured across the root chord: that line is span / cos(sweep) long.",
+        "the root's. `span_m` is measured across the root chord: the mid-chord line is span / cos(sweep) "
+        "long.",
     )
     dihedral_rad: Annotated[float, Field(ge=-MAX_DIHEDRAL_RAD, le=MAX_DIHEDRAL_RAD)] = Field(
         default=0.0, description="Tip up; pi / 2 makes a vertical fin."

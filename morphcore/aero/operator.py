@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from morphcore.aero.kernels.loads import (
     CENTRE_X,
+    CHORD_SLOPE,
     CHORD_X,
     CHORD_Y,
     EDGE_DX,
@@ -208,7 +209,7 @@ def lattice_operator(
         return np.asarray(induced[:, :rings] + induced[:, rings:] if lattice.images else induced)
 
     induced = along(normal)
-    circulation = np.asarray(np.linalg.solve(induced[:rings], _boundary(lattice)), dtype=np.float64)
+    circulation = np.asarray(np.linalg.solve(induced[:rings], _boundary(lattice)), np.float64)
     flow = [induced[rings:] @ circulation]
     if lattice.has_more_outputs:
         flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
@@ -368,6 +369,7 @@ class _Edges:
         out[:, CENTRE_X] = np.sum(self.bound * middle_x[:-1], axis=0)
         out[:, EDGE_DX], out[:, EDGE_DY] = trailing[:, 0], trailing[:, 1]
         out[:, CHORD_X], out[:, CHORD_Y] = chord_W[0], chord_W[1]
+        out[:, CHORD_SLOPE] = chord_W[1] / chord_W[0]
         return out
 
 

@@ -13,8 +13,8 @@ from 0 here (in MATLAB files from 1).
     By their names, ``division`` (f, n), ``stiffness_nm_rad`` and ``damping_nms_rad`` (f, n - 1, 3) of flap,
     torsion and edgewise, others (f,), or () for the whole aircraft; ``surface_index`` (f,).
 ``surfaces``
-    ``name``, ``side`` (s,); ``root_m`` (s, 3) origin of the first link in B; ``first_link_index``, ``links``
-    (s,).
+    ``name``, ``side`` (s,); ``root_m`` (s, 3) origin of the first link in B; ``rotation`` (s, 3, 3) of the
+    surface's axes to B with all hinges at zero; ``first_link_index``, ``links`` (s,).
 ``links``
     ``surface_index`` (l,); ``length_m`` (l,); ``origin_m`` (l, 3) from the origin of the link before, in its
     axes (of a first link from the reference point, in B); ``mass_kg`` (l,); ``centre_of_mass_m`` (l, 3) and

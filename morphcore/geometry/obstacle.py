@@ -92,7 +92,7 @@ def load_per_length(aircraft: Aircraft, flight: Flight) -> float:
 
 def _share_of_lift(surface: Surface) -> float:
     """Cosine of the dihedral: fins carry no weight."""
-    return float(abs(surface.rest_R_BW[2, 2])) if surface.dihedral_rad else 1.0
+    return float(abs(np.cos(surface.dihedral_rad)))
 
 
 def _mass(aircraft: Aircraft) -> float:

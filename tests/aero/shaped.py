@@ -82,9 +82,8 @@ def of_aerosandbox(
                     np.array([0.0, each.span_sign * distance, 0.0]) + 0.5 * chord * each.chord_W
                 )
                 sections.append((leading_B * [-1.0, 1.0, -1.0], chord, np.degrees(each.incidence_rad)))
-            if each.side == "left":  # their wings run from left to right
-                sections.reverse()
-            wings.append(_wing(asb, sections))
+            # their wings run from left to right
+            wings.append(_wing(asb, sections if each.side == "right" else sections[::-1]))
         plane = asb.Airplane(wings=wings, xyz_ref=[0, 0, 0], s_ref=1.0, c_ref=1.0, b_ref=1.0)
         result = asb.VortexLatticeMethod(
             plane,

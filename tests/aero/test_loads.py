@@ -96,8 +96,8 @@ def test_rates(angles, omega):
 def test_odd_surfaces():
     """Tapered wings off mid-chord and a tail, all in one plane: exact.
 
-    Out of one plane what surfaces induce along each other's planes acts at the strips' centres: its moments are
-    within half a per cent of lift times span.
+    Out of one plane what surfaces induce along each other's planes acts at the strips' centres: its
+    moments are within half a per cent of lift times span.
     """
     aircraft = odd_aircraft(np.random.default_rng(3))
     aircraft = replace(aircraft, surfaces=tuple(replace(s, profile_drag=0.0) for s in aircraft.surfaces))

@@ -105,7 +105,7 @@ def of_links(shape: Aircraft, twist_B: Array) -> Array:
 
 
 def assert_close(found: Loads, expected: Loads, share: float) -> None:
-    """Each force and moment within a share of itself; what should vanish within a hundredth of that of lift."""
+    """Each force and moment within a share of itself; what should vanish within a hundredth of lift's."""
     tiny = 0.01 * share * abs(expected.force[2])
     np.testing.assert_allclose(found.force, expected.force, rtol=share, atol=tiny)
     np.testing.assert_allclose(found.moment, expected.moment, rtol=share, atol=tiny)
@@ -160,9 +160,9 @@ CLOSE = aircraft(
 def test_links_against_all_edges(name: str, omega: tuple[float, float, float]) -> None:
     """Every surface's six loads are those of all edges of the lattice, in sideslip, with rates.
 
-    Within 0.1 per cent of the lift and of lift times span without rates, 0.3 per cent at a roll, pitch and yaw
-    rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 2.5 per cent, the tail's pitch
-    moment, because what is induced in its plane acts at the strips' centres.
+    Within 0.1 per cent of the lift (moments: times a metre) without rates, 0.3 per cent at a roll, pitch, yaw
+    rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 2.5 per cent, the
+    tail's pitch moment, because what is induced in its plane acts at the strips' centres.
     """
     shape = CLOSE if name == "close" else SHAPES[name]
     twist = np.concatenate([omega, velocity(0.08, 0.05)])
@@ -206,7 +206,7 @@ def test_aerodynamic_centre_moves_along_the_chord() -> None:
 
 
 def test_lattice_of_a_swept_surface() -> None:
-    """Chords lie along the root's, the area is span times mean chord, the mid-chord line span / cos(sweep)."""
+    """Chords lie along the root's, the area is span times mean chord, its mid line span / cos(sweep)."""
     for each in SHAPES["swept"].surfaces:
         part = surface_lattice(each, DEFAULT_LATTICE.chordwise, DEFAULT_LATTICE.spanwise)
         R_BW, r_B = surface_pose(each)

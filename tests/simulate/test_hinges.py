@@ -189,7 +189,8 @@ def test_two_hinges_in_one_place_are_one(kind):
     """
     again = {**CANT, "name": "more"}
     single, double = hinged_wings(CANT), hinged_wings(CANT, again)
-    a, b = ConstantRate(0.0, 0.3, 0.4), ConstantRate(0.0, 0.2, 0.5)
+    # their sum in 0.3 s is no whole number of the table's spacings, at which round-off would add a node
+    a, b = ConstantRate(0.0, 0.29, 0.4), ConstantRate(0.0, 0.2, 0.5)
     times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
     class Sum:
@@ -199,7 +200,7 @@ def test_two_hinges_in_one_place_are_one(kind):
             one, other = a.motion(time_s), b.motion(time_s)
             return type(one)(*(getattr(one, n) + getattr(other, n) for n in vars(one)))
 
-    assert Sum().motion(times).angle[-1] == pytest.approx(0.5)
+    assert Sum().motion(times).angle[-1] == pytest.approx(0.49)
     model = guess_of(single) if kind == "equivalent" else kind
     found = flown(double, {"cant": a, "more": b}, model, 0.3).trajectory
     expected = flown(single, {"cant": Sum()}, model, 0.3).trajectory

@@ -9,12 +9,11 @@ the Kutta-Joukowski forces on all bound edges follow (see aero/operator.py for t
     0  g = Gamma dy       circulation at the trailing edge times strip width, m^3/s
     1  S = sum Gamma_i A_i              vortex moment of the strip's rings, m^4/s
     2  X = sum Gamma_i A_i x_i          its chordwise moment, m^5/s
-    3  w_x   induced normal velocity weighted by the bound spanwise circulation, m/s
-    4  w_y   the same for the chordwise edges, m/s
+    3  w_x   induced normal velocity weighted by the bound circulation along y, m/s
+    4  w_y   the same for that along x, m/s
 
-Both are sums over all bound edges, by their components along y and x, per circulation and width of the
-strip. Unless all surfaces are oblongs in one plane, two more outputs of each strip follow those of all
-strips:
+Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces are oblongs in
+one plane, two more outputs of each strip follow those of all strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
@@ -33,9 +32,9 @@ from morphcore.lanes import not_in_lanes
 OUTPUTS, MORE_OUTPUTS = 5, 2
 # columns of the table of strips, in link axes about each strip's middle on the link axis (the elastic axis),
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
-# lifting circulation, per width of the strip; unit vector of the chord, forward
-EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y = 0, 1, 2, 3, 4, 5, 6
-STRIP_COLUMNS = 7
+# lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x
+EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7
+STRIP_COLUMNS = 8
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
@@ -222,7 +221,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         out = outputs[OUTPUTS * strip : OUTPUTS * strip + OUTPUTS]
         edge, centre = strips[strip, EDGE_X], strips[strip, CENTRE_X]
         ex, ey, aside = strips[strip, EDGE_DX], strips[strip, EDGE_DY], strips[strip, EDGE_Y]
-        skew = strips[strip, CHORD_Y] / strips[strip, CHORD_X]
+        slope = strips[strip, CHORD_SLOPE]
         behind = centre - edge
         for l in range(len(lanes)):
             wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
@@ -235,7 +234,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
             forward, across = ey * suction, ex * suction
             back = g * (wy * behind + out[3, l])
             sums[0, l] -= edge_y * lift + moment * twist[4, l] + weight * out[2, l] * wz
-            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * skew
+            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * slope
             sums[2, l] += y * back - edge_y * forward - edge * across
             sums[3, l] += forward - back
             sums[4, l] += moment * wx - across - g * out[4, l]
@@ -245,7 +244,7 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
             for l in range(len(lanes)):
                 g = part[0, l] * out[0, l]
                 normal = g * more[0, l]
-                sums[0, l] += (part[1, l] + centre * skew) * normal
+                sums[0, l] += (part[1, l] + centre * slope) * normal
                 sums[1, l] -= centre * normal
                 sums[2, l] += g * more[1, l]
                 sums[5, l] += normal
