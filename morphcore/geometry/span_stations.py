@@ -107,7 +107,7 @@ class SpanStations:
         values = np.array(every)
         slopes = np.diff(values, axis=1) / np.diff(at)
         size = np.abs(values).max(axis=1, keepdims=True) / np.diff(at).min()
-        return at[1:-1][(np.abs(np.diff(slopes, axis=1)) > SAME_SLOPE * size).any(axis=0)]
+        return np.asarray(at[1:-1][(np.abs(np.diff(slopes, axis=1)) > SAME_SLOPE * size).any(axis=0)])
 
     @property
     def mean_chord_m(self) -> float:

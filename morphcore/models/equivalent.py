@@ -101,8 +101,8 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 6) first link, links, first strip, strips, first overlap pair of each surface, and whether
-        it also represents its mirror image.
+    surfaces : (s, 8) first link, links, first strip, strips, first overlap pair of each surface; whether it
+        also represents its mirror image, may have a bent trailing edge, and carries point masses.
     """
 
     aircraft: Aircraft
@@ -289,7 +289,8 @@ def _chain_model(
     rows, link, pair = [], 0, 0
     for surface, part, strip0 in zip(aircraft.surfaces, lattices.lattices, lattices.strip0, strict=True):
         count = links_per_wing if surface.flexible else 1
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images))])
+        bent, lumped = surface.stations is not None, bool(surface.point_masses)
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), int(bent), int(lumped)])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))

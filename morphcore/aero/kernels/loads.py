@@ -33,9 +33,8 @@ L_LIFT, L_CENTRE = 14, 15
 JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
-SAME_SLOPE = 1e-9  # of trailing edges: round-off of one straight edge
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED = 0, 1, 2, 3, 4, 5
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, BENT, LUMPED = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 @kernel
@@ -201,15 +200,13 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         wrench[3, l] = fx + dx
         wrench[4, l] = fy + dy
         wrench[5, l] = fz + dz
-    bend_edge(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, wrench)
+    if surface[BENT]:
+        bend_edge(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, wrench)
 
 
 @kernel
 def bend_edge(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, wrench):
-    """Add to a link's wrench what strips add whose trailing edge has another slope than the first one's.
-
-    Costs a comparison for each strip where taper is linear.
-    """
+    """Add to a link's wrench what strips add whose trailing edge has another slope than the first one's."""
     if (
         not_in_lanes(overlap, lanes)
         or not_in_lanes(outputs, lanes)
@@ -222,15 +219,14 @@ def bend_edge(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, 
     for j in range(ranges[number, 0], ranges[number, 1]):
         strip = surface[STRIP0] + j
         bend = strips[strip, 2] - strips[surface[STRIP0], 2]
-        if abs(bend) > SAME_SLOPE:
-            pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
-            part = overlap[pair : pair + 2]
-            g = outputs[OUTPUTS * strip]
-            edge = strips[strip, 0]
-            for l in range(len(lanes)):
-                pull = density * bend * part[0, l] * g[l]
-                across = pull * twist[4, l]
-                fz = across + pull * edge * twist[2, l]
-                wrench[0, l] += part[1, l] * fz
-                wrench[1, l] -= edge * across + link[L_CENTRE, l] * fz
-                wrench[5, l] += fz
+        pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
+        part = overlap[pair : pair + 2]
+        g = outputs[OUTPUTS * strip]
+        edge = strips[strip, 0]
+        for l in range(len(lanes)):
+            pull = density * bend * part[0, l] * g[l]
+            across = pull * twist[4, l]
+            fz = across + pull * edge * twist[2, l]
+            wrench[0, l] += part[1, l] * fz
+            wrench[1, l] -= edge * across + link[L_CENTRE, l] * fz
+            wrench[5, l] += fz

@@ -9,6 +9,7 @@ from __future__ import annotations
 from morphcore.aero.kernels.loads import (
     LINK0,
     LINKS,
+    LUMPED,
     PAIRED,
     lagged_motion,
     lane_product,
@@ -42,6 +43,7 @@ from morphcore.multibody.kernels.articulated import (
     accumulate_pair,
     add_bias,
     add_link,
+    add_lump,
     solve_base,
 )
 from morphcore.multibody.kernels.gimbal import (
@@ -236,6 +238,9 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
                 inertia,
                 carried,
             )
+            if surfaces[s, LUMPED]:
+                twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
+                add_lump(lanes, rows, twist, inertia, carried)
             if k == 0:
                 add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
                 carry_through_hinge(lanes, hinges[s], inertia, carried)
