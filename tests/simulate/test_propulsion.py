@@ -108,6 +108,17 @@ def test_a_reported_start_can_be_given_again(kind: dict[str, Any]) -> None:
     np.testing.assert_allclose(again.thrust_moment_B, found.thrust_moment_B, rtol=1e-12, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind["model"])
+def test_the_example_with_pods_flies(kind: dict[str, Any]) -> None:
+    """It trims and stays level; its engine above pitches it down by what the rest of the moment makes up."""
+    document = load_aircraft(EXAMPLES / "pods" / "aircraft.json").model_dump(exclude_none=True)
+    aircraft = aircraft_of(document)
+    assert mirror_of(aircraft, example_flight()) is not None
+    found = started(aircraft, kind, replace(example_flight(), start=None))
+    assert 0.0 < found.alpha[0] < 0.15
+    np.testing.assert_allclose(found.thrust_moment_B[0, 1], -0.45 * found.force_B[0, 0], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("line", "code", "field"),
     [
