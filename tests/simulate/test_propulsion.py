@@ -12,11 +12,13 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, Start
 from morphcore.geometry.mirror import mirror_of
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.trim import Trim, trim
 from morphdata.aircraft import load_aircraft
 from tests.models.chains import EXAMPLES, aircraft_of, example_flight, instant
 from tests.simulate.flights import fly
+from tests.simulate.test_request import request
 from tests.simulate.test_trim import start_rates
 
 STILL = np.zeros((2, 3))
@@ -72,6 +74,22 @@ def test_an_inclined_line_carries_weight(kind: dict[str, Any]) -> None:
     assert found.alpha[0] < plain.alpha[0]
     moment = np.cross([-1.0, 0.0, 0.0], found.force_B[0])
     np.testing.assert_allclose(found.thrust_moment_B[0], moment, rtol=1e-12, atol=1e-9)
+
+
+def test_results_tell_the_moment_of_the_thrust() -> None:
+    """The document of a flight has the moment of the thrust and that beyond it; without a line only one."""
+    aircraft = load_aircraft(EXAMPLES / "aircraft.json").model_dump(exclude_none=True)
+    line = {"position_m": [0.0, 0.0, -HEIGHT_M]}
+    found = []
+    for more in ({"propulsion": line}, {}):
+        run = simulation_from_document(request(aircraft=aircraft | more))
+        found.append(run.result().to_document()["trim"])
+    above, plain = found
+    assert "thrust_moment_b_n_m" not in plain
+    assert above["thrust_moment_b_n_m"][1] == pytest.approx(-HEIGHT_M * above["force_b_n"][0], rel=1e-12)
+    moment = above["moment_b_n_m"][1] + above["thrust_moment_b_n_m"][1]
+    # the thrust along body x instead of the path lifts less, so that the wings carry 0.2 per cent more
+    assert moment == pytest.approx(plain["moment_b_n_m"][1], rel=0.01)
 
 
 def test_without_a_line_the_thrust_is_along_the_path() -> None:
