@@ -162,9 +162,14 @@ class TrimState(Result):
 
     alpha_rad: float
     force_b_n: list[float]
-    moment_b_n_m: list[float]
+    moment_b_n_m: list[float] = Field(
+        description="Beyond the moment of the thrust if the aircraft has a line of thrust."
+    )
     drives_rad: dict[str, float] | None = Field(
         default=None, description="Angles found for the flight's `trim_drive`; absent without one."
+    )
+    thrust_moment_b_n_m: list[float] | None = Field(
+        default=None, description="Moment of the thrust by the aircraft's line of thrust, if it has one."
     )
 
 

@@ -133,8 +133,8 @@ def station_faults(
             straight = 0.5 + (axes[0] - stations[number].aft_m) / own[number]
             yield Fault(
                 "axis_not_straight",
-                f"The elastic axis lies {axis:g} m aft of the root's mid-chord, but {axes[0]:g} m at the "
-                "root: an axis that bends is not supported yet.",
+                f"The elastic axis lies {axis:g} m aft of the root's mid-chord, {axes[0]:g} m at the root: "
+                "an axis that bends is not supported yet.",
                 f"/stations/{number}/elastic_axis",
                 f"On the straight axis, elastic_axis is {straight:.9g} here.",
             )

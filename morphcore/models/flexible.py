@@ -168,9 +168,9 @@ def element_sections(surface: Surface, start_m: float, length_m: float, lumps: A
     if np.any((kinks > KINK * length_m) & (kinks < (1.0 - KINK) * length_m)):
         ends = start_m + length_m * np.array([0.0, *np.cumsum(GAUSS_WEIGHTS)[:-1], 1.0])
         ends[-1] = min(ends[-1], surface.length_m)
-        every, width = span_points(surface, ends, POINTS, WEIGHTS)
+        every, length, rule = span_points(surface, ends, POINTS, WEIGHTS)
         sections = []
-        for point, stations, weight in zip(points, every, width, strict=True):
+        for point, stations, weight in zip(points, every, length * rule, strict=True):
             share = (weight / weight.sum())[:, None, None]
             of = beam_sections(surface, stations)
             arms = np.zeros((stations.size, 3))
@@ -219,8 +219,8 @@ def fuselage_inertia(fuselage: Fuselage) -> Array:
 
 def rigid_surface_inertia(surface: Surface) -> Array:
     """Spatial inertia (6, 6) of an unbent surface about its root node, in W."""
-    distance, width = span_points(surface, np.array([0.0, surface.length_m]), POINTS, WEIGHTS)
-    distance, width = distance.ravel(), width.ravel()
+    stations, length, rule = span_points(surface, np.array([0.0, surface.length_m]), POINTS, WEIGHTS)
+    distance, width = stations[0], (0.5 * length * rule)[0]
     properties = surface.section_at(distance)
     ahead = surface.mass_arm_at(distance)
     total = surface_lumps(surface)

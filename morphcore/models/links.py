@@ -37,7 +37,8 @@ def link_masses(surface: Surface, edges: Array) -> Array:
     m^2).
     """
     start = edges[:, :-1, None]
-    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
+    stations, length, rule = span_points(surface, edges, POINTS, WEIGHTS)
+    weight = 0.5 * length * rule
     section = surface.section_at(stations.ravel())
     mass, ix, iy, iz = (
         value.reshape(stations.shape) * weight
@@ -120,8 +121,8 @@ def _segment_compliance(surface: Surface, ends: Array) -> tuple[Array, Array]:
     compliance : ndarray, shape (3, p, n - 1, points)
         Flap, torsion, edgewise: weight times (L - y) over EI or GJ; the sum over points is the integral.
     """
-    stations, weight = span_points(surface, ends, BEAM_POINTS, BEAM_WEIGHTS)
-    moment = weight * (surface.length_m - stations)
+    stations, length, rule = span_points(surface, ends, BEAM_POINTS, BEAM_WEIGHTS)
+    moment = 0.5 * length * rule * (surface.length_m - stations)
     section = surface.section_at(stations.ravel())
     stiffness = np.stack([section.ei_flap, section.gj, section.ei_edge]).reshape(3, *stations.shape)
     return stations, moment / stiffness
@@ -165,8 +166,15 @@ def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     Where the profile drag varies along the span, the area is weighted by it (`Surface.drag_share_at`).
     """
     start = edges[:, :-1, None]
-    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
-    chord = surface.chord_at(stations) * surface.chord_W[0] * weight * surface.drag_share_at(stations)
+    stations, length, rule = span_points(surface, edges, POINTS, WEIGHTS)
+    chord = (
+        surface.chord_at(stations)
+        * surface.chord_W[0]
+        * 0.5
+        * length
+        * rule
+        * surface.drag_share_at(stations)
+    )
     area = chord.sum(-1)
     return area, surface.span_sign * (chord * (stations - start)).sum(-1) / area
 
@@ -174,7 +182,7 @@ def drag_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
 def moment_areas(surface: Surface, edges: Array) -> tuple[Array, Array]:
     """Integral of the chord squared (particles, n) over each link in m^3, and the y of its centroid, m."""
     start = edges[:, :-1, None]
-    stations, weight = span_points(surface, edges, POINTS, WEIGHTS)
-    squared = surface.chord_at(stations) ** 2 * surface.chord_W[0] * weight
+    stations, length, rule = span_points(surface, edges, POINTS, WEIGHTS)
+    squared = surface.chord_at(stations) ** 2 * surface.chord_W[0] * 0.5 * length * rule
     total = squared.sum(-1)
     return total, surface.span_sign * (squared * (stations - start)).sum(-1) / total

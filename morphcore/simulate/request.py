@@ -60,6 +60,7 @@ class SimulationResult(Shown):
     def to_document(self) -> Document:
         """JSON form with the names of the API; the summary's angles are departures from the start."""
         flown, trim = self.trajectory, self.simulation.trim
+        driven = bool(trim.thrust_moment_B.any())
         return {
             "model": model_document(self.model, self.simulation.step_s),
             "trim": {
@@ -67,6 +68,7 @@ class SimulationResult(Shown):
                 "force_b_n": trim.force_B[0].tolist(),
                 "moment_b_n_m": trim.moment_B[0].tolist(),
                 **({"drives_rad": dict(self.simulation.trim_drives)} if self.simulation.trim_drives else {}),
+                **({"thrust_moment_b_n_m": trim.thrust_moment_B[0].tolist()} if driven else {}),
                 "tip_z_m": {side: self.simulation.start_tips_z.get(side) for side in SIDES},
             },
             "trajectory": trajectory_document(flown),

@@ -27,6 +27,7 @@ from morphcore.simulate.batch import state_rates
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, hinge_path, set_in_motion
 from morphcore.simulate.flexible_trim import trim_flexible
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.torque import hinge_torques
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.aircraft import load_aircraft
 from morphdata.operations.identify import _mirror_groups
@@ -47,9 +48,9 @@ from tests.models.chains import (
 )
 from tests.models.test_chain import accelerations
 from tests.multibody.test_beam import momentum as beam_momentum
-from tests.oracles.chain_tree import chain_tree, slice_inertia
+from tests.oracles.chain_tree import chain_tree, of_hinges, slice_inertia
 from tests.oracles.clamped_beams import clamped_modes
-from tests.oracles.dynamics import energy, forward_dynamics_crba, momentum
+from tests.oracles.dynamics import energy, forward_dynamics_crba, hinge_torque, momentum
 from tests.oracles.tree import spatial_inertia
 from tests.simulate.flights import fly_free, plan_of, steps
 from tests.simulate.test_step import SWINGS
@@ -184,6 +185,23 @@ def test_links_with_masses_accelerate_as_the_textbook_says(links: int) -> None:
         )
         both = np.concatenate([expected.base, expected.joint])
         np.testing.assert_allclose(found[p], both, rtol=0, atol=1e-10 * np.abs(both).max())
+
+
+@pytest.mark.parametrize("links", [1, 3])
+def test_hinge_motors_feel_the_masses(links: int) -> None:
+    """Torques of the hinges are those of Newton and Euler's recursion over the tree, to 1e-10."""
+    rng = np.random.default_rng(links)
+    flight = airless(example_flight())
+    model = small_model(loaded(rng), flight, links)
+    batch = random_batch(rng, model, 1)
+    hinges, state = random_hinges(rng, model), random_state(rng, model, 1, speed=30.0)
+    constants = lane_constants(model, batch, 0.005)
+    found = hinge_torques(model, instant(model, hinges), constants, np.repeat(state, 2, axis=0))[0]
+    tree, motion = chain_tree(model, batch), motion_of(model, hinges, state[0])
+    none = np.zeros((tree.bodies, 6))
+    prescribed = hinge_torque(tree, motion, none, [0.0, 0.0, flight.gravity_m_s2])
+    expected = of_hinges(model, prescribed) if prescribed.size != found.size else prescribed
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
 
 def test_shares_are_smooth_in_the_division() -> None:

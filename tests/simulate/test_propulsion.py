@@ -12,11 +12,13 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight, Start
 from morphcore.geometry.mirror import mirror_of
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.trim import Trim, trim
 from morphdata.aircraft import load_aircraft
 from tests.models.chains import EXAMPLES, aircraft_of, example_flight, instant
 from tests.simulate.flights import fly
+from tests.simulate.test_request import request
 from tests.simulate.test_trim import start_rates
 
 STILL = np.zeros((2, 3))
@@ -74,6 +76,22 @@ def test_an_inclined_line_carries_weight(kind: dict[str, Any]) -> None:
     np.testing.assert_allclose(found.thrust_moment_B[0], moment, rtol=1e-12, atol=1e-9)
 
 
+def test_results_tell_the_moment_of_the_thrust() -> None:
+    """The document of a flight has the moment of the thrust and that beyond it; without a line only one."""
+    aircraft = load_aircraft(EXAMPLES / "aircraft.json").model_dump(exclude_none=True)
+    line = {"position_m": [0.0, 0.0, -HEIGHT_M]}
+    found = []
+    for more in ({"propulsion": line}, {}):
+        run = simulation_from_document(request(aircraft=aircraft | more))
+        found.append(run.result().to_document()["trim"])
+    above, plain = found
+    assert "thrust_moment_b_n_m" not in plain
+    assert above["thrust_moment_b_n_m"][1] == pytest.approx(-HEIGHT_M * above["force_b_n"][0], rel=1e-12)
+    moment = above["moment_b_n_m"][1] + above["thrust_moment_b_n_m"][1]
+    # the thrust along body x instead of the path lifts less, so that the wings carry 0.2 per cent more
+    assert moment == pytest.approx(plain["moment_b_n_m"][1], rel=0.01)
+
+
 def test_without_a_line_the_thrust_is_along_the_path() -> None:
     """As ever: no moment of its own, the force at the angle of attack."""
     found = started(driven(), {"model": "rigid"})
@@ -106,6 +124,17 @@ def test_a_reported_start_can_be_given_again(kind: dict[str, Any]) -> None:
     start = Start(float(found.alpha[0]), found.force_B[0], found.moment_B[0])
     again = started(aircraft, kind, replace(example_flight(), start=start), start="given")
     np.testing.assert_allclose(again.thrust_moment_B, found.thrust_moment_B, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind["model"])
+def test_the_example_with_pods_flies(kind: dict[str, Any]) -> None:
+    """It trims and stays level; its engine above pitches it down by what the rest of the moment makes up."""
+    document = load_aircraft(EXAMPLES / "pods" / "aircraft.json").model_dump(exclude_none=True)
+    aircraft = aircraft_of(document)
+    assert mirror_of(aircraft, example_flight()) is not None
+    found = started(aircraft, kind, replace(example_flight(), start=None))
+    assert 0.0 < found.alpha[0] < 0.15
+    np.testing.assert_allclose(found.thrust_moment_B[0, 1], -0.45 * found.force_B[0, 0], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from morphcore.aero.kernels.loads import (
     CONTROL0,
     LINK0,
     LINKS,
+    LUMPED,
     PAIRED,
     control_inputs,
     lagged_motion,
@@ -47,6 +48,7 @@ from morphcore.multibody.kernels.articulated import (
     add_apparent,
     add_bias,
     add_link,
+    add_lump,
     solve_base,
 )
 from morphcore.multibody.kernels.gimbal import (
@@ -278,6 +280,9 @@ def articulate(lanes, surfaces, shared, hinges, constants, scratch, links, coord
             if shared[APPARENT] != 0.0:
                 row = gravity_rows_of_scratch(links) + 3 * link
                 add_apparent(lanes, rows, scratch[row : row + 3], inertia, carried)
+            if surfaces[s, LUMPED]:
+                twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
+                add_lump(lanes, rows, twist, inertia, carried)
             if k == 0:
                 add_bias(lanes, inertia, scratch[w_bias + 6 * link : w_bias + 6 * link + 6], carried)
                 carry_through_hinge(lanes, hinges[s], inertia, carried)

@@ -148,7 +148,7 @@ def carry_lane(r00, r01, r02, r10, r11, r12, r20, r21, r22, px, py, pz, inertia,
 
 @kernel
 def add_link(lanes, link, twist, wrench, inertia, force):
-    """Add a link's rigid inertia and its bias force v x* I v - wrench to those already accumulated."""
+    """Add a flat link's rigid inertia and its bias force v x* I v - wrench to those already accumulated."""
     if not_in_lanes(link, lanes) or not_in_lanes(twist, lanes) or not_in_lanes(wrench, lanes):
         return
     if not_in_lanes(inertia, lanes) or not_in_lanes(force, lanes):
@@ -156,18 +156,13 @@ def add_link(lanes, link, twist, wrench, inertia, force):
     for l in range(len(lanes)):
         m, mx, my = link[0, l], link[1, l], link[2, l]
         ixx, iyy, izz, ixy = link[3, l], link[4, l], link[5, l], link[6, l]
-        mz, ixz, iyz = link[L_UP, l], link[L_UP + 1, l], link[L_UP + 2, l]
         wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
         ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
         inertia[0, l] += ixx
         inertia[1, l] += ixy
-        inertia[2, l] += ixz
         inertia[3, l] += iyy
-        inertia[4, l] += iyz
         inertia[5, l] += izz
-        inertia[7, l] -= mz
         inertia[8, l] += my
-        inertia[9, l] += mz
         inertia[11, l] -= mx
         inertia[12, l] -= my
         inertia[13, l] += mx
@@ -175,11 +170,11 @@ def add_link(lanes, link, twist, wrench, inertia, force):
         inertia[18, l] += m
         inertia[20, l] += m
         # momentum at the origin: angular (hx, hy, hz), linear (gx, gy, gz)
-        hx = ixx * wx + ixy * wy + my * uz + (ixz * wz - mz * uy)
-        hy = ixy * wx + iyy * wy - mx * uz + (iyz * wz + mz * ux)
-        hz = izz * wz + mx * uy - my * ux + (ixz * wx + iyz * wy)
-        gx = m * ux - my * wz + mz * wy
-        gy = m * uy + mx * wz - mz * wx
+        hx = ixx * wx + ixy * wy + my * uz
+        hy = ixy * wx + iyy * wy - mx * uz
+        hz = izz * wz + mx * uy - my * ux
+        gx = m * ux - my * wz
+        gy = m * uy + mx * wz
         gz = m * uz + my * wx - mx * wy
         force[0, l] += wy * hz - wz * hy + uy * gz - uz * gy - wrench[0, l]
         force[1, l] += wz * hx - wx * hz + uz * gx - ux * gz - wrench[1, l]
@@ -212,6 +207,37 @@ def add_apparent(lanes, link, gravity, inertia, force):
         force[0, l] += xz * fall
         force[1, l] += yz * fall
         force[5, l] += zz * fall
+
+
+@kernel
+def add_lump(lanes, link, twist, inertia, force):
+    """Add to `add_link`'s sums what masses out of a link's plane contribute: m z, Ixz and Iyz."""
+    if (
+        not_in_lanes(link, lanes)
+        or not_in_lanes(twist, lanes)
+        or not_in_lanes(inertia, lanes)
+        or not_in_lanes(force, lanes)
+    ):
+        return
+    for l in range(len(lanes)):
+        mz, ixz, iyz = link[L_UP, l], link[L_UP + 1, l], link[L_UP + 2, l]
+        wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
+        ux, uy, uz = twist[3, l], twist[4, l], twist[5, l]
+        inertia[2, l] += ixz
+        inertia[4, l] += iyz
+        inertia[7, l] -= mz
+        inertia[9, l] += mz
+        # its share of the momentum at the origin
+        hx = ixz * wz - mz * uy
+        hy = iyz * wz + mz * ux
+        hz = ixz * wx + iyz * wy
+        gx, gy = mz * wy, -mz * wx
+        force[0, l] += wy * hz - wz * hy - uz * gy
+        force[1, l] += wz * hx - wx * hz + uz * gx
+        force[2, l] += wx * hy - wy * hx + ux * gy - uy * gx
+        force[3, l] -= wz * gy
+        force[4, l] += wz * gx
+        force[5, l] += wx * gy - wy * gx
 
 
 @kernel

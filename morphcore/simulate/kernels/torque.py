@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from morphcore.aero.kernels.loads import LUMPED
 from morphcore.jit import entry_kernel
 from morphcore.models.kernels.chain import clear
 from morphcore.models.kernels.layout import (
@@ -14,7 +15,7 @@ from morphcore.models.kernels.layout import (
     joint_rows_of_scratch,
     link_rows_of_scratch,
 )
-from morphcore.multibody.kernels.articulated import LINK_ROWS, add_apparent, add_bias, add_link
+from morphcore.multibody.kernels.articulated import LINK_ROWS, add_apparent, add_bias, add_link, add_lump
 from morphcore.multibody.kernels.gimbal import JOINT_ROWS, carry_through_gimbal
 from morphcore.simulate.kernels.step import instant_rates
 
@@ -76,6 +77,9 @@ def torques(
                 if shared[APPARENT] != 0.0:
                     row = gravity_rows_of_scratch(links) + 3 * link
                     add_apparent(lanes, rows, scratch[row : row + 3], inertia, force)
+                if surfaces[s, LUMPED]:
+                    twist = scratch[w_twist + 6 * link : w_twist + 6 * link + 6]
+                    add_lump(lanes, rows, twist, inertia, force)
                 add_bias(
                     lanes, inertia, scratch[w_acceleration + 6 * link : w_acceleration + 6 * link + 6], force
                 )
