@@ -26,6 +26,9 @@ LARGEST_ALPHA_RAD = np.radians(15.0)
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
+# tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.5 mrad off, see
+# `bending_warnings`
+LARGEST_BENDING = 0.15
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
@@ -137,6 +140,33 @@ def overlap_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning]:
             )
         )
     return found
+
+
+def bending_warnings(aircraft: Aircraft, bending: Array, name: str, pointer: str) -> list[ResultWarning]:
+    """Wings bent further than a lattice that stays on the unbent wings is good for.
+
+    Chains of eight links against beams with a lattice on the bent wings, trims of Patil's wing and of a
+    tailed aircraft (tests/simulate/test_bending_warning.py): the angle of attack is off by up to 0.3, 0.5, 1,
+    2 and 4 mrad at a tip deflection of 10, 15, 20, 27 and 45 per cent of the span.
+
+    Parameters
+    ----------
+    bending : (k, s) displacement of the tips by bending over the span, at k times.
+    """
+    if not bending.size or not (bending > LARGEST_BENDING).any():
+        return []
+    row, number = np.unravel_index(int(np.argmax(bending)), bending.shape)
+    surface = aircraft.surfaces[int(number)]
+    return [
+        ResultWarning(
+            "large_bending",
+            f"the tip of {surface.name!r} moves by {100.0 * bending[row, number]:.0f} per cent of its span "
+            f"in {name}, and the lattice of an equivalent model stays on the unbent wings",
+            f"beyond {100.0 * LARGEST_BENDING:.0f} per cent its angle of attack at trim was found off by half "
+            "a milliradian and more: compare with the flexible model, whose lattice bends with the wings",
+            pointer,
+        )
+    ]
 
 
 def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:

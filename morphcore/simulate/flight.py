@@ -37,7 +37,14 @@ from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
 from morphcore.stopping import Stop
-from morphcore.validity import ResultWarning, air_motion, air_warnings, overlap_warnings, steep_warning
+from morphcore.validity import (
+    ResultWarning,
+    air_motion,
+    air_warnings,
+    bending_warnings,
+    overlap_warnings,
+    steep_warning,
+)
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
@@ -258,8 +265,10 @@ def _warnings(
     """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
     wind_N = np.tile(flight.wind_N, (times.size, 1)) if smooth_air_N is None else smooth_air_N(times)
     motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
+    bending = np.zeros((0, 0)) if record.bending is None else record.bending
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
+        *bending_warnings(aircraft, bending, "the flight", "/model"),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *overlap_warnings(aircraft, record.angles),
     )
