@@ -162,8 +162,8 @@ def bending_warnings(aircraft: Aircraft, bending: Array, name: str, pointer: str
             "large_bending",
             f"the tip of {surface.name!r} moves by {100.0 * bending[row, number]:.0f} per cent of its span "
             f"in {name}, and the lattice of an equivalent model stays on the unbent wings",
-            f"beyond {100.0 * LARGEST_BENDING:.0f} per cent its angle of attack at trim was found off by half "
-            "a milliradian and more: compare with the flexible model, whose lattice bends with the wings",
+            f"beyond {100.0 * LARGEST_BENDING:.0f} per cent its angle of attack at trim was found off by 0.5 "
+            "mrad and more: compare with the flexible model, whose lattice bends with the wings",
             pointer,
         )
     ]
