@@ -76,11 +76,13 @@ def chain_flight(
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
+    bending = _bending(flown, batch, history[:, JOINTS:])
     tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
     loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
         spread = model.mirror.spread
         angles, tips_z = model.mirror.spread_hinges(angles), spread(tips_z)
+        bending = spread(bending)
         tips_twist = None if tips_twist is None else spread(tips_twist)
         if loads is not None and loads.hinge_torque is not None:
             loads = replace(loads, hinge_torque=model.mirror.spread_hinges(loads.hinge_torque))
@@ -97,6 +99,7 @@ def chain_flight(
         trim=found,
         tips_twist=tips_twist,
         loads=loads,
+        bending=bending,
     )
     yield 1.0, record
 
@@ -109,6 +112,15 @@ def _tips_z(
     tips_W = tip_positions(model, _repeated(batch, at.size), _level_hinges(model), q_joint)
     down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
     return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))
+
+
+def _bending(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
+    """Displacement (k, s) of the tips by the joints' angles, over the span."""
+    level = _level_hinges(model)
+    bent = tip_positions(model, _repeated(batch, q_joint.shape[0]), level, q_joint)
+    straight = tip_positions(model, batch, level, np.zeros((1, q_joint.shape[1])))
+    spans = np.array([surface.span_m for surface in model.aircraft.surfaces])
+    return np.asarray(np.linalg.norm(bent - straight, axis=2) / spans)
 
 
 def _tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:

@@ -42,6 +42,7 @@ from morphcore.validity import (
     ResultWarning,
     air_motion,
     air_warnings,
+    bending_warnings,
     deflection_warnings,
     light_wing_warnings,
     overlap_warnings,
@@ -275,8 +276,10 @@ def _warnings(
     """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
     wind_N = np.tile(flight.wind_N, (times.size, 1)) if smooth_air_N is None else smooth_air_N(times)
     motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
+    bending = np.zeros((0, 0)) if record.bending is None else record.bending
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
+        *bending_warnings(aircraft, bending, "the flight", "/model"),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),

@@ -41,7 +41,8 @@ class FlightRecord:
     euler : (k, 3) rad; omega_B : (k, 3) rad/s; velocity_N, position_N : (k, 3) m/s and m of the reference
     point; wind_N : (k, 3) m/s of the air there; angles : (k, h + c) of all hinges, then of all controls, rad;
     tips_z : (k, s) tips below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the
-    tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`).
+    tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`). bending :
+    (k, s) displacement of the tips by bending over the span, of models whose lattice does not bend; else None.
     """
 
     euler: Array
@@ -54,6 +55,7 @@ class FlightRecord:
     trim: Trim
     tips_twist: Array | None = None
     loads: Loads | None = None
+    bending: Array | None = None
 
 
 def require_sound(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STALL_RAD = 0.35  # angle of attack at which wings stall; the lattice does not
-BENT_RAD = 1.0  # turn of a tip against its root, beyond which the lift no longer points upward
+BENT_RAD = 1.0  # turn of a tip against its root, beyond which a wing carries little upward
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def shape(alpha: float, bent: tuple[str, float] | None) -> str:
     if bent is None:
         return angle
     name, turn = bent
-    folded = " (beyond 1 its lift no longer points upward)" if turn > BENT_RAD else ""
+    folded = " (beyond about 1 a wing carries little upward)" if turn > BENT_RAD else ""
     return f"{angle} and {name} turned by {turn:.3g} rad{folded}"
 
 

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from morphcore.errors import TrimNotFound
 from morphcore.geometry.aircraft import Start
+from morphcore.identify.cost import sample_cases, shared_trims
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.kinematics import tip_positions
 from morphcore.simulate.flexible import FlexibleFlight
 from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.time_grid import TimeGrid
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import Trim, trim
 from morphcore.simulate.trim_limits import BENT_RAD, STALL_RAD
 from morphdata.lattice import Lattice, VortexCore
@@ -117,9 +119,8 @@ def wing_loads(found: Trimmed) -> Loads:
 def test_the_bent_wing_is_an_elastica(law: str) -> None:
     """At Patil's stiffness the tip rises by 45 (46) per cent of the half-span, as an independent rod says.
 
-    The rod bears the trimmed wing's air loads and weight, has no stretch or shear, and 320 cells, with which
-    it has converged to 1e-4: the tips agree within 0.2 per cent of the half-span. Forty elements move the
-    tip of ten by less than 0.2 per cent of the half-span as well.
+    The rod bears the trimmed wing's air loads and weight, and has no stretch or shear: the tips agree within
+    0.03 per cent of the half-span. Forty elements move the tip of ten by 0.06 per cent.
     """
     found = slender(1.0, law)
     R_NB = found.found.state.poses.R[0]
@@ -129,8 +130,8 @@ def test_the_bent_wing_is_an_elastica(law: str) -> None:
     tip = tip_N @ R_NB / HALF_SPAN_M
     fine = slender(1.0, law, 40).tip
     print(law, "beams", found.tip, "rod", tip, "forty elements", fine)
-    np.testing.assert_allclose(found.tip, tip, rtol=0.0, atol=2e-3)
-    np.testing.assert_allclose(found.tip, fine, rtol=0.0, atol=2e-3)
+    np.testing.assert_allclose(found.tip, tip, rtol=0.0, atol=3e-4)
+    np.testing.assert_allclose(found.tip, fine, rtol=0.0, atol=1e-3)
     assert -found.tip[2] == pytest.approx({"line": 0.446, "smoothed": 0.460}[law], abs=1e-3)
 
 
@@ -268,3 +269,44 @@ def test_a_chain_without_trim_says_where_it_ended() -> None:
     plan = flight_plan(heavy, [], TimeGrid(0.0, 1e-3, 2, None))
     with pytest.raises(TrimNotFound, match="the iteration ended with an angle of attack of"):
         trim(heavy, physical_guess(heavy), plan).require()
+
+
+def test_mirror_images_trim_alike() -> None:
+    """One wing 1.4 times as stiff: the image has the same alpha to 1e-9 rad, roll and yaw reversed."""
+    both = [slender_aircraft(stiffness).surfaces for stiffness in (1.0, 1.4)]
+    aircraft = slender_aircraft(1.0)
+    there = trimmed(replace(aircraft, surfaces=(both[0][0], both[1][1])), slender_flight()).found
+    back = trimmed(replace(aircraft, surfaces=(both[1][0], both[0][1])), slender_flight()).found
+    assert abs(there.moment_B[0]) > 10.0
+    assert back.alpha == pytest.approx(there.alpha, abs=1e-9)
+    np.testing.assert_allclose(back.force_B, there.force_B * [1.0, -1.0, 1.0], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(back.moment_B, there.moment_B * [-1.0, 1.0, -1.0], rtol=0.0, atol=1e-6)
+
+
+def test_a_soft_chain_flies_halved_and_whole() -> None:
+    """Followed in its half or as a whole: the same flight to 1e-9 rad, and it stays in trim."""
+    model = chain_model(slender_aircraft(0.9), slender_flight(), 8)
+    shared = physical_guess(model)
+    apart = physical_guess(model, separate_wings=True)  # sets of their own: flown as a whole
+    halved, whole = (
+        fly(slender_aircraft(0.9), slender_flight(), [], model=batch, duration_s=0.5, step_s=0.005).trajectory
+        for batch in (shared, apart)
+    )
+    np.testing.assert_allclose(halved.euler, whole.euler, rtol=0.0, atol=1e-9)
+    assert np.abs(halved.euler - halved.euler[0]).max() < 1e-6
+
+
+def level(rows: int = 11) -> Trajectory:
+    """A sample of level flight without any drive."""
+    time_s, zero = np.linspace(0.0, 0.1, rows), np.zeros(rows)
+    return Trajectory(name="level", time_s=time_s, drives={}, phi=zero, theta=zero, psi=zero)
+
+
+@pytest.mark.parametrize(("stiffness", "needed"), [(1.5, False), (0.9, True)])
+def test_a_search_follows_if_its_nominal_model_needs_it(stiffness: float, needed: bool) -> None:  # noqa: FBT001
+    """Decided once for a sample; then every set of a batch is trimmed that can be."""
+    model = chain_model(slender_aircraft(stiffness), slender_flight(), 8)
+    (case,) = sample_cases(model, [level()])
+    assert case.needs_following(model, "trim") is needed
+    ((_, found),) = shared_trims(model, physical_guess(model), (case,), "trim")
+    assert found.converged.all()
