@@ -32,7 +32,9 @@ MATERIAL = {"density_kg_m3": 60.0, "youngs_modulus_pa": 7e9, "stiffness_damping_
 ELEVATOR = {"name": "elevator", "from": 0.0, "to": 1.0, "chord_fraction": 0.35}
 AILERON = {"name": "aileron", "from": 0.5, "to": 0.9, "chord_fraction": 0.25, "mirror": "antisymmetric"}
 WING, TAIL = (1.5, 0.25), (0.4, 0.15)  # semi-span and chord, m
+HALF_WIDTH = 0.08  # m, of the fuselage
 TAIL_ARM = 1.0  # m aft of the wing
+TAIL_HEIGHT = 0.3  # m above the wing, away from its wake, whose direction differs between the models
 
 
 def surface(side: str, name: str, size: tuple[float, float], x: float, **more: Any) -> Document:
@@ -57,8 +59,11 @@ def tailed(*, flexible: bool = False, hinged: bool = False) -> Document:
     for side in ("right", "left"):
         wing = surface(side, "wing", WING, 0.0, flexible=flexible, controls=[copy.deepcopy(AILERON)])
         if hinged:
-            wing["hinge"] = {"position_m": [0.0, 0.0, 0.0], "axis": "z"}
+            # at the fuselage's side, so that swept wings do not overlap
+            root = [0.0, HALF_WIDTH if side == "right" else -HALF_WIDTH, 0.0]
+            wing |= {"hinge": {"position_m": root, "axis": "z"}, "position_m": root}
         surfaces += [wing, surface(side, "tail", TAIL, -TAIL_ARM, controls=[copy.deepcopy(ELEVATOR)])]
+        surfaces[-1]["position_m"][2] = -TAIL_HEIGHT
     return {
         "name": "tailed",
         "fuselage": {
@@ -75,10 +80,12 @@ def flight_document(**more: Any) -> FlightDocument:
     return FlightDocument.parse({"airspeed_m_s": SPEED, "air_density_kg_m3": DENSITY, **more})
 
 
-def chain_loads(document: Document, alpha: float, angles: dict[str, float], lattice: Lattice) -> Array:
+def chain_loads(
+    document: Document, alpha: float, angles: dict[str, float], lattice: Lattice, **flight: Any
+) -> Array:
     """Moment about the reference point and force (6,) of the air in B, from the rigid model's kernels."""
     aircraft = Aircraft.of(AircraftDocument.parse(document))
-    model = chain_model(aircraft, Flight.of(flight_document()), 1, lattice)
+    model = chain_model(aircraft, Flight.of(flight_document(**flight)), 1, lattice)
     held = {name: Hold(angle) for name, angle in angles.items()}
     schedules = hinge_schedules(aircraft, followed_schedules(aircraft, held))
     plan = flight_plan(model, schedules, time_grid(0.01 * np.arange(3)))
@@ -102,10 +109,12 @@ def chain_loads(document: Document, alpha: float, angles: dict[str, float], latt
     return total
 
 
-def beam_loads(document: Document, alpha: float, angles: dict[str, float], lattice: Lattice) -> Array:
+def beam_loads(
+    document: Document, alpha: float, angles: dict[str, float], lattice: Lattice, **flight: Any
+) -> Array:
     """The same from the flexible model, whose surfaces must be rigid and unhinged."""
     aircraft = Aircraft.of(AircraftDocument.parse(document))
-    model = flexible_model(aircraft, Flight.of(flight_document(gravity_m_s2=0.0)), lattice=lattice)
+    model = flexible_model(aircraft, Flight.of(flight_document(gravity_m_s2=0.0, **flight)), lattice=lattice)
     held = {name: Hold(angle) for name, angle in angles.items()}
     schedules = hinge_schedules(aircraft, followed_schedules(aircraft, held))
     path = hinge_path(model, schedules, time_grid(0.01 * np.arange(3)))

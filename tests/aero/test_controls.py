@@ -7,16 +7,22 @@ import warnings
 import numpy as np
 import pytest
 
+from morphcore.aero.kernels.loads import CONTROL0
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.control_slopes import flap_effectiveness, flap_weights
+from morphcore.models.equivalent import chain_model
+from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.lattice import Lattice, VortexCore
 from tests.aero.controlled import (
     DENSITY,
     SPEED,
     TAIL,
     TAIL_ARM,
+    TAIL_HEIGHT,
     WING,
     beam_loads,
     chain_loads,
+    flight_document,
     surface,
     tailed,
 )
@@ -118,9 +124,9 @@ def other_loads(drive, angle, strips, rows):
 
     wings = []
 
-    def stretch(ends, chord, aft, airfoil, count):
+    def stretch(ends, chord, aft, up, airfoil, count):
         sections = [
-            asb.WingXSec(xyz_le=[aft - 0.5 * chord, y, 0.0], chord=chord, airfoil=airfoil)
+            asb.WingXSec(xyz_le=[aft - 0.5 * chord, y, up], chord=chord, airfoil=airfoil)
             for y in np.linspace(*sorted(ends), count + 1)
         ]
         wings.append(asb.Wing(xsecs=sections))
@@ -129,9 +135,9 @@ def other_loads(drive, angle, strips, rows):
         for begin, end in ((0.0, 0.5), (0.5, 0.9), (0.9, 1.0)):
             moved = sign * angle if drive == "aileron" and begin == 0.5 else 0.0
             ends = sign * begin * WING[0], sign * end * WING[0]
-            stretch(ends, WING[1], 0.0, flapped(0.25, moved), round(strips * (end - begin)))
+            stretch(ends, WING[1], 0.0, 0.0, flapped(0.25, moved), round(strips * (end - begin)))
         moved = angle if drive == "elevator" else 0.0
-        stretch((0.0, sign * TAIL[0]), TAIL[1], TAIL_ARM, flapped(0.35, moved), strips)
+        stretch((0.0, sign * TAIL[0]), TAIL[1], TAIL_ARM, TAIL_HEIGHT, flapped(0.35, moved), strips)
     found = asb.VortexLatticeMethod(
         asb.Airplane(wings=wings, xyz_ref=[0, 0, 0], s_ref=1, c_ref=1, b_ref=1),
         asb.OperatingPoint(velocity=SPEED, alpha=np.degrees(ALPHA)),
@@ -173,3 +179,38 @@ def test_chain_and_beam_agree(law, drive):
     np.testing.assert_allclose(chain, beam, atol=0.01 * np.abs(beam).max())
     if drive == "aileron":
         assert chain[YAW] == pytest.approx(beam[YAW], rel=0.03)
+
+
+@pytest.mark.parametrize("kind", ["chain", "beam"])
+def test_goethert(kind):
+    """A flap at Mach M lifts 1/beta times as much as that of a wing of beta times the span: within 1e-3."""
+    mach, lattice = 0.5, Lattice(chordwise=4, spanwise=10)
+    beta = np.sqrt(1.0 - mach**2)
+
+    def lift(semi_span, **flight):
+        flap = [{"name": "flap", "from": 0.2, "to": 0.8, "chord_fraction": 0.3}]
+        surfaces = [
+            surface(side, "wing", (semi_span, 0.25), 0.0, controls=flap) for side in ("right", "left")
+        ]
+        document = {**tailed(), "surfaces": surfaces}
+        return LOADS[kind](document, 0.0, {"flap": 1e-3}, lattice, **flight)[LIFT] / semi_span
+
+    assert lift(1.5, mach=mach) == pytest.approx(lift(1.5 * beta) / beta, rel=1e-3)
+
+
+def test_aircraft_without_controls_have_no_further_inputs():
+    """Two inputs for each strip, as ever; with controls one more for each strip of their surfaces."""
+    plain = tailed()
+    for each in plain["surfaces"]:
+        del each["controls"]
+    of_tail = tailed()
+    for number in (0, 2):
+        del of_tail["surfaces"][number]["controls"]
+    flight, lattice = Flight.of(flight_document()), Lattice(chordwise=2, spanwise=8)
+    columns = {}
+    for name, document in {"plain": plain, "tail": of_tail, "all": tailed()}.items():
+        model = chain_model(Aircraft.of(AircraftDocument.parse(document)), flight, 2, lattice)
+        columns[name] = model.lattice.operator_shape[1], model.surfaces[:, CONTROL0].tolist()
+    assert columns["plain"] == (64, [-1, -1, -1, -1])
+    assert columns["tail"] == (80, [-1, 64, -1, 72])
+    assert columns["all"] == (96, [64, 72, 80, 88])
