@@ -42,7 +42,7 @@ class FlightRecord:
     point; wind_N : (k, 3) m/s of the air there; angles : (k, h + c) of all hinges, then of all controls, rad;
     tips_z : (k, s) tips below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the
     tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`). bending :
-    (k, s) displacement of the tips by bending over the span, of models whose lattice does not bend; else None.
+    (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None.
     """
 
     euler: Array
