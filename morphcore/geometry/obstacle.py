@@ -79,7 +79,9 @@ def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
     except (TrimNotFound, FlightDiverged) as error:
         found = find()
         if found is not None:
-            error.pointer, error.hint = found.pointer, found.hint
+            # what a trim has found to work remains true
+            kept = error.hint if isinstance(error, TrimNotFound) and found.hint not in error.hint else ""
+            error.pointer, error.hint = found.pointer, f"{found.hint}; {kept}" if kept else found.hint
         raise
 
 

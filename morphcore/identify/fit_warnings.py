@@ -16,12 +16,14 @@ from morphcore.identify.diagnoses import WRONG_DATA
 from morphcore.identify.parameters import SearchSpace
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.models.equivalent import ChainModel, ParameterBatch
+from morphcore.models.kinematics import tip_bending
 from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules
 from morphcore.validity import (
     AirMotion,
     ResultWarning,
     air_warnings,
+    bending_warnings,
     deflection_warnings,
     error_warning,
     light_wing_warnings,
@@ -92,6 +94,7 @@ def fit_warnings(
     found += _of_samples(fits, explained=any(warning.code in WRONG_DATA for warning in diagnosed))
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
+    found += _of_bending(run, best, fits)
     found += light_wing_warnings(aircraft, run.model.flight)
     angles = np.concatenate([_angles(fit, aircraft) for fit in fits])
     found += overlap_warnings(aircraft, angles)
@@ -151,6 +154,18 @@ def _of_bounds(
             hint,
             f"/model/bounds/{kind}",
         )
+
+
+def _of_bending(run: Identification, best: ParameterBatch, fits: Sequence[SampleFit]) -> list[ResultWarning]:
+    """Tips that the best model's trim displaces too far for its lattice, for the first such sample."""
+    trims = shared_trims(run.model, best, [fit.case for fit in fits], run.settings.start)
+    for number, (fit, (case, found)) in enumerate(zip(fits, trims, strict=True)):
+        flown = case.plan.flown(run.model)
+        bending = tip_bending(flown, best, found.q_joint)[found.converged]
+        name = f"the trim of sample {fit.case.sample.name!r}"
+        if warnings := bending_warnings(flown.aircraft, bending, name, f"/samples/{number}"):
+            return warnings
+    return []
 
 
 def _angles(fit: SampleFit, aircraft: Aircraft) -> np.ndarray:

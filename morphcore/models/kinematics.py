@@ -96,3 +96,13 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
             r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
         )
     return tips
+
+
+def tip_bending(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
+    """Displacement (p, s) of the tips by the joints' angles q_joint (p, coordinates), over the span."""
+    level = np.zeros((len(model.aircraft.surfaces), H_ORIGIN + 3))
+    level[:, :9] = np.eye(3).ravel()
+    bent = tip_positions(model, batch, level, q_joint)
+    straight = tip_positions(model, batch, level, np.zeros_like(q_joint))
+    spans = np.array([surface.length_m for surface in model.aircraft.surfaces])
+    return np.asarray(np.linalg.norm(bent - straight, axis=2) / spans)

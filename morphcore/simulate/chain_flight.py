@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
-from morphcore.models.kinematics import link_poses, tip_positions, whole_joints
+from morphcore.models.kinematics import link_poses, tip_bending, tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.control_motion import control_angles
@@ -76,7 +76,7 @@ def chain_flight(
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
-    bending = _bending(flown, batch, history[:, JOINTS:])
+    bending = tip_bending(flown, _repeated(batch, at.size), history[:, JOINTS:])
     tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
     loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
@@ -112,15 +112,6 @@ def _tips_z(
     tips_W = tip_positions(model, _repeated(batch, at.size), _level_hinges(model), q_joint)
     down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
     return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))
-
-
-def _bending(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
-    """Displacement (k, s) of the tips by the joints' angles, over the span."""
-    level = _level_hinges(model)
-    bent = tip_positions(model, _repeated(batch, q_joint.shape[0]), level, q_joint)
-    straight = tip_positions(model, batch, level, np.zeros((1, q_joint.shape[1])))
-    spans = np.array([surface.span_m for surface in model.aircraft.surfaces])
-    return np.asarray(np.linalg.norm(bent - straight, axis=2) / spans)
 
 
 def _tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:

@@ -151,11 +151,10 @@ def _follow(
         part = _trim_slab(model, softer, held, start, begin)
         ok = part.converged
         arrived = left[ok]
-        for name in ("alpha", "force_B", "moment_B", "q_joint"):
+        at_end = k == len(shares) - 1
+        for name in set(Trim.__dataclass_fields__) - (set() if at_end else {"converged", "residual"}):
             getattr(found, name)[arrived] = getattr(part, name)[ok]
         found.share[arrived] = shares[k]
-        if k == len(shares) - 1:
-            found.converged[arrived], found.residual[arrived] = True, part.residual[ok]
         left = arrived
         if left.size == 0:
             return

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.identify.cost import sample_cases
+from morphcore.identify.fit_warnings import _of_bending
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.time_grid import TimeGrid
+from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import trim
 from morphcore.validity import LARGEST_BENDING
 from morphdata.lattice import Lattice, VortexCore
@@ -72,3 +78,17 @@ def test_the_examples_do_not_warn(name: str) -> None:
     chain = physical_guess(chain_model(example_aircraft(), example_flight(), 3))
     found = fly(example_aircraft(), example_flight(), sample(name), model=chain)
     assert not found.warnings
+
+
+@pytest.mark.parametrize(("stiffness", "warned"), [(2.0, True), (3.0, False)])
+def test_a_fit_warns_of_its_trims(stiffness: float, warned: bool) -> None:  # noqa: FBT001
+    """The best model of a search, in the trim of the first sample that bends it too far."""
+    model = chain_model(slender_aircraft(stiffness), slender_flight(), 3)
+    time_s, zero = np.linspace(0.0, 0.1, 11), np.zeros(11)
+    level = Trajectory(name="level", time_s=time_s, drives={}, phi=zero, theta=zero, psi=zero)
+    (case,) = sample_cases(model, [level])
+    run: Any = SimpleNamespace(model=model, settings=SimpleNamespace(start="trim"))
+    fits: Any = [SimpleNamespace(case=case)]
+    found = _of_bending(run, physical_guess(model), fits)
+    assert [warning.code for warning in found] == ["large_bending"] * warned
+    assert [warning.pointer for warning in found] == ["/samples/0"] * warned

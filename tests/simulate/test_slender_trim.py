@@ -186,6 +186,8 @@ def test_a_tailed_aircraft_trims(law: str) -> None:
     assert is_smooth(alphas, 5e-4)
     for step in steps:
         assert step.found.residual < 1e-10
+    bending_tail = trimmed(tailed_aircraft(5.0 / 2.9, flexible_tail=True), tailed_flight(), law)
+    assert bending_tail.found.alpha == pytest.approx(soft.found.alpha, abs=1e-3)
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), [("slender", 1.0), ("tailed", 5.0 / 2.9)])
