@@ -18,11 +18,11 @@ def place_lattice(parts, place, stream_B):
 @entry_kernel
 def deflect(parts, place, deflection):
     """Set the slopes of the panels for the deflections (c,) of all control surfaces, trailing edge down."""
-    for p in range(place.slope.size):
+    for p in range(place.flap_slope.size):
         total = 0.0
         for c in range(deflection.size):
             total += deflection[c] * parts.control_slope[c, p]
-        place.slope[p] = total
+        place.flap_slope[p] = total
 
 
 @kernel
@@ -68,7 +68,7 @@ def blocked_flow(parts, place, twists, wind_B, out):
             along = 0.0
             for i in range(3):
                 along += place.R_BS[k, i, 0] * (velocity[i] - wind_B[i])
-            total -= place.slope[p] * along
+            total -= place.flap_slope[p] * along
         out[p] = total
 
 

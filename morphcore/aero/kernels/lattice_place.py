@@ -64,7 +64,7 @@ class LatticePlace(NamedTuple):
     points : (3, r + e) control points and the edges' middles, stretched. distances : (c, r + e). normals,
     tilted : (3, r). influence : (r + 1, r) normal velocity, ring by point. row : (r + e,). strength :
     (e + l,). induced : (3, e), of the circulations summed (r,). corner_velocity, control_velocity,
-    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). slope : (r,) of the panels, trailing edge down.
+    drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). flap_slope : (r,) of the panels by controls.
     """
 
     R_BS: Array
@@ -85,7 +85,7 @@ class LatticePlace(NamedTuple):
     control_velocity: Array
     drag_velocity: Array
     force: Array
-    slope: Array
+    flap_slope: Array
 
 
 def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePlace:
@@ -110,7 +110,7 @@ def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePl
         control_velocity=np.zeros((rings, 3)),
         drag_velocity=np.zeros(3),
         force=np.zeros((corners, 3)),
-        slope=np.zeros(rings),
+        flap_slope=np.zeros(rings),
     )
 
 
