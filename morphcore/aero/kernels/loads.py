@@ -74,6 +74,16 @@ def sloped(link, twist, l):
     )
 
 
+@inlined
+def lagged(motion, change, slow, fast, slow_weight, fast_weight):
+    """A component of the motion after Jones' lag, from both lag states and the change since those."""
+    return (
+        (1.0 - JONES_A1 - JONES_A2) * motion
+        + JONES_A1 * (slow + slow_weight * change)
+        + JONES_A2 * (fast + fast_weight * change)
+    )
+
+
 @kernel
 def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
     """Compute the motion that drives the circulation: lagged (v_z, omega_x, omega_y) times lift factor.
@@ -91,18 +101,12 @@ def lagged_motion(lanes, link, twist, slow, fast, previous, effective):
         return
     if not_in_lanes(previous, lanes) or not_in_lanes(effective, lanes):
         return
-    now = 1.0 - JONES_A1 - JONES_A2
     for l in range(len(lanes)):
-        effective[0, l], effective[1, l], effective[2, l] = sloped(link, twist, l)
-    for i in range(3):
-        for l in range(len(lanes)):
-            motion = effective[i, l]
-            change = motion - previous[i, l]
-            effective[i, l] = link[L_LIFT, l] * (
-                now * motion
-                + JONES_A1 * (slow[i, l] + link[L_SLOW_WEIGHT, l] * change)
-                + JONES_A2 * (fast[i, l] + link[L_FAST_WEIGHT, l] * change)
-            )
+        z, x, y = sloped(link, twist, l)
+        lift, w_slow, w_fast = link[L_LIFT, l], link[L_SLOW_WEIGHT, l], link[L_FAST_WEIGHT, l]
+        effective[0, l] = lift * lagged(z, z - previous[0, l], slow[0, l], fast[0, l], w_slow, w_fast)
+        effective[1, l] = lift * lagged(x, x - previous[1, l], slow[1, l], fast[1, l], w_slow, w_fast)
+        effective[2, l] = lift * lagged(y, y - previous[2, l], slow[2, l], fast[2, l], w_slow, w_fast)
 
 
 @kernel
