@@ -10,6 +10,7 @@ import pytest
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.mirror import mirror_groups
+from morphcore.geometry.obstacle import obstacle, too_little_air
 from morphcore.geometry.overlap import overlapping_surfaces
 from morphcore.validity import air_motion
 from tests.aero.shaped import FINNED, SHAPES, aircraft, pair, surface
@@ -139,3 +140,22 @@ def test_hinges_hold_the_weight_of_a_shaped_wing(axis: str) -> None:
     for drive, expected in torque.items():
         assert abs(expected) > 1.0
         np.testing.assert_allclose(found.extra[f"hinge_torque_{drive}"], expected, rtol=1e-5)
+
+
+def test_fins_carry_no_weight_and_wings_swept_aft_do_not_diverge() -> None:
+    """The same area flies as a wing and falls as a fin; sweep aft takes away the fear of divergence."""
+    flight = replace(example_flight(), airspeed_m_s=40.0)
+    flat, upright = (aircraft(wing(dihedral_rad=angle)) for angle in (0.0, 0.5 * np.pi))
+    assert too_little_air(flat, flight) is None
+    found = too_little_air(upright, flight)
+    assert found is not None
+    assert found.pointer == "/flight/airspeed_m_s"
+    soft = wing(flexible=True, elastic_axis_offset_m=0.1)
+    soft["section"] = {
+        "ei_flap_n_m2": 1e5, "ei_edge_n_m2": 1e6, "gj_n_m2": 20.0, "mass_per_length_kg_m": 1.0,
+        "inertia_per_length_kg_m": [0.01, 0.01, 0.02],
+    }  # fmt: skip
+    straight, swept = (obstacle(aircraft(soft | {"sweep_rad": angle}), flight) for angle in (0.0, 0.5))
+    assert straight is not None
+    assert "divergence" in straight.hint
+    assert swept is None

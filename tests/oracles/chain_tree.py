@@ -32,6 +32,7 @@ def chain_tree(model: ChainModel, batch: ParameterBatch, particle: int = 0) -> T
     gimbal, of which the last is the link. Prescribed coordinates are those of `tree_hinges`, free ones as in
     the lanes' state.
     """
+    assert all(surface.is_upright for surface in model.aircraft.surfaces), "the tree knows no other axes"
     fuselage = model.aircraft.fuselage
     base = spatial_inertia(fuselage.mass_kg, fuselage.centre_of_mass_B, fuselage.inertia_B)
     parent, axis, sign, offset, inertia = [-1], [-1], [1.0], [np.zeros(3)], [base]
