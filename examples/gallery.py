@@ -23,8 +23,8 @@ from rich.table import Table
 from morphcore import identify, load_aircraft, load_flight, load_trajectory, simulate
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.flexible import FlexibleModel, flexible_model
-from morphcore.simulate.flexible import FlexibleFlight, hinge_path
-from morphcore.simulate.flexible_trim import trim_flexible
+from morphcore.simulate.flexible import FlexibleFlight
+from morphcore.simulate.flexible_start import start_flexible
 from morphcore.simulate.flight import write_trajectory_csv
 from morphcore.simulate.schedule import Hold
 from morphcore.simulate.time_grid import TimeGrid
@@ -58,15 +58,12 @@ def fly(folder: Path) -> None:
     draw(Aircraft.of(aircraft), Flight.of(flight), folder / "picture.svg")
 
 
-def outlines(model: FlexibleModel, *, trimmed: bool) -> list[np.ndarray[Any, Any]]:
-    """Corners (rows, strips, 3) of each surface's lattice in B, m, unbent or as trimmed."""
+def outlines(model: FlexibleModel) -> list[np.ndarray[Any, Any]]:
+    """Corners (rows, strips, 3) of each surface's lattice in trim, in B, m."""
     flown = FlexibleFlight(model)
-    grid = TimeGrid(0.0, 0.01, 1)
-    path = hinge_path(model.aircraft, [Hold(hinge.angle_rad) for hinge in model.aircraft.hinges], grid)
-    found = trim_flexible(flown, path, model.flight.wind_N)
+    held = [Hold(part.angle_rad) for part in model.aircraft.moved_parts]
+    _, found = start_flexible(flown, held, TimeGrid(0.0, 0.01, 1, None), model.flight.wind_N, "trim")
     state = found.state
-    if not trimmed:
-        return []
     flown.structure(state.poses, state.V, state.A)
     flown.place_lattice(state.poses, model.flight.wind_N, state.V)
     corners, first = flown.lattice.at.corners, 0
@@ -84,7 +81,7 @@ def draw(aircraft: Aircraft, flight: Flight, path: Path) -> None:
     model = flexible_model(aircraft, flight)
     figure = Figure(figsize=(7.0, 5.0))
     above, front = figure.subplots(2, 1, gridspec_kw={"height_ratios": [2, 1]})
-    for shape in outlines(model, trimmed=True):
+    for shape in outlines(model):
         edge = np.concatenate([shape[0], shape[::-1, -1][:1], shape[-1, ::-1], shape[:1, 0]])
         above.fill(edge[:, 1], edge[:, 0], alpha=0.3, color="#0072B2")
         above.plot(edge[:, 1], edge[:, 0], color="#0072B2", linewidth=0.8)
