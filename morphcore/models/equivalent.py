@@ -101,8 +101,8 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 7) first link, links, first strip, strips, first overlap pair of each surface, whether
-        it also represents its mirror image, and the first input of its controls (-1 without).
+    surfaces : (s, 9) first link, links, first strip, strips, first overlap pair of each surface, whether
+        it also represents its mirror image, and its `AircraftLattice.control_inputs`.
     """
 
     aircraft: Aircraft
@@ -287,11 +287,11 @@ def _chain_model(
 ) -> ChainModel:
     lattices = aircraft_lattice(aircraft, lattice, images)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0, control0 in zip(
-        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control0, strict=True
+    for surface, part, strip0, controls in zip(
+        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, strict=True
     ):
         count = links_per_wing if surface.flexible else 1
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), control0])
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), *controls])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
