@@ -77,12 +77,19 @@ class AircraftLattice:
     slopes: ControlSlopes
 
     @property
-    def control0(self) -> tuple[int, ...]:
-        """By surface, the input of its first strip's velocity along the chord; -1 without controls."""
+    def control_inputs(self) -> tuple[tuple[int, int, int], ...]:
+        """By surface: what to add to the number of its strip for the input u_x, first such strip, and end.
+
+        The strips are those from the first to the last that a control moves; none without controls.
+        """
         first, out = 2 * self.strips, []
-        for surface, part in zip(self.aircraft.surfaces, self.lattices, strict=True):
-            out.append(first if surface.controls else -1)
-            first += part.spanwise if surface.controls else 0
+        for strip0, part in zip(self.strip0, self.lattices, strict=True):
+            own = self.slopes.strip[
+                (self.slopes.strip >= strip0) & (self.slopes.strip < strip0 + part.spanwise)
+            ]
+            low, high = (int(own.min()) - strip0, int(own.max()) - strip0 + 1) if own.size else (0, 0)
+            out.append((first - low, low, high))
+            first += high - low
         return tuple(out)
 
     @property
@@ -90,8 +97,10 @@ class AircraftLattice:
         """(m,) input that the loads of each part of the controls multiply: u_x of its strip."""
         shift = np.concatenate(
             [
-                np.full(part.spanwise, first - strip0)
-                for first, strip0, part in zip(self.control0, self.strip0, self.lattices, strict=True)
+                np.full(part.spanwise, control0 - strip0)
+                for (control0, _, _), strip0, part in zip(
+                    self.control_inputs, self.strip0, self.lattices, strict=True
+                )
             ]
         )
         return np.asarray(self.slopes.strip + shift[self.slopes.strip], dtype=np.int64)
@@ -126,15 +135,11 @@ class AircraftLattice:
     @property
     def operator_shape(self) -> tuple[int, int]:
         """Rows and columns of the operator, padded to whole tiles."""
+        chordwise = sum(end - low for _, low, end in self.control_inputs)
         return (
             -(-(OUTPUTS + MORE_OUTPUTS * self.has_more_outputs) * self.strips // ROW_MULTIPLE) * ROW_MULTIPLE,
-            -(-(2 * self.strips + self._chordwise_inputs) // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
+            -(-(2 * self.strips + chordwise) // COLUMN_MULTIPLE) * COLUMN_MULTIPLE,
         )
-
-    @property
-    def _chordwise_inputs(self) -> int:
-        every = zip(self.aircraft.surfaces, self.lattices, strict=True)
-        return sum(part.spanwise for surface, part in every if surface.controls)
 
 
 @dataclass(frozen=True)

@@ -103,9 +103,9 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 9) first link, links, first strip, strips, first overlap pair of each surface; whether it
-        also represents its mirror image; the first of its further outputs of the lattice and the first input
-        of its controls (-1 without); whether it carries point masses.
+    surfaces : (s, 11) first link, links, first strip, strips, first overlap pair of each surface; whether it
+        also represents its mirror image; the first of its further outputs of the lattice (or -1); its
+        `AircraftLattice.control_inputs`; whether it carries point masses.
     """
 
     aircraft: Aircraft
@@ -303,12 +303,12 @@ def _chain_model(
 ) -> ChainModel:
     lattices = aircraft_lattice(aircraft, lattice, images)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0, control0 in zip(
-        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control0, strict=True
+    for surface, part, strip0, controls in zip(
+        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, strict=True
     ):
         count = links_per_wing if surface.flexible else 1
         more, lumped = lattices.more_rows(strip0), int(bool(surface.point_masses))
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, control0, lumped])
+        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))

@@ -199,7 +199,7 @@ def test_goethert(kind):
 
 
 def test_aircraft_without_controls_have_no_further_inputs():
-    """Two inputs for each strip, as ever; with controls one more for each strip of their surfaces."""
+    """Two inputs for each strip, as ever; with controls one more for each strip from their first to last."""
     plain = tailed()
     for each in plain["surfaces"]:
         del each["controls"]
@@ -210,7 +210,9 @@ def test_aircraft_without_controls_have_no_further_inputs():
     columns = {}
     for name, document in {"plain": plain, "tail": of_tail, "all": tailed()}.items():
         model = chain_model(Aircraft.of(AircraftDocument.parse(document)), flight, 2, lattice)
-        columns[name] = model.lattice.operator_shape[1], model.surfaces[:, CONTROL0].tolist()
-    assert columns["plain"] == (64, [-1, -1, -1, -1])
-    assert columns["tail"] == (80, [-1, 64, -1, 72])
-    assert columns["all"] == (96, [64, 72, 80, 88])
+        columns[name] = model.lattice.operator_shape[1], model.surfaces[:, CONTROL0:].tolist()
+    none, every = [64, 0, 0], [64, 0, 8]
+    assert columns["plain"] == (64, [none] * 4)
+    assert columns["tail"] == (80, [none, every, [72, 0, 0], [72, 0, 8]])
+    # the ailerons cover the strips 4 to 7 of each wing
+    assert columns["all"] == (88, [[60, 4, 8], [68, 0, 8], [72, 4, 8], [80, 0, 8]])

@@ -238,3 +238,20 @@ def test_the_example_flies():
     assert not result.warnings
     far = simulate(aircraft, flight, {"elevator": Hold(0.4)}, duration_s=0.05, lattice=LATTICE)
     assert "large_deflection" in [warning.code for warning in far.warnings]
+
+
+def test_a_control_of_one_side_is_never_halved():
+    """A tab on one wing alone, held or moved, makes the aircraft asymmetric: it rolls in every model."""
+    given = tailed(flexible=True, hinged=True)
+    tab = {"name": "tab", "from": 0.1, "to": 0.3, "chord_fraction": 0.2, "angle_rad": 0.02}
+    given["surfaces"][0]["controls"].append(tab)
+    aircraft = AircraftDocument.parse(given)
+    assert "tab" in aircraft.drives
+    moments = [
+        flown({}, model=model, aircraft=aircraft, duration_s=0.1).trim.moment_B[0, 0]
+        for model in ("rigid", 2, "flexible")
+    ]
+    assert min(np.abs(moments)) > 0.1
+    np.testing.assert_allclose(moments, moments[-1], rtol=0.1)
+    moved = flown({"tab": ConstantRate(0.02, 0.1, 0.1, 0.05, 0.02)}, aircraft=aircraft).trajectory
+    assert np.ptp(moved.phi) > 1e-3

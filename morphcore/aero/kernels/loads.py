@@ -50,7 +50,8 @@ JONES_A1, JONES_B1 = 0.165, 0.0455
 JONES_A2, JONES_B2 = 0.335, 0.3
 JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
-LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0, CONTROL0, LUMPED = 0, 1, 2, 3, 4, 5, 6, 7, 8
+LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0 = 0, 1, 2, 3, 4, 5, 6
+CONTROL0, CONTROLLED, CONTROL_END, LUMPED = 7, 8, 9, 10
 
 
 @inlined
@@ -135,9 +136,10 @@ def strip_inputs(lanes, surface, ranges, strips, overlap, effective, inputs):
 
 @kernel
 def control_inputs(lanes, surface, k, ranges, overlap, link, twist, inputs):
-    """Add what link ``k`` gives to the velocity along the chord of each strip, one row each from CONTROL0.
+    """Add what link ``k`` gives to the velocity along the chord of each strip with controls.
 
-    The operator's columns of these inputs hold the deflections, lagged beforehand.
+    These are the strips from CONTROLLED to CONTROL_END, one row each at CONTROL0 + strip. The operator's
+    columns of these inputs hold the deflections, lagged beforehand.
     """
     if not_in_lanes(overlap, lanes) or not_in_lanes(link, lanes) or not_in_lanes(twist, lanes):
         return
@@ -145,12 +147,13 @@ def control_inputs(lanes, surface, k, ranges, overlap, link, twist, inputs):
         return
     control0 = surface[CONTROL0]
     if k == 0:
-        for j in range(control0, control0 + surface[STRIPS]):
-            row = inputs[j]
+        for j in range(surface[CONTROLLED], surface[CONTROL_END]):
+            row = inputs[control0 + j]
             for l in range(len(lanes)):
                 row[l] = 0.0
     number = surface[LINK0] + k
-    for j in range(ranges[number, 0], ranges[number, 1]):
+    first, end = max(ranges[number, 0], surface[CONTROLLED]), min(ranges[number, 1], surface[CONTROL_END])
+    for j in range(first, end):
         pair = 2 * (surface[PAIR0] + j * surface[LINKS] + k)
         part = overlap[pair : pair + 2]
         out = inputs[control0 + j]

@@ -7,7 +7,7 @@ accelerations from root to tips. Rows as in layout.py.
 from __future__ import annotations
 
 from morphcore.aero.kernels.loads import (
-    CONTROL0,
+    CONTROL_END,
     LINK0,
     LINKS,
     LUMPED,
@@ -204,7 +204,7 @@ def accelerations(
     effective = scratch[w_effective : w_effective + 3 * links]
     for s in range(surfaces.shape[0]):
         strip_inputs(lanes, surfaces[s], ranges, strips, overlap, effective, inputs)
-        if surfaces[s, CONTROL0] >= 0:
+        if surfaces[s, CONTROL_END] > 0:
             for k in range(surfaces[s, LINKS]):
                 link = surfaces[s, LINK0] + k
                 control_inputs(
