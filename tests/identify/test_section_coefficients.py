@@ -155,3 +155,23 @@ def test_the_aircraft_says_where_a_search_begins() -> None:
     run = Identification(plane, reference_flight(), [example("rate_0.8")], model)
     guess = run.space.decode(run.space.guess)
     assert {name: float(guess[name].flat[0]) for name in TRUTH} == pytest.approx(TRUTH)
+
+
+def test_every_pair_has_its_own() -> None:
+    """Wings and a tail that bends: two of each, named after their right surfaces; the cost counts them."""
+    request = identify_document()
+    request["samples"] = [each for each in request["samples"] if each["name"] == "train_rate_0.8"]
+    tails = [
+        {**wing, "name": f"tail {wing['side']}", "span_m": 1.0, "position_m": [-2.0, y, -0.4]}
+        for wing, y in zip(request["aircraft"]["surfaces"], (0.3, -0.3), strict=True)
+    ]
+    for tail in tails:
+        del tail["hinge"]
+    request["aircraft"]["surfaces"] += tails
+    request["model"] = {"links_per_wing": 1, "bounds": BOTH}
+    parsed = IdentifyRequest.parse(request)
+    plane = resolved.Aircraft.of(parsed.aircraft)
+    run = Identification(plane, reference_flight(), [example("rate_0.8")], parsed.model)
+    own = {f"{surface}.{name}" for surface in ("right wing", "tail right") for name in TRUTH}
+    assert own <= set(run.space.names)
+    assert cost(parsed).parameters == run.space.dimension

@@ -88,6 +88,7 @@ class FreshModel:
         per_ring = lag_s[model.lattice.table.panel_surface] / JONES_MEAN_LAG
         self.lag_times = np.maximum(np.stack([per_ring / JONES_B1, per_ring / JONES_B2]), SHORTEST_LAG_S)
         self._carry_lattice(batch, particle)
+        self._set_sections(batch, particle, values)
         self._cut_drag_areas(batch, particle, [float(value["profile_drag"][0]) for value in values])
 
     def _carry_lattice(self, batch: ParameterBatch, particle: int) -> None:
@@ -137,6 +138,29 @@ class FreshModel:
         self.drag_area: Array = np.concatenate(areas)
         self.drag_centre_L: Array = np.concatenate(centroids)
 
+    def _set_sections(self, batch: ParameterBatch, particle: int, values: Sequence[dict[str, Array]]) -> None:
+        """Slope of the mean line at each control point; cm0 times the integral of c^2 and its y, by link."""
+        slopes, areas, centres = [], [], []
+        for s, (surface, part) in enumerate(
+            zip(self.model.aircraft.surfaces, self.model.lattice.lattices, strict=True)
+        ):
+            share = np.abs(part.control_points_W[..., 1]).ravel() / surface.span_m
+            slopes.append(surface.twist_rad * share - values[s]["zero_lift_rad"][0])
+            ends = link_ends(self.model, batch, s, particle)
+            length, inner, outer = np.diff(ends), surface.chord_at(ends[:-1]), surface.chord_at(ends[1:])
+            squared = (inner**2 + inner * outer + outer**2) / 3.0
+            areas.append(values[s]["cm0"][0] * length * squared)
+            centres.append(
+                surface.span_sign
+                * length
+                * (inner**2 + 2.0 * inner * outer + 3.0 * outer**2)
+                / 12.0
+                / squared
+            )
+        self.slope: Array = np.concatenate(slopes)
+        self.moment_area: Array = np.concatenate(areas)
+        self.moment_y: Array = np.concatenate(centres)
+
     def motion(self, state: FreshState, hinges: Array) -> Motion:
         """The tree's motion with angle, rate, acceleration (h, 3) of every hinge."""
         angle, rate, acceleration = tree_hinges(self.model, hinges).T
@@ -179,9 +203,10 @@ class FreshModel:
         stream_B, mach = wind_B - motion.twist_B[3:], flight.mach or 0.0
         core = self.model.lattice.settings.core
         at_controls = influence(place(self.controls), corners, table, stream_B, core, mach)
-        circulation = solve_circulation(
-            at_controls, panel_normals(corners, table), wind_B - velocity(self.controls)
-        )
+        normals, flow = panel_normals(corners, table), wind_B - velocity(self.controls)
+        along = np.einsum("mk,kb,mb->m", self.controls[..., 0], R_BL[:, :, 0], flow)  # the chords
+        flow = flow - normals * (self.slope * along)[:, None]
+        circulation = solve_circulation(at_controls, normals, flow)
         lagged = circulation
         if lag is not None:
             slow, fast = self.lagged(circulation, lag, blend)
@@ -214,6 +239,10 @@ class FreshModel:
         speed = np.linalg.norm(velocity, axis=1)
         drag_L = -0.5 * self.model.flight.air_density_kg_m3 * (self.drag_area * speed)[:, None] * velocity
         moment_L = moment_L + np.cross(self.drag_centre_L, drag_L)
+        at_centre = v_L + np.cross(omega_L, np.outer(self.moment_y, [0.0, 1.0, 0.0]))
+        at_centre -= np.einsum("kba,b->ka", R_BL, wind_B)
+        pressure = 0.5 * self.model.flight.air_density_kg_m3 * (at_centre[:, 0] ** 2 + at_centre[:, 2] ** 2)
+        moment_L[:, 1] += pressure * self.moment_area
         force_L = force_L + drag_L
         wrench = np.zeros((self.tree.bodies, 6))
         np.add.at(wrench, self.bodies, np.hstack([moment_L + np.cross(self.origins, force_L), force_L]))
