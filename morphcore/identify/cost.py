@@ -98,7 +98,9 @@ class Evaluation:
     @property
     def cost(self) -> Array:
         """(p,) J."""
-        return np.asarray(np.einsum("pka,pka->p", self.errors, self.errors))
+        # row by row in one order: the errors' layout, and so the last bit, varies with the number of sets
+        rows = self.errors.reshape(self.errors.shape[0], -1)
+        return np.asarray(np.einsum("pm,pm->p", rows, rows))
 
 
 def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> list[Schedule]:
