@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from morphcore.errors import InvalidInput
 from morphcore.export.formats import ExportedModel
 from morphcore.frames import quaternion_from_euler
+from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.simulate.flight import Simulation
@@ -291,3 +292,21 @@ def test_a_tailed_aircraft_has_a_phugoid() -> None:
     assert 2.0 * np.diff(own).mean() == pytest.approx(2.0 * np.diff(wanted).mean(), rel=0.01)
     np.testing.assert_allclose(own, wanted, rtol=0.015)
     assert crossings(grid.times_s, speeds[None]).size < 3
+
+
+def test_a_sample_of_such_a_flight_is_flown_again() -> None:
+    """The recorded flight as a sample, tail column and all: the model that flew it has no cost.
+
+    The tail's column counts from its first value, which is the angle found; without the trim drive, the same
+    column is an angle, and the moment that is left makes no difference either.
+    """
+    aircraft, flight = aircraft_of(document()), flight_of(BY_TAIL)
+    model = chain_model(aircraft, flight, 3, COARSE)
+    guess = physical_guess(model)
+    schedules = {"sweep": ConstantRate(0.0, 0.3, 0.4), "incidence": ConstantRate(0.0, -0.02, 0.3)}
+    more = {"duration_s": 0.6, "lattice": COARSE, "step_s": 0.005}
+    sample = fly(aircraft, flight, schedules, model=guess, **more).trajectory
+    for resolved in (flight, flight_of(FLIGHT)):
+        again = chain_model(aircraft, resolved, 3, COARSE)
+        (case,) = sample_cases(again, [sample], 0.005)
+        assert float(costs(again, guess, [case], "trim")[0]) < 1e-9 * sample.time_s.size
