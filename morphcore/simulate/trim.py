@@ -199,7 +199,7 @@ def _trim_slab(
     model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start: StartMode, begin: Array | None = None
 ) -> Trim:
     """Newton's iteration from joint angles and angle of attack, ``begin`` (p, coordinates + 1), or zero."""
-    n, particles = model.coordinates, batch.particles
+    n, particles, propulsion = model.coordinates, batch.particles, model.aircraft.propulsion
     given = model.flight.start if start == "given" else None
     free = n + (0 if given else 6)
     probes = np.full(free, ANGLE_PROBE)
@@ -223,11 +223,7 @@ def _trim_slab(
         repeated = np.repeat(np.arange(particles), points.shape[1])
         flat = points.reshape(-1, n + 6)
         lane_rows = rows[repeated]
-        force_B, moment_B = _thrust(flat, n, given, model.aircraft.propulsion)
-        lane_rows[:, FORCE_C : FORCE_C + 3] = force_B
-        lane_rows[:, FORCE_C + 3 : FORCE_C + 6] = moment_B + thrust_moment_B(
-            model.aircraft.propulsion, force_B
-        )
+        lane_rows[:, FORCE_C : FORCE_C + 6] = _acting(flat, n, given, propulsion)
         blocks = to_lanes(lane_rows)
         lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), flat.shape[0])
         state = _state(model, batch.select(repeated), plan, flat[:, n], flat[:, :n])
@@ -256,10 +252,10 @@ def _trim_slab(
         moving &= (residual >= ANGLE_TOLERANCE) & np.isfinite(residual)
         if not np.any(moving):
             break
-    force_B, moment_B = _thrust(x, n, given, model.aircraft.propulsion)
+    force_B, moment_B = _thrust(x, n, given, propulsion)
     # forward differences limit the last digits: nearly converged is good enough
     converged = residual < 1e3 * ANGLE_TOLERANCE
-    of_thrust_B, share = thrust_moment_B(model.aircraft.propulsion, force_B), converged.astype(np.float64)
+    of_thrust_B, share = thrust_moment_B(propulsion, force_B), converged.astype(np.float64)
     return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, of_thrust_B, share)
 
 
@@ -287,3 +283,9 @@ def _thrust(points: Array, n: int, given: object, propulsion: Propulsion | None)
         return np.tile(given.force_B, (count, 1)), np.tile(given.moment_B, (count, 1))  # type: ignore[attr-defined]
     alpha, along, across = points[:, n], points[:, n + 1], points[:, n + 2]
     return thrust_force_B(propulsion, alpha, along, across), points[:, n + 3 : n + 6]
+
+
+def _acting(points: Array, n: int, given: object, propulsion: Propulsion | None) -> Array:
+    """Constant force and all of the constant moment (k, 6) in B of each row of unknowns."""
+    force_B, moment_B = _thrust(points, n, given, propulsion)
+    return np.concatenate([force_B, moment_B + thrust_moment_B(propulsion, force_B)], axis=1)

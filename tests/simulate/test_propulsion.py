@@ -66,14 +66,17 @@ def test_thrust_above_the_reference_point_pitches_down(kind: dict[str, Any]) -> 
 
 @pytest.mark.parametrize("kind", MODELS, ids=lambda kind: kind["model"])
 def test_an_inclined_line_carries_weight(kind: dict[str, Any]) -> None:
-    """Thrust 0.2 rad up of body x: the force is along the line, and the wings carry that much less."""
+    """Thrust 0.2 rad up of body x: the force is along the line, and the wings carry that much less.
+
+    A flexible trim is off by 1e-10 rad of angle of attack at most, 2e-5 N of lift.
+    """
     line_B = np.array([np.cos(0.2), 0.0, -np.sin(0.2)])
     plain = started(driven(), kind)
     found = started(driven(position_m=[-1.0, 0.0, 0.0], direction=(3.0 * line_B).tolist()), kind)
-    np.testing.assert_allclose(np.cross(found.force_B[0], line_B), 0.0, atol=1e-9 * found.force_B[0, 0])
+    np.testing.assert_allclose(np.cross(found.force_B[0], line_B), 0.0, atol=2e-5)
     assert found.alpha[0] < plain.alpha[0]
     moment = np.cross([-1.0, 0.0, 0.0], found.force_B[0])
-    np.testing.assert_allclose(found.thrust_moment_B[0], moment, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(found.thrust_moment_B[0], moment, rtol=1e-12, atol=2e-5)
 
 
 def test_results_tell_the_moment_of_the_thrust() -> None:
