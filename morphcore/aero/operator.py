@@ -16,9 +16,9 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
   circulation and induced velocity, both distributed along the chord; here the induced velocity of a strip is
   averaged with the chordwise distribution of the circulation in uniform incidence, which is exact there and
   of second order elsewhere.
-- The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces lie in
-  one plane. Otherwise, or with sweep or taper, two more numbers for each strip hold it, and the moment of the
-  forces in the plane about the strip's point on the axis.
+- The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces and their
+  wakes lie in one plane. Otherwise, or with sweep or taper, three more numbers for each strip hold it, its
+  moment, and the moment of the forces in the plane about the strip's point on the axis.
 """
 
 from __future__ import annotations
@@ -63,8 +63,9 @@ class AircraftLattice:
     """The undeformed lattices of all surfaces, their settings and their numbering.
 
     images : mirror images of the surfaces if these are one half of a symmetric aircraft. They induce
-    velocities but have no outputs of their own. table : rings of the surfaces, then of the images.
-    slopes : of the control surfaces.
+    velocities but have no outputs of their own. table : rings of the surfaces, then of the images. slopes :
+    of the control surfaces. steep : the wake leaves the surfaces at such an angle that the velocity it
+    induces along them matters.
     """
 
     aircraft: Aircraft
@@ -75,6 +76,7 @@ class AircraftLattice:
     strip0: tuple[int, ...]
     strips: int
     slopes: ControlSlopes
+    steep: bool = False
 
     @property
     def control_inputs(self) -> tuple[tuple[int, int, int], ...]:
@@ -112,12 +114,12 @@ class AircraftLattice:
 
     @property
     def has_more_outputs(self) -> bool:
-        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs that stay in one plane."""
+        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs in one plane, as is their wake."""
         surfaces = self.aircraft.surfaces
         turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
         heights = {surface.position_m[2] for surface in surfaces}
         oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
-        return turns or len(heights) > 1 or not oblong
+        return self.steep or turns or len(heights) > 1 or not oblong
 
     @cached_property
     def paired(self) -> NDArray[np.bool_]:
@@ -157,7 +159,11 @@ class LatticeOperator:
 
 
 def aircraft_lattice(
-    aircraft: Aircraft, settings: Lattice = DEFAULT_LATTICE, images: Sequence[Surface] = ()
+    aircraft: Aircraft,
+    settings: Lattice = DEFAULT_LATTICE,
+    images: Sequence[Surface] = (),
+    *,
+    steep: bool = False,
 ) -> AircraftLattice:
     """Lattices of the same settings on every surface; ``images`` of all of them or none."""
     panels = (settings.chordwise, settings.spanwise)
@@ -173,6 +179,7 @@ def aircraft_lattice(
         strip0,
         sum(lattice.spanwise for lattice in lattices),
         control_slopes([surface.controls for surface in aircraft.surfaces], lattices, strip0),
+        steep,
     )
 
 
@@ -315,9 +322,10 @@ def _reduced(
             )
         if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
-            loads[more] = edges.summed(on_edges[1], edges.front[..., 1], edges.side[..., 1]) - edges.summed(
-                on_edges[2], edges.front[..., 0], edges.side[..., 0]
-            )
+            for place, (front, side) in ((0, (1.0, 1.0)), (2, edges.middles_x)):
+                loads[more + place] = edges.summed(
+                    on_edges[1], front * edges.front[..., 1], side * edges.side[..., 1]
+                ) - edges.summed(on_edges[2], front * edges.front[..., 0], side * edges.side[..., 0])
             loads[more + 1] = edges.moment(on_edges[0])
         strips[strip0 : strip0 + part.spanwise] = edges.columns(surface.chord_W)
     matrix = np.zeros(lattice.operator_shape)
@@ -357,6 +365,12 @@ class _Edges:
         total += np.einsum("ijn,ij->jn", on_sides[:, 1:], self.share * side[..., 1])
         total -= np.einsum("ijn,ij->jn", on_sides[:, :-1], self.share * side[..., 0])
         return np.asarray(total / self.width[:, None])
+
+    @property
+    def middles_x(self) -> tuple[Array, Array]:
+        """Along x of the link, the middles of the fronts and of the sides."""
+        front = 0.5 * (self.corners[:-1, :, 0, 0] + self.corners[:-1, :, 1, 0])
+        return front, 0.5 * (self.corners[:-1, :, :, 0] + self.corners[1:, :, :, 0])
 
     def moment(self, flow: tuple[Array, Array]) -> Array:
         """Moment about z (spanwise, inputs) of the forces that a normal velocity makes in the plane."""

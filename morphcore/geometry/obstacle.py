@@ -85,6 +85,13 @@ def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
         raise
 
 
+def lift_coefficient(aircraft: Aircraft, flight: Flight) -> float:
+    """The lift coefficient of level flight, of all surfaces that carry weight; 0 without air."""
+    area = sum(surface.area_m2 * _share_of_lift(surface) for surface in aircraft.surfaces)
+    carried = flight.dynamic_pressure_pa * area
+    return _mass(aircraft) * flight.gravity_m_s2 / carried if carried > 0.0 else 0.0
+
+
 def load_per_length(aircraft: Aircraft, flight: Flight) -> float:
     """The weight distributed evenly over all spans, N/m: an estimate of the lift per length."""
     weight_n = _mass(aircraft) * flight.gravity_m_s2

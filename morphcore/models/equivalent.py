@@ -16,6 +16,7 @@ from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.fields import whole_number
 from morphcore.geometry.mirror import Mirror, mirror_groups, mirror_of
+from morphcore.geometry.obstacle import lift_coefficient
 from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
 from morphcore.models.kernels.layout import (
@@ -35,6 +36,10 @@ from morphdata.renamed import RENAMED, current_name
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+# Lift coefficient from which the lattice accounts for the velocity that the wake induces along wings of one
+# plane: without it, 0.05 per cent of the angle of attack and 0.07 of the thrust at 0.38, 0.2 and 0.6 at 0.7
+STEEP_LIFT = 0.45
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,7 +135,9 @@ class ChainModel(Shown):
         every = self.aircraft.surfaces
         own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
         images = tuple(every[k] for k in self.mirror.image)
-        return _chain_model(own, self.flight, self.links_per_wing, self.lattice.settings, images)
+        return _chain_model(
+            own, self.flight, self.links_per_wing, self.lattice.settings, images, self.lattice.steep
+        )
 
     @cached_property
     def rigid(self) -> ChainModel:
@@ -138,7 +145,7 @@ class ChainModel(Shown):
         if self.links_per_wing == 1:
             return self
         lattice = self.lattice
-        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images)
+        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images, lattice.steep)
 
     @cached_property
     def starts(self) -> dict[bytes, tuple[float, float | None]]:
@@ -291,7 +298,8 @@ def chain_model(
     links = whole_number(
         links_per_wing, "links_per_wing", pointer="/model/links_per_wing", minimum=1, maximum=MAX_LINKS
     )
-    return _chain_model(aircraft, flight, links, lattice)
+    steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
+    return _chain_model(aircraft, flight, links, lattice, steep=steep)
 
 
 def _chain_model(
@@ -300,8 +308,9 @@ def _chain_model(
     links_per_wing: int,
     lattice: Lattice,
     images: Sequence[Surface] = (),
+    steep: bool = False,  # noqa: FBT001, FBT002 - private
 ) -> ChainModel:
-    lattices = aircraft_lattice(aircraft, lattice, images)
+    lattices = aircraft_lattice(aircraft, lattice, images, steep=steep)
     rows, link, pair = [], 0, 0
     for surface, part, strip0, controls in zip(
         aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, strict=True

@@ -93,35 +93,42 @@ def test_rigid_and_flexible_models_have_one_circulation(aircraft, speed, degrees
 
 
 @pytest.mark.parametrize(
-    ("aircraft", "speeds", "within"),
-    [
-        (rigid(example_aircraft()), STRAIGHT, (0.014, 0.07, 0.01)),
-        (rigid(tailed()), TAILED, (0.03, 0.06, 0.08)),
-    ],
+    ("aircraft", "speeds"),
+    [(rigid(example_aircraft()), STRAIGHT), (rigid(tailed()), TAILED)],
     ids=["straight", "tailed"],
 )
-def test_rigid_and_flexible_models_have_one_trim(aircraft, speeds, within):
+def test_rigid_and_flexible_models_have_one_trim(aircraft, speeds):
     """Angle of attack, thrust and moment of an all-rigid aircraft agree in both models, from 2 to 20 degrees.
 
-    Their circulations are the same (above). What is left is the flow that wakes induce along the surfaces,
-    which the reduced operator's lift leaves out: 1.4 per cent of the angle, 6.7 of the thrust and 1.0 of the
-    moment without a tail; 2.7, 5.5 and 7.6 with a tail that flies right above the wing's wake.
+    Within 2e-4. They are equal to 1e-8 where the reduced operator accounts for the velocity along the
+    surfaces: with a tail, and without one from a lift coefficient of 0.45.
     """
     for speed in speeds:
         model = model_at(aircraft, speed)
+        close = 2e-4 if model.lattice.operator_shape[0] < 6 * model.lattice.strips else 1e-7
         one, other = chain_trim(model), beam_trim(model)
-        assert one.alpha[0] == pytest.approx(other.alpha, rel=within[0])
+        assert one.alpha[0] == pytest.approx(other.alpha, rel=close)
         thrust = np.hypot(*other.force_B[[0, 2]])
-        assert np.hypot(*one.force_B[0, [0, 2]]) == pytest.approx(thrust, rel=within[1])
-        assert one.moment_B[0, 1] == pytest.approx(other.moment_B[1], rel=within[2])
+        assert np.hypot(*one.force_B[0, [0, 2]]) == pytest.approx(thrust, rel=close)
+        assert one.moment_B[0, 1] == pytest.approx(other.moment_B[1], rel=10.0 * close)
 
 
 def test_a_wake_along_the_body_misses_the_moment_of_a_tail():
-    """The law has content: with the wake along x of B the tailed aircraft's moment is 12 per cent off."""
+    """The law has content: with the wake along x of B the tailed aircraft's moment is 17 per cent off."""
     model = model_at(rigid(tailed()), TAILED[1])
     wanted = beam_trim(model).moment_B[1]
-    assert abs(chain_trim(model, 0.0).moment_B[0, 1] / wanted - 1.0) > 0.12
-    assert abs(chain_trim(model).moment_B[0, 1] / wanted - 1.0) < 0.08
+    assert abs(chain_trim(model, 0.0).moment_B[0, 1] / wanted - 1.0) > 0.16
+
+
+def test_just_below_the_lift_from_which_the_flow_along_wings_counts():
+    """At a lift coefficient of 0.44 a straight wing's trim is within 0.2 per cent without that flow."""
+    model = model_at(rigid(example_aircraft()), 139.8)
+    assert not model.lattice.steep
+    assert model_at(rigid(example_aircraft()), 135.0).lattice.steep
+    one, other = chain_trim(model), beam_trim(model)
+    assert one.alpha[0] == pytest.approx(other.alpha, rel=2e-3)
+    assert np.hypot(*one.force_B[0, [0, 2]]) == pytest.approx(np.hypot(*other.force_B[[0, 2]]), rel=2e-3)
+    assert one.moment_B[0, 1] == pytest.approx(other.moment_B[1], rel=2e-3)
 
 
 def test_the_wake_is_that_of_the_trim():

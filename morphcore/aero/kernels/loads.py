@@ -12,12 +12,13 @@ the Kutta-Joukowski forces on all bound edges follow (see aero/operator.py for t
     3  w_x   induced normal velocity weighted by the bound circulation along y, m/s
     4  w_y   the same for that along x, m/s
 
-Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces are oblongs in
-one plane, two more outputs of each strip follow those of all strips:
+Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces and their wakes
+are in one plane, three more outputs of each strip follow those of all strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
              per density and g, m^2/s
+    2  m_y   moment of the normal force of 0: u_n times the distance along x from the axis, m^2/s
 
 All quantities are in link axes; velocities are those of the structure relative to still air.
 """
@@ -29,7 +30,7 @@ import math
 from morphcore.jit import inlined, kernel
 from morphcore.lanes import not_in_lanes
 
-OUTPUTS, MORE_OUTPUTS = 5, 2
+OUTPUTS, MORE_OUTPUTS = 5, 3
 # columns of the table of strips, in link axes about each strip's middle on the link axis (the elastic axis),
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
 # lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x
@@ -250,9 +251,9 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
             more = outputs[surface[MORE0] + MORE_OUTPUTS * j : surface[MORE0] + MORE_OUTPUTS * (j + 1)]
             for l in range(len(lanes)):
                 g = part[0, l] * out[0, l]
-                normal = g * more[0, l]
-                sums[0, l] += (part[1, l] + centre * slope) * normal
-                sums[1, l] -= centre * normal
+                normal, along = g * more[0, l], g * more[2, l]
+                sums[0, l] += part[1, l] * normal + slope * along
+                sums[1, l] -= along
                 sums[2, l] += g * more[1, l]
                 sums[5, l] += normal
     for l in range(len(lanes)):
