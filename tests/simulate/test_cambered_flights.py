@@ -159,8 +159,8 @@ def test_more_links_tend_to_the_beams() -> None:
 def test_a_fresh_lattice_agrees() -> None:
     """Unlike sections on both sides: attitudes within 1 mrad of a lattice rebuilt in every evaluation.
 
-    Flat wings are 0.6 mrad off in this flight: the price of a lattice that does not bend. That program lags
-    circulations instead of motions, and puts the slope on the panels of the bent wings.
+    Flat wings are 0.6 mrad off in this flight: the price of a lattice that does not bend. That
+    program lags circulations instead of motions, and puts the slope on the panels of the bent wings.
     """
     model = chain_model(with_sections(MODERATE, OTHER), free_flight(), 2, Lattice(chordwise=2, spanwise=5))
     guess, schedules = physical_guess(model), [ConstantRate(0.0, 0.3, 0.3), ConstantRate(0.0, 0.6, 0.3)]

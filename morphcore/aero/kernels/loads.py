@@ -12,8 +12,8 @@ the Kutta-Joukowski forces on all bound edges follow (see aero/operator.py for t
     3  w_x   induced normal velocity weighted by the bound circulation along y, m/s
     4  w_y   the same for that along x, m/s
 
-Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces and their wakes
-are in one plane, three more outputs of each strip follow those of all strips:
+Both are sums over all bound edges, per circulation and width of the strip. Unless all surfaces and their
+wakes are in one plane, three more outputs of each strip follow those of all strips:
 
     0  u_n   induced velocity in the plane, m/s, that adds to the normal force as much as motion along x
     1  m_z   moment about z of the in-plane forces of induced velocity, about the strip's middle on the axis,
