@@ -114,7 +114,7 @@ class AircraftLattice:
 
     @property
     def has_more_outputs(self) -> bool:
-        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs in one plane, as is their wake."""
+        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs in one plane, wake too."""
         surfaces = self.aircraft.surfaces
         turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
         heights = {surface.position_m[2] for surface in surfaces}
