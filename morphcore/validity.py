@@ -34,7 +34,7 @@ INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the inciden
 LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
 # A plain flap loses its linear lift to separation at about this deflection (Abbott & von Doenhoff 1959).
 LARGEST_DEFLECTION_RAD = np.radians(20.0)
-# tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.5 mrad off, see
+# tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.6 mrad off, see
 # `bending_warnings`
 LARGEST_BENDING = 0.15
 LARGEST_ERROR = 0.05  # share of the motion, rms
@@ -194,7 +194,7 @@ def bending_warnings(aircraft: Aircraft, bending: Array, name: str, pointer: str
     """Wings bent further than a lattice that stays on the unbent wings is good for.
 
     Chains of eight links against beams with a lattice on the bent wings, trims of Patil's wing and of a
-    tailed aircraft (tests/simulate/test_bending_warning.py): the angle of attack is off by up to 0.3, 0.5, 1,
+    tailed aircraft (tests/simulate/test_bending_warning.py): the angle of attack is off by up to 0.2, 0.6, 1.2,
     2 and 4 mrad at a tip deflection of 10, 15, 20, 27 and 45 per cent of the span.
 
     Parameters
@@ -210,7 +210,7 @@ def bending_warnings(aircraft: Aircraft, bending: Array, name: str, pointer: str
             "large_bending",
             f"the tip of {surface.name!r} moves by {100.0 * bending[row, number]:.0f} per cent of its span "
             f"in {name}, and the lattice of an equivalent model stays on the unbent wings",
-            f"beyond {100.0 * LARGEST_BENDING:.0f} per cent its angle of attack at trim was found off by 0.5 "
+            f"beyond {100.0 * LARGEST_BENDING:.0f} per cent its angle of attack at trim was found off by 0.6 "
             "mrad and more: compare with the flexible model, whose lattice bends with the wings",
             pointer,
         )

@@ -14,13 +14,14 @@ from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
 from morphcore.models.kinematics import link_poses, tip_bending, tip_positions, whole_joints
 from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
-from morphcore.simulate.control_motion import control_angles
-from morphcore.simulate.plan import FlightPlan, flight_plan
+from morphcore.simulate.control_motion import control_angles, of_every_part
+from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
 from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.torque import torques_and_rates
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
+from morphcore.simulate.wake import trimmed_schedules
 from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
@@ -47,8 +48,16 @@ def chain_flight(
     at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
     `flight.simulate`.
     """
+    times, schedules = grid.halves_s, of_every_part(model.aircraft, schedules)
+    begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
+    schedules = trimmed_schedules(model, schedules, times, begin)
     plan = flight_plan(
-        model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=model.is_even(batch), start=start
+        model,
+        schedules,
+        grid,
+        air_velocity_N=air_velocity_N,
+        may_halve=model.is_even(batch),
+        wake_alpha=begin.alpha,
     )
     flown = plan.flown(model)
     found = trim(flown, batch, plan, start=start).require()

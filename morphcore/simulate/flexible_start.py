@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.models.equivalent import chain_model
 from morphcore.models.flexible import FlexibleModel
+from morphcore.simulate.control_motion import of_every_part
 from morphcore.simulate.flexible import FlexibleFlight, HingePath, hinge_path
 from morphcore.simulate.flexible_trim import FlexibleTrim, trim_flexible
 from morphcore.simulate.plan import start_at
@@ -53,6 +54,7 @@ def start_flexible(
         There is no level flight.
     """
     model, name = flight.model, flight.model.flight.trim_drive
+    schedules = of_every_part(model.aircraft, schedules)
     drives = trim_drives(model.aircraft, name)
     if not drives or start == "given":
         path = hinge_path(model, schedules, grid)

