@@ -194,8 +194,8 @@ def bending_warnings(aircraft: Aircraft, bending: Array, name: str, pointer: str
     """Wings bent further than a lattice that stays on the unbent wings is good for.
 
     Chains of eight links against beams with a lattice on the bent wings, trims of Patil's wing and of a
-    tailed aircraft (tests/simulate/test_bending_warning.py): the angle of attack is off by up to 0.2, 0.6, 1.2,
-    2 and 4 mrad at a tip deflection of 10, 15, 20, 27 and 45 per cent of the span.
+    tailed aircraft (tests/simulate/test_bending_warning.py): the angle of attack is off by up to 0.2, 0.6,
+    1.2, 2 and 4 mrad at a tip deflection of 10, 15, 20, 27 and 45 per cent of the span.
 
     Parameters
     ----------

@@ -103,9 +103,9 @@ def by_hand(aircraft: Aircraft) -> Array:
             total += moved(slice_inertia(bare, a, b, origin_W + from_root), R_BW, r_B)
         for mass in surface.point_masses:
             own = np.array(mass.inertia).reshape(3, 3)
-            at = mass.at * surface.span_m
+            at = mass.at * surface.length_m
             aft = mass.aft_m + float(surface.aft_at(at))
-            place_W = np.array([-aft, surface.span_sign * at, -mass.up_m])
+            place_W = np.array([0.0, surface.span_sign * at, -mass.up_m]) - aft * surface.chord_W
             total += moved(spatial_inertia(mass.mass_kg, place_W, own), R_BW, r_B)
     return total
 
@@ -117,7 +117,7 @@ def of_links(model: ChainModel, batch: ParameterBatch) -> Array:
     total = spatial_inertia(fuselage.mass_kg, fuselage.centre_of_mass_B, fuselage.inertia_B)
     for number, surface in enumerate(model.aircraft.surfaces):
         first, count = model.surfaces[number, :2]
-        edges = link_edges(model.on_surface(batch, number)["division"], surface.span_m)[0]
+        edges = link_edges(model.on_surface(batch, number)["division"], surface.length_m)[0]
         R_BW, r_B = surface_pose(surface)
         for k in range(count):
             link = rows[6 + LINK_ROWS * (first + k) :][:LINK_ROWS]
@@ -127,7 +127,7 @@ def of_links(model: ChainModel, batch: ParameterBatch) -> Array:
             own = np.block(
                 [[np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), cross], [cross.T, m * np.eye(3)]]
             )
-            at_W = np.array([-surface.elastic_axis_offset_m, surface.span_sign * edges[k], 0.0])
+            at_W = surface.elastic_axis_W + np.array([0.0, surface.span_sign * edges[k], 0.0])
             total += moved(own, R_BW, r_B + R_BW @ at_W)
     return np.asarray(total)
 
@@ -139,7 +139,7 @@ def of_beams(aircraft: Aircraft, elements: int) -> Array:
     for surface, root, tip in zip(aircraft.surfaces, model.roots, model.tips, strict=True):
         R_BW, r_B = surface_pose(surface)
         for node in range(root, tip + 1):
-            at_W = model.rest_W[node] - np.array([surface.elastic_axis_offset_m, 0.0, 0.0])
+            at_W = model.rest_W[node] + surface.elastic_axis_W
             places[node], axes[node] = r_B + R_BW @ at_W, R_BW
     total = np.zeros((6, 6))
     for node, inertia in zip(beams.bodies, beams.inertia, strict=True):
