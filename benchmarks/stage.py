@@ -33,8 +33,9 @@ from morphcore.models.parameters import lag_weights
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.operator_table import OperatorTable
-from morphcore.simulate.plan import FlightPlan, surface_accelerations, surface_rows
+from morphcore.simulate.plan import FlightPlan
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
 from morphcore.simulate.trim import Trim, trimmed_state
 
 Array = NDArray[np.float64]

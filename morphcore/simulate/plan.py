@@ -13,10 +13,9 @@ from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.control import Control
-from morphcore.geometry.hinge import Hinge, hinged_pose
+from morphcore.geometry.hinge import Hinge
 from morphcore.models.equivalent import ChainModel
-from morphcore.multibody.hinges import relative_motion
-from morphcore.multibody.kernels.hinge import H_ORIGIN, H_ROTATION, H_TWIST, HINGE_ROWS
+from morphcore.multibody.kernels.hinge import H_TWIST
 from morphcore.shown import Shown
 from morphcore.simulate.control_motion import (
     control_angles,
@@ -26,6 +25,7 @@ from morphcore.simulate.control_motion import (
 )
 from morphcore.simulate.operator_table import ControlTable, OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
 from morphcore.simulate.time_grid import STEP_S, TimeGrid
 from morphcore.simulate.trim import StartMode
 from morphcore.simulate.wake import (
@@ -418,41 +418,6 @@ def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
     if max(np.abs(own - image).max(initial=0.0), np.abs(up - down).max(initial=0.0)) > ALIKE_RAD:
         return model, motion
     return half, motion.columns(mirror.own_hinges, mirror.own_controls)
-
-
-def surface_rows(aircraft: Aircraft, angles: Array, rates: Array) -> Array:
-    """Rows (k, s, HINGE_ROWS) of the surfaces' motion for the kernels, from that of all hinges (k, h).
-
-    See multibody/kernels/hinge.py.
-    """
-    rows = np.empty((angles.shape[0], len(aircraft.surfaces), HINGE_ROWS))
-    for number, (surface, own) in enumerate(zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)):
-        arms, rest = surface.root_arms_B, surface.rest_R_BW
-        R_BW, origin_B = hinged_pose(surface.hinges, arms, angles[:, own], rest)
-        still = 0.0 * rates[:, own]
-        twist, _ = relative_motion(surface.hinges, arms, angles[:, own], rates[:, own], still, rest)
-        rows[:, number, H_ROTATION:H_TWIST] = R_BW.reshape(-1, 9)
-        rows[:, number, H_TWIST:H_ORIGIN] = twist
-        rows[:, number, H_ORIGIN:] = origin_B
-    return rows
-
-
-def surface_accelerations(aircraft: Aircraft, angles: Array, rates: Array, accelerations: Array) -> Array:
-    """Time derivative (k, s, 6) of the surfaces' twist relative to the fuselage, from the hinges' motion."""
-    return np.stack(
-        [
-            relative_motion(
-                surface.hinges,
-                surface.root_arms_B,
-                angles[:, own],
-                rates[:, own],
-                accelerations[:, own],
-                surface.rest_R_BW,
-            )[1]
-            for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
-        ],
-        axis=1,
-    )
 
 
 def _nodes(length_rad: float, spacing_rad: float) -> int:

@@ -110,7 +110,14 @@ RESULT: Document = {
         "division": [0.5, 0.5],
         "stiffness_nm_rad": [[1.0, 2.0, 3.0]],
         "damping_nms_rad": [[0.1, 0.2, 0.3]],
-        "aero": {"lift_factor": 1.0, "ac_offset_m": 0.0, "profile_drag": 0.01, "lag_s": 0.0},
+        "aero": {
+            "lift_factor": 1.0,
+            "ac_offset_m": 0.0,
+            "profile_drag": 0.01,
+            "lag_s": 0.0,
+            "zero_lift_rad": 0.0,
+            "cm0": 0.0,
+        },
     },
     "fit": [
         {
