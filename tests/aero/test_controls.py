@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from morphcore.aero.kernels.loads import CONTROL0
+from morphcore.aero.kernels.loads import CONTROL0, CONTROL_END
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.control_slopes import flap_effectiveness, flap_weights
 from morphcore.models.equivalent import chain_model
@@ -210,7 +210,10 @@ def test_aircraft_without_controls_have_no_further_inputs():
     columns = {}
     for name, document in {"plain": plain, "tail": of_tail, "all": tailed()}.items():
         model = chain_model(Aircraft.of(AircraftDocument.parse(document)), flight, 2, lattice)
-        columns[name] = model.lattice.operator_shape[1], model.surfaces[:, CONTROL0:].tolist()
+        columns[name] = (
+            model.lattice.operator_shape[1],
+            model.surfaces[:, CONTROL0 : CONTROL_END + 1].tolist(),
+        )
     none, every = [64, 0, 0], [64, 0, 8]
     assert columns["plain"] == (64, [none] * 4)
     assert columns["tail"] == (80, [none, every, [72, 0, 0], [72, 0, 8]])

@@ -84,7 +84,7 @@ def test_held_out_flights_have_no_say() -> None:
 
 def test_without_a_trim_the_default_is_flown() -> None:
     """Wings that fold before they carry: nothing can be compared, and the search may still find others."""
-    assert run(softened(0.1)).step_s == STEP_S
+    assert run(softened(0.01)).step_s == STEP_S
 
 
 def test_the_choice_checks_a_stop() -> None:

@@ -197,7 +197,7 @@ def test_bad_requests_name_the_field() -> None:
     """What is wrong in a request is said with a pointer to it and a hint."""
     lists = {
         "": [],
-        "/1": [1, 9],
+        "/1": [1, 17],
         "/0": [0],
         "/2": [1, 2, 1],
         "/3": [1, 2, 3, 2.5],
