@@ -225,7 +225,7 @@ def lattice_operator(
     flow = [induced[rings:] @ circulation]
     if lattice.has_more_outputs:
         flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
-    return _reduced(lattice, circulation, flow, _references(lattice, poses, circulation))
+    return _reduced(lattice, circulation, flow, _uniform_flows(lattice, poses))
 
 
 def _at_points(poses: Sequence[tuple[Array, Array]], groups: Sequence[Sequence[Array]], axis: int) -> Array:
@@ -239,24 +239,21 @@ def _at_points(poses: Sequence[tuple[Array, Array]], groups: Sequence[Sequence[A
     )
 
 
-def _references(
-    lattice: AircraftLattice, poses: Sequence[tuple[Array, Array]], circulation: Array
-) -> list[Array]:
-    """Circulations (rings,) for each surface in a uniform flow normal to it: its chordwise distribution.
+def _uniform_flows(lattice: AircraftLattice, poses: Sequence[tuple[Array, Array]]) -> list[Array]:
+    """Normal velocities (strips,) of all strips, for each surface, in a uniform flow normal to it.
 
     Other surfaces meet that flow by the cosine between the normals. Mirror images meet it alike, as in an
     aircraft of which only one half is computed.
     """
     counts = [part.spanwise for part in lattice.lattices]
     normals = np.stack([R_BW[:, 2] for R_BW, _ in poses])
-    references = []
+    flows = []
     for normal, paired in zip(normals, lattice.paired, strict=True):
         met = normals @ normal
         if paired:
             met = np.where(lattice.paired, np.maximum(met, (normals * ACROSS) @ normal), met)
-        uniform = circulation[:, : 2 * lattice.strips : 2]  # every strip at the same incidence
-        references.append((uniform * np.repeat(met, counts)).sum(axis=1))
-    return references
+        flows.append(np.repeat(met, counts))
+    return flows
 
 
 def _boundary(lattice: AircraftLattice) -> Array:
@@ -283,12 +280,12 @@ def _boundary(lattice: AircraftLattice) -> Array:
 
 
 def _reduced(
-    lattice: AircraftLattice, circulation: Array, flow: Sequence[Array], references: Sequence[Array]
+    lattice: AircraftLattice, circulation: Array, flow: Sequence[Array], uniform_flows: Sequence[Array]
 ) -> LatticeOperator:
     """The operator from circulations (rings, inputs) and what they induce at fronts and sides.
 
     flow : normal velocity (points, inputs); if it has further outputs, also those along x and y of W.
-    references : (rings,) for each surface.
+    uniform_flows : of `_uniform_flows`, in which a surface has its chordwise distribution of circulation.
     """
     motions = 2 * lattice.strips
     strips = np.zeros((lattice.strips, STRIP_COLUMNS))
@@ -296,13 +293,13 @@ def _reduced(
     loads = np.zeros((lattice.operator_shape[0], inputs))
     ring, side0 = 0, lattice.rings
     for surface, part, strip0, uniform in zip(
-        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, references, strict=True
+        lattice.aircraft.surfaces, lattice.lattices, lattice.strip0, uniform_flows, strict=True
     ):
         shape = (part.chordwise, part.spanwise)
         fronts = slice(ring, ring + part.rings)
         sides = slice(side0, side0 + part.chordwise * (part.spanwise + 1))
         gamma = circulation[fronts].reshape(*shape, inputs)
-        reference = uniform[fronts].reshape(shape)
+        reference = (circulation[fronts, :motions:2] * uniform).sum(axis=1).reshape(shape)
         on_edges = [
             (each[fronts].reshape(*shape, inputs), each[sides].reshape(part.chordwise, -1, inputs))
             for each in flow
@@ -318,7 +315,7 @@ def _reduced(
         loads[row + 4] = -edges.summed(on_edges[0], edges.front[..., 0], edges.side[..., 0])
         if lattice.slopes.parts:
             loads[row + 3, motions:] += _exchanged(
-                gamma[..., motions:], on_edges[0][0][..., :motions:2], edges, reference
+                gamma[..., motions:], on_edges[0][0][..., :motions:2] @ uniform, edges, reference
             )
         if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
@@ -413,15 +410,15 @@ def _edges(surface: Surface, part: SurfaceLattice, share: Array) -> _Edges:
     )
 
 
-def _exchanged(gamma: Array, front: Array, edges: _Edges, reference: Array) -> Array:
+def _exchanged(gamma: Array, induced: Array, edges: _Edges, reference: Array) -> Array:
     """What the induced velocity (strips, m) of controls lacks for the right force along the chord.
 
     A flap's circulation is distributed along the chord unlike that of uniform incidence (the weights
     ``bound``), and meets other velocities of it than the mean: without this a deflection in two dimensions
     would have a drag or thrust in proportion to the incidence. gamma : (rows, strips, m) of the controls;
-    front : (rows, strips, strips) induced velocities of unit incidence; reference : (rows, strips) its rings.
+    induced : (rows, strips) velocities that a uniform flow induces at the fronts; reference : its rings.
     """
-    induced = front.sum(axis=2) * edges.front[..., 1] / edges.width
+    induced = induced * edges.front[..., 1] / edges.width
     mean = np.sum(edges.bound * induced, axis=0)
     of_edges = np.diff(gamma, axis=0, prepend=0.0)
     met = np.einsum("ijm,ij->jm", of_edges, induced) - gamma[-1] * mean[:, None]
