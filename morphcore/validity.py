@@ -18,6 +18,7 @@ from morphcore.aero.apparent_mass import share_of_mass
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.overlap import overlapping_surfaces
+from morphcore.geometry.wake_contact import surfaces_in_wakes
 from morphdata.atmosphere import standard_atmosphere
 from morphdata.drives import without_side
 
@@ -37,6 +38,7 @@ LARGEST_DEFLECTION_RAD = np.radians(20.0)
 # tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.6 mrad off, see
 # `bending_warnings`
 LARGEST_BENDING = 0.15
+NEAREST_WAKE_CHORDS = 0.5  # see `wake_warnings`
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
 
@@ -263,6 +265,32 @@ def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[R
             f"let a drive balance it: set flight.trim_drive (the aircraft has {', '.join(able)}). A constant "
             "moment does not change with speed, and so spoils slow motions such as the phugoid",
             "/flight",
+        )
+    ]
+
+
+def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str) -> list[ResultWarning]:
+    """A surface in the wake of another one, in a model whose wake keeps the direction that it has in trim.
+
+    Two aircraft, all rigid, whose elevators were moved: pitch differs by 0.6 of the motion from the model
+    whose wake moves where the tail comes within a quarter of a chord of the wing's wake, and by 0.1 from half
+    a chord on. A fin between the roots of the wings is as sensitive in yaw.
+
+    Parameters
+    ----------
+    angles : (h,) of all hinges at the start, rad. alpha_rad : there.
+    """
+    worst = min(surfaces_in_wakes(aircraft, angles, alpha_rad), key=lambda pair: pair[2], default=None)
+    if worst is None or worst[2] > NEAREST_WAKE_CHORDS:
+        return []
+    ahead, behind = (aircraft.surfaces[number].name for number in worst[:2])
+    return [
+        ResultWarning(
+            "surface_in_wake",
+            f"{behind!r} comes within {worst[2]:.2f} chords of the wake of {ahead!r}, which keeps its "
+            "direction in rigid and equivalent models",
+            "its loads depend on where the wake passes: compare with the flexible model, whose wake moves",
+            pointer,
         )
     ]
 

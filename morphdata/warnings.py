@@ -13,8 +13,9 @@ class ResultWarning(BaseModel):
     code: str = Field(
         description="Stable, for programs: `at_bound`, `large_error`, `large_alpha`, `compressible`, "
         "`steep_pitch`, `surfaces_overlap`, `large_bending`, `large_deflection`, `apparent_mass_left_out`, "
-        "`constant_trim_moment`, `diverged` (a flight on which the result does not depend), "
-        "`verification_failed`, `not_flyable` (in a partial result: nothing has flown yet). Of samples: "
+        "`constant_trim_moment`, `surface_in_wake`, `diverged` (a flight on which the result does not "
+        "depend), `verification_failed`, `not_flyable` (in a partial result: nothing has flown yet). Of "
+        "samples: "
         "`looks_like_degrees`, `flipped_sign`, `swapped_sides`, `late`, `clipped_column`, `frozen_column`, "
         "`wrong_aircraft`, `start_off_trim`, `repeated_rows`, `gap`.",
         examples=["at_bound"],

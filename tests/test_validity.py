@@ -17,8 +17,11 @@ from morphcore.validity import (
     error_warning,
     light_wing_warnings,
     steep_warning,
+    wake_warnings,
 )
 from morphdata.lattice import Lattice
+from tests.aero.shaped import aircraft as shaped
+from tests.aero.shaped import pair
 from tests.geometry.rehinged import rehinged
 from tests.models.chains import example_aircraft, example_flight
 from tests.simulate.flights import fly
@@ -64,6 +67,18 @@ def test_apparent_mass_left_out(share: float, warned: bool) -> None:  # noqa: FB
     flight = replace(SLOW, air_density_kg_m3=density)
     assert codes(light_wing_warnings(example_aircraft(), flight)) == ["apparent_mass_left_out"] * warned
     assert light_wing_warnings(example_aircraft(), replace(flight, apparent_mass=True)) == []
+
+
+@pytest.mark.parametrize(("up_m", "warned"), [(0.1, True), (0.35, True), (1.0, False), (-0.5, False)])
+def test_a_tail_in_a_wake(up_m: float, warned: bool) -> None:  # noqa: FBT001
+    """Three metres behind wings of 0.5 m chord at 0.1 rad, whose wake is 0.3 m above them there."""
+    tailed = shaped(
+        *pair("wing", 2.5, (0.5, 0.5), position_m=[0.0, 0.0, 0.0]),
+        *pair("tail", 1.0, (0.3, 0.3), position_m=[-3.0, 0.0, -up_m]),
+    )
+    found = wake_warnings(tailed, np.zeros(0), 0.1, "/aircraft")
+    assert codes(found) == ["surface_in_wake"] * warned
+    assert wake_warnings(example_aircraft(), np.zeros(2), 0.1, "/aircraft") == []
 
 
 def test_incidence_by_hand() -> None:
@@ -146,7 +161,10 @@ def test_a_sweep_into_the_tail_warns() -> None:
     )
     whole = replace(aircraft, surfaces=(*aircraft.surfaces, tail))
     quiet = replace(example_flight(), mach=0.0)
-    for final, expected in ((0.02, []), (1.0, ["surfaces_overlap"])):
+    for final, expected in (
+        (0.02, []),
+        (1.0, ["surfaces_overlap"]),
+    ):  # it lies in the wings' wake in any case
         sweep = ConstantRate(0.0, final, 0.4)
         found = fly(whole, quiet, {"both": sweep}, duration_s=0.4, lattice=COARSE)
-        assert codes(found.warnings) == expected
+        assert codes(found.warnings) == ["surface_in_wake", *expected]

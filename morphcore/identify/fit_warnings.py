@@ -29,6 +29,7 @@ from morphcore.validity import (
     light_wing_warnings,
     overlap_warnings,
     steep_warning,
+    wake_warnings,
 )
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ def fit_warnings(
     found += _of_bounds(run.space, at_bound, undetermined)
     found += air_warnings(run.model.flight, _motions(run, best, fits))
     found += _of_bending(run, best, fits)
+    found += _of_wakes(run, best, fits)
     found += light_wing_warnings(aircraft, run.model.flight)
     angles = np.concatenate([_angles(fit, aircraft) for fit in fits])
     found += overlap_warnings(aircraft, angles)
@@ -164,6 +166,17 @@ def _of_bending(run: Identification, best: ParameterBatch, fits: Sequence[Sample
         bending = tip_bending(flown, best, found.q_joint)[found.converged]
         name = f"the trim of sample {fit.case.sample.name!r}"
         if warnings := bending_warnings(flown.aircraft, bending, name, f"/samples/{number}"):
+            return warnings
+    return []
+
+
+def _of_wakes(run: Identification, best: ParameterBatch, fits: Sequence[SampleFit]) -> list[ResultWarning]:
+    """Surfaces in wakes of others, at the trim of the first such sample."""
+    aircraft = run.model.aircraft
+    trims = shared_trims(run.model, best, [fit.case for fit in fits], run.settings.start)
+    for fit, (_, found) in zip(fits, trims, strict=True):
+        angles, alpha = _angles(fit, aircraft)[0], float(found.alpha[0])
+        if found.converged[0] and (warnings := wake_warnings(aircraft, angles, alpha, "/aircraft/surfaces")):
             return warnings
     return []
 

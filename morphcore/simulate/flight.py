@@ -48,6 +48,7 @@ from morphcore.validity import (
     overlap_warnings,
     steep_warning,
     trim_warnings,
+    wake_warnings,
 )
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
@@ -280,11 +281,17 @@ def _warnings(
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
         *bending_warnings(aircraft, bending, "the flight", "/model"),
+        *([] if record.bending is None else wake_warnings(aircraft, *_start(record), "/aircraft/surfaces")),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
         *deflection_warnings(aircraft, record.angles),
     )
+
+
+def _start(record: FlightRecord) -> tuple[Array, float]:
+    """Angles of hinges and controls at the start, and the angle of attack there, rad."""
+    return record.angles[0], float(record.trim.alpha[0])
 
 
 def _is_one_of(channels: Mapping[str, Array], title: str) -> bool:
