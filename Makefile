@@ -18,7 +18,7 @@ SIDE_BY_SIDE = $(AT_ONCE) --jobs=2
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3 python; do \
 	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 
-.PHONY: help setup demo serve test test-api test-library test-command test-services test-slow slow-services slow-library slow-timed test-extended faults faults-postgres faults-others faults-timed conformance bench check check-types check-rest openapi locked format clean
+.PHONY: help setup demo gallery serve test test-api test-library test-command test-services test-slow slow-services slow-library slow-timed test-extended faults faults-postgres faults-others faults-timed conformance bench check check-types check-rest openapi locked format clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -47,6 +47,9 @@ setup: $(VENV)/.stamp-full  ## make .venv with everything in it
 
 demo: $(VENV)/.stamp-server  ## identify a model from the example flights through the running service
 	@$(BIN)/python examples/demo.py
+
+gallery: $(VENV)/.stamp-server  ## identify the aircraft of examples/aircraft, and print how well
+	@$(BIN)/python examples/gallery.py
 
 serve: $(VENV)/.stamp-server  ## API, worker and broker on this machine
 	@exec $(BIN)/morphid serve

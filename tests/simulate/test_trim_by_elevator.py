@@ -64,3 +64,23 @@ def test_half_an_aircraft_trims_like_the_whole() -> None:
         assert plan.halved is may_halve
         answers.append(fly_trimmed(plan.flown(model), plan, physical_guess(model)).euler)
     np.testing.assert_allclose(answers[1], answers[0], rtol=0.0, atol=1e-9)
+
+
+def test_a_fin_does_not_disturb_the_symmetry() -> None:
+    """A symmetric aircraft with a fin is flown whole; its elevator moves neither roll nor yaw."""
+    fin = {
+        **with_elevator()["surfaces"][2],
+        "name": "fin",
+        "dihedral_rad": 0.5 * np.pi,
+        "span_m": 0.3,
+        "position_m": [-1.0, 0.0, -0.3],
+    }
+    del fin["controls"]
+    document = with_elevator()
+    document["surfaces"].append(fin)
+    aircraft, flight = aircraft_of(document), flight_of(FLIGHT | {"trim_drive": "elevator"})
+    for model in ("rigid", "flexible"):
+        moved = {"elevator": ConstantRate(0.1, 0.05, 0.05, ramp_s=0.02)}
+        found = fly(aircraft, flight, moved, model=model, duration_s=0.2, lattice=COARSE, elements=4)
+        assert np.ptp(found.trajectory.euler[:, 1]) > 1e-3
+        assert np.abs(found.trajectory.euler[:, [0, 2]]).max() < 1e-9
