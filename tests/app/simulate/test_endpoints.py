@@ -265,7 +265,7 @@ def test_separate_wings_are_accepted(service: RunningService) -> None:
 
 OWN = {name: RESULT["model"][name] for name in ("division", "stiffness_nm_rad", "damping_nms_rad")}
 SURFACES: dict[str, Any] = {
-    "right wing": {**OWN, "profile_drag": 0.01},
+    "right wing": {**OWN, "profile_drag": 0.01, "zero_lift_rad": 0.0, "cm0": 0.0},
     "left wing": {"mirror_of": "right wing"},
 }
 
