@@ -45,6 +45,7 @@ class RingTable:
     edge_panel : (e, 2) the panels that carry the edge's force in equal parts (the same panel twice at root,
     tip and fronts).
     leg_start, leg_plus, leg_minus : (l,) trailing-edge corner and rings of each wake leg.
+    leg_width_m : (l,) width of the wider strip beside each leg.
     edge_surface, leg_surface : (e,), (l,) surface of each edge and leg.
     panel_size_m, mean_chord_m : (s,) of each surface, the reference lengths of the two core laws.
     ring_corner : (r, 4) corners of each ring: root front, tip front, root aft, tip aft.
@@ -61,6 +62,7 @@ class RingTable:
     leg_start: IntArray
     leg_plus: IntArray
     leg_minus: IntArray
+    leg_width_m: Array
     edge_surface: IntArray
     leg_surface: IntArray
     panel_size_m: Array
@@ -154,6 +156,8 @@ def influence(
         table.leg_plus,
         table.leg_minus,
         radius[table.leg_surface],
+        table.leg_width_m,
+        table.mean_chord_m[table.leg_surface],
         core.law == "smoothed",
         u_B,
         np.empty((3, points.shape[0])),
@@ -202,6 +206,7 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
         leg_plus, leg_minus = leg_minus, leg_plus
     start = np.concatenate([corners[:-1, :-1].ravel(), corners[:-1].ravel()])
     end = np.concatenate([corners[:-1, 1:].ravel(), corners[1:].ravel()])
+    width = np.diff(lattice.strip_edges_m)
     quarters = (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
     return {
         "edge_start": start,
@@ -212,6 +217,7 @@ def _surface_table(lattice: SurfaceLattice, index: int, corner: int, ring: int) 
         "leg_start": corners[-1],
         "leg_plus": leg_plus,
         "leg_minus": leg_minus,
+        "leg_width_m": np.maximum(np.append(width, 0.0), np.append(0.0, width)),
         "edge_surface": np.full(start.size, index),
         "leg_surface": np.full(strips + 1, index),
         "panel_size_m": np.array([lattice.panel_size_m]),

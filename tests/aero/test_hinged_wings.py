@@ -84,12 +84,12 @@ def test_core_does_not_matter(aircraft, sweep):
     assert lifts[0] == pytest.approx(lifts[1], rel=1e-3)
 
 
-@pytest.mark.parametrize(("core", "low", "high"), [(0.1, 0.5, 2.0), (1e-6, 10.0, np.inf)])
-def test_core_holds_where_a_leg_strikes_a_control_point(core, low, high):
+@pytest.mark.parametrize("core", [0.1, 1e-6])
+def test_core_holds_where_a_leg_strikes_a_control_point(core):
     """A wing shifted sideways in the plane of another's wake: its control points pass the legs within 0.1 mm.
 
-    With the core the largest circulation stays within twice that of a clear pass midway between the legs;
-    with next to none it is more than ten times as large, which is what the core is for.
+    The largest circulation stays within 2 per cent of that of a clear pass midway between the legs, whatever
+    the core at the trailing edge: it has grown to the width of a strip.
     """
     wings = straight_wings(1.0, 0.2, 0.2)
     front = wings.surfaces[0]
@@ -103,7 +103,7 @@ def test_core_holds_where_a_leg_strikes_a_control_point(core, low, high):
     struck = max(
         peak(offset) for offset in np.linspace(0.049, 0.051, 21)
     )  # legs every 0.1 m, controls halfway
-    assert low < struck / peak(0.0) < high
+    assert struck / peak(0.0) == pytest.approx(1.0, abs=0.02)
 
 
 def test_lift_of_the_strips_adds_up(aircraft):

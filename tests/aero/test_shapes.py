@@ -116,10 +116,11 @@ def assert_close(found: Loads, expected: Loads, share: float) -> None:
 def test_lattice_against_aerosandbox(name: str, alpha: float, beta: float) -> None:
     """Forces, moments and induced drag of the same vortices agree within half a per cent (required: 2).
 
-    A swept tapered wing with incidence, a wing with dihedral, wing and tail, wing and fin.
+    A swept tapered wing with incidence, a wing with dihedral, wing and tail, wing and fin. The fin's root is
+    in the wing's wake, whose cores grow here and not there: one per cent.
     """
     found = of_edges(SHAPES[name], alpha, beta, chordwise=False)
-    assert_close(found, other_program(SHAPES[name], alpha, beta), 0.005)
+    assert_close(found, other_program(SHAPES[name], alpha, beta), 0.01 if name == "finned" else 0.005)
 
 
 @pytest.mark.parametrize(("name", "alpha", "beta"), CASES)

@@ -22,8 +22,8 @@ def _segment(a, e, core4):  # the inlined laws are called from kernels only
 
 
 @entry_kernel
-def _leg(a, u, core4):
-    return leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core4)
+def _leg(a, u, core4, width4, chord2):
+    return leg_velocity(a[0], a[1], a[2], u[0], u[1], u[2], core4, width4, chord2)
 
 
 @entry_kernel
@@ -44,13 +44,13 @@ def segment(start, end, point, core=TINY_CORE, law="line"):
     return np.array(_segment(start - point, end - start, core**4))
 
 
-def leg(start, direction, point, core=TINY_CORE, law="line"):
-    """Velocity at a point of a semi-infinite vortex of unit circulation."""
+def leg(start, direction, point, core=TINY_CORE, law="line", width=0.0, chord=1.0):
+    """Velocity at a point of a semi-infinite vortex of unit circulation; its core grows to ``width``."""
     start, direction, point = (np.asarray(v, dtype=float) for v in (start, direction, point))
     unit = direction / np.linalg.norm(direction)
     if law == "smoothed":
         return np.array(_smoothed_leg(start - point, unit, core**2))
-    return np.array(_leg(start - point, unit, core**4))
+    return np.array(_leg(start - point, unit, core**4, width**4, chord**2))
 
 
 def product_form(start, end, point, core):
@@ -207,3 +207,20 @@ def test_a_smoothed_core_reaches_further():
     for h in (0.0375, 0.06, 0.15):
         speed = np.linalg.norm(segment(*ends, (h, 0, 0), core, "smoothed"))
         assert speed == pytest.approx(h / (2 * np.pi * (h**2 + 2 * core**2)), rel=1e-6)
+
+
+def test_core_of_a_leg_grows_downstream():
+    """Upstream and beside the trailing edge a leg is as without growth; far behind, its core is its strip.
+
+    Growth has fraction (s^2 / (s^2 + chord^2))^4 of the width's fourth power, and that vortex is of Vatistas.
+    """
+    width, chord, h = 0.3, 0.5, 0.15
+    for s, change in ((-0.3, 0.0), (0.0, 0.0), (0.1 * chord, 1e-6), (0.25 * chord, 1e-4)):
+        plain = leg((0, 0, 0), (1, 0, 0), (s, h, 0))[2]
+        grown = leg((0, 0, 0), (1, 0, 0), (s, h, 0), width=width, chord=chord)[2]
+        assert abs(grown / plain - 1.0) <= change
+    s = 4.0 * chord
+    core4 = width**4 * (16.0 / 17.0) ** 4
+    plain = leg((0, 0, 0), (1, 0, 0), (s, h, 0))[2]
+    grown = leg((0, 0, 0), (1, 0, 0), (s, h, 0), width=width, chord=chord)[2]
+    assert grown / plain == pytest.approx(h**2 / np.sqrt(h**4 + core4), rel=1e-12)

@@ -29,6 +29,8 @@ def ring_influence(
     leg_plus,
     leg_minus,
     leg_core,
+    leg_width,
+    leg_chord,
     smoothed,
     wake,
     scratch,
@@ -43,6 +45,7 @@ def ring_influence(
     edge_plus, edge_minus : (e,) ring whose circulation runs along the edge, and ring whose circulation runs
     against it; -1 for none.
     leg_start : (l,) corner index on the trailing edge; leg_plus, leg_minus, leg_core : (l,) as for edges.
+    leg_width, leg_chord : (l,) width of the strips beside a leg and mean chord, m: see `vortex.grown_core`.
     smoothed : True for the core law "smoothed", False for "line".
     wake : (3,) unit vector of the free stream. scratch : (3, p).
     out : (3, r, p) velocity, 1/m.
@@ -78,9 +81,11 @@ def ring_influence(
             for p in range(count):
                 u[p], v[p], w[p] = smoothed_leg_velocity(px - x[p], py - y[p], pz - z[p], ux, uy, uz, core2)
         else:
-            core4 = leg_core[leg] ** 4
+            core4, width4, chord2 = leg_core[leg] ** 4, leg_width[leg] ** 4, leg_chord[leg] ** 2
             for p in range(count):
-                u[p], v[p], w[p] = leg_velocity(px - x[p], py - y[p], pz - z[p], ux, uy, uz, core4)
+                u[p], v[p], w[p] = leg_velocity(
+                    px - x[p], py - y[p], pz - z[p], ux, uy, uz, core4, width4, chord2
+                )
         _gather(scratch, leg_plus[leg], leg_minus[leg], out)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.kernels.vortex import (
+    grown_core,
     leg_strength,
     segment_strength,
     smoothed_leg_strength,
@@ -32,10 +33,11 @@ class LatticeParts(NamedTuple):
 
     Lines : (e + l,) bound edges, then legs; ``line_end`` of a leg is -1. line_plus, line_minus : the ring
     whose circulation runs along the line, and the one against it; r for none. line_core : core radius, m, to
-    the fourth, "smoothed" squared. ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on :
-    sections and places of riders, as in `moving_lattice.Riders`. moment_area : (t,) cm0 times the integral of
-    the chord squared, m^3. slope : (r,) of the mean line, nose up. stretch : 1 / beta of Goethert's rule.
-    density : kg/m^3. control_slope : (c, r) slopes of the panels per unit deflection of each control surface.
+    the fourth, "smoothed" squared; line_width4, line_chord2 : of legs, as in `vortex.grown_core`.
+    ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on : sections and places of riders, as
+    in `moving_lattice.Riders`. moment_area : (t,) cm0 times the integral of the chord squared, m^3. slope :
+    (r,) of the mean line, nose up. stretch : 1 / beta of Goethert's rule. density :
+    kg/m^3. control_slope : (c, r) slopes of the panels per unit deflection of each control surface.
     """
 
     line_start: IntArray
@@ -43,6 +45,8 @@ class LatticeParts(NamedTuple):
     line_plus: IntArray
     line_minus: IntArray
     line_core: Array
+    line_width4: Array
+    line_chord2: Array
     ring_corner: IntArray
     panel_side: Array
     corner: IntArray
@@ -207,7 +211,7 @@ def _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, smoot
 
 
 @kernel
-def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, smoothed, out):
+def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, width4, chord2, smoothed, out):
     """Factors k of a leg's velocity -k (u x a) at points."""
     if smoothed:
         for p in range(out.size):
@@ -220,7 +224,7 @@ def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, smoothed, out):
             ax, ay, az = px - x[p], py - y[p], pz - z[p]
             cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
             along, cross2 = ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz
-            out[p] = leg_strength(from_start[p], along, cross2, core)
+            out[p] = leg_strength(from_start[p], along, cross2, grown_core(along, core, width4, chord2))
 
 
 @kernel
@@ -270,7 +274,8 @@ def normal_influence(parts, place):
         core, end = parts.line_core[line], parts.line_end[line]
         from_start = place.distances[parts.line_start[line], :rings]
         if end < 0:
-            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
+            width4, chord2 = parts.line_width4[line], parts.line_chord2[line]
+            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, width4, chord2, parts.smoothed, k)
         else:
             from_end = place.distances[end, :rings]
             _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
@@ -315,7 +320,8 @@ def _sum_induced(parts, place, gamma):
         core, end = parts.line_core[line], parts.line_end[line]
         from_start = place.distances[parts.line_start[line], rings:]
         if end < 0:
-            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, parts.smoothed, k)
+            width4, chord2 = parts.line_width4[line], parts.line_chord2[line]
+            _legs(x, y, z, from_start, px, py, pz, ex, ey, ez, core, width4, chord2, parts.smoothed, k)
         else:
             from_end = place.distances[end, rings:]
             _segments(x, y, z, from_start, from_end, px, py, pz, ex, ey, ez, core, parts.smoothed, k)

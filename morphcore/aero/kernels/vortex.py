@@ -55,6 +55,20 @@ def leg_strength(a, along, cross2, core4):
 
 
 @inlined
+def grown_core(along, core4, width4, chord2):
+    """Core radius to the fourth, m^4, of a wake leg beside a point; "line". ``along`` as in ``leg_strength``.
+
+    Grows downstream from the core at the trailing edge to the width of the leg's strips (``width4``, m^4),
+    most of it within two chords (``chord2``, m^2): a surface close to the wake of another one then meets a
+    sheet instead of single vortices whose places between its own strips are an accident.
+    """
+    behind2 = along * along if along < 0.0 else 0.0
+    grown = behind2 / (behind2 + chord2)
+    grown *= grown
+    return core4 + width4 * grown * grown
+
+
+@inlined
 def smoothed_segment_strength(a, b, dot, cross2, length2, core2):
     """Factor k of a segment as in ``segment_strength``; "smoothed", core radius squared, m^2."""
     ab = a * b + TINY
@@ -91,14 +105,16 @@ def segment_velocity(ax, ay, az, ex, ey, ez, core4):
 
 
 @inlined
-def leg_velocity(ax, ay, az, ux, uy, uz, core4):
+def leg_velocity(ax, ay, az, ux, uy, uz, core4, width4, chord2):
     """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along u from P + a; "line".
 
-    ``u`` is a unit vector. Circulation is right-handed about ``u``; arguments as in ``segment_velocity``.
+    ``u`` is a unit vector. Circulation is right-handed about ``u``; ``width4`` and ``chord2`` as in
+    ``grown_core``, the others as in ``segment_velocity``.
     """
     cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
     a = sqrt(ax * ax + ay * ay + az * az)
-    k = leg_strength(a, ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz, core4)
+    along = ax * ux + ay * uy + az * uz
+    k = leg_strength(a, along, cx * cx + cy * cy + cz * cz, grown_core(along, core4, width4, chord2))
     return -k * cx, -k * cy, -k * cz
 
 
