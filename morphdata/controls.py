@@ -11,7 +11,17 @@ from pydantic import Field, create_model
 
 from morphdata.base import Document
 from morphdata.channels import is_channel
-from morphdata.drives import RESERVED, SIDES, Drive, Hinge, OfSide, Turned, drive_name, drives_of
+from morphdata.drives import (
+    RESERVED,
+    SIDES,
+    Drive,
+    Hinge,
+    OfSide,
+    Turned,
+    drive_name,
+    drives_of,
+    range_faults,
+)
 from morphdata.faults import Fault
 
 MAX_CONTROLS = 8  # of one surface
@@ -90,21 +100,7 @@ class Control(_Stretch):
                 "/from",
                 "Both are shares of the span from the root: give the inboard end first.",
             )
-        if self.min_rad >= self.max_rad:
-            yield Fault(
-                "range_upside_down",
-                f"min_rad {self.min_rad:g} is not below max_rad {self.max_rad:g}.",
-                "/min_rad",
-                "Swap them, or correct one.",
-            )
-        elif not self.min_rad <= self.angle_rad <= self.max_rad:
-            yield Fault(
-                "angle_out_of_range",
-                f"The control is held at {self.angle_rad:g} rad, and goes from {self.min_rad:g} to "
-                f"{self.max_rad:g} rad.",
-                "/angle_rad",
-                "Give an angle inside the range, or widen min_rad and max_rad.",
-            )
+        yield from range_faults("control", self.min_rad, self.max_rad, self.angle_rad)
 
 
 Controls = Annotated[list[Control], Field(min_length=1, max_length=MAX_CONTROLS)]

@@ -84,21 +84,25 @@ class Hinge(Document):
                     "/name",
                     'Name its drive, for example "cant"; only x, y and z have default names.',
                 )
-        if self.min_rad >= self.max_rad:
-            yield Fault(
-                "range_upside_down",
-                f"min_rad {self.min_rad:g} is not below max_rad {self.max_rad:g}.",
-                "/min_rad",
-                "Swap them, or correct one.",
-            )
-        elif not self.min_rad <= self.angle_rad <= self.max_rad:
-            yield Fault(
-                "angle_out_of_range",
-                f"The hinge is held at {self.angle_rad:g} rad, and goes from {self.min_rad:g} to "
-                f"{self.max_rad:g} rad.",
-                "/angle_rad",
-                "Give an angle inside the range, or widen min_rad and max_rad.",
-            )
+        yield from range_faults("hinge", self.min_rad, self.max_rad, self.angle_rad)
+
+
+def range_faults(what: str, min_rad: float, max_rad: float, angle_rad: float) -> Iterator[Fault]:
+    """Check that the range of a drive has a width and holds the held angle."""
+    if min_rad >= max_rad:
+        yield Fault(
+            "range_upside_down",
+            f"min_rad {min_rad:g} is not below max_rad {max_rad:g}.",
+            "/min_rad",
+            "Swap them, or correct one.",
+        )
+    elif not min_rad <= angle_rad <= max_rad:
+        yield Fault(
+            "angle_out_of_range",
+            f"The {what} is held at {angle_rad:g} rad, and goes from {min_rad:g} to {max_rad:g} rad.",
+            "/angle_rad",
+            "Give an angle inside the range, or widen min_rad and max_rad.",
+        )
 
 
 class OfSide(Protocol):

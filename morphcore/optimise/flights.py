@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
+from morphcore.models.kinematics import tip_bending
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
@@ -103,6 +104,8 @@ class MorphFlights:
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
         with naming_obstacles(partial(chain_obstacle, model, batch)):
             found = trim(self.model, batch, waiting, start=start).require()
+        self.alpha_rad = float(found.alpha[0])  # at the start
+        self.bending = tip_bending(self.model, batch, found.q_joint)  # (1, s), at the start
         self.constants = lane_constants(self.model, batch, self.grid.step_s)
         self.constants.set_thrust(*found.acting_B)
         self.state = trimmed_state(self.model, batch, waiting, found)

@@ -15,10 +15,12 @@ from morphcore.simulate.schedule import Schedule
 from morphcore.validity import (
     ResultWarning,
     air_warnings,
+    bending_warnings,
     deflection_warnings,
     documents,
     light_wing_warnings,
     overlap_warnings,
+    wake_warnings,
 )
 
 SHAPES = 9  # angles between the path's ends at which overlaps are checked
@@ -36,7 +38,11 @@ def schedule_warnings(
     optimum = schedules["optimum"]
     flown = flights["equivalent"]["optimum"]
     if optimum is not None and flown is not None and flown.variation is not None:
-        motion = case.flights("equivalent").motion(optimum)
+        bench = case.flights("equivalent")
+        motion = bench.motion(optimum)
+        found += bending_warnings(bench.model.aircraft, bench.bending, "the trim", "/model")
+        first = path_angles(case.aircraft, case.drives, np.array([case.morph.initial_rad]))[0]
+        found += wake_warnings(case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces")
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
     found += light_wing_warnings(case.aircraft, case.flight)
     path = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)
