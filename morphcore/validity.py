@@ -272,9 +272,9 @@ def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[R
 def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str) -> list[ResultWarning]:
     """A surface in the wake of another one, in a model whose wake keeps the direction that it has in trim.
 
-    Two aircraft, all rigid, whose elevators were moved: pitch differs by 0.6 of the motion from the model
-    whose wake moves where the tail comes within a quarter of a chord of the wing's wake, and by 0.1 from half
-    a chord on. A fin over the gap between the wings is as sensitive: roll by 0.07 at 0.7 chords.
+    An all-rigid aircraft whose elevator was moved: pitch differs by up to 0.04 of the motion from the model
+    whose wake moves, most at half a chord from the wing's wake, and by 0.02 at 1.3 chords. Within a quarter
+    of a chord it is up to 0.2 with the core law "smoothed", whose wake remains single vortices.
 
     Parameters
     ----------
