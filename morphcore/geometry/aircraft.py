@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +78,14 @@ class Aircraft(Shown):
     propulsion: Propulsion | None = None
 
     @classmethod
-    def of(cls, document: documents.Aircraft) -> Aircraft:
-        """Return the aircraft that a document describes."""
+    def of(cls, document: documents.Aircraft | Mapping[str, Any]) -> Aircraft:
+        """Return the aircraft that a document, or its parsed JSON, describes.
+
+        Raises
+        ------
+        InvalidInput : it is neither, or invalid.
+        """
+        document = documents.Aircraft.parse(document, "/aircraft")
         masses = document.point_masses or []
         surfaces = tuple(
             replace(_named(Surface.of(surface), n, document), point_masses=masses_on(surface.name, masses))
@@ -150,8 +157,14 @@ class Flight(Shown):
     trim_drive: str | None = None
 
     @classmethod
-    def of(cls, document: FlightDocument) -> Flight:
-        """Return the flight condition that a document describes."""
+    def of(cls, document: FlightDocument | Mapping[str, Any]) -> Flight:
+        """Return the flight condition that a document, or its parsed JSON, describes.
+
+        Raises
+        ------
+        InvalidInput : it is neither, or invalid.
+        """
+        document = FlightDocument.parse(document, "/flight")
         start = document.start
         return cls(
             airspeed_m_s=document.airspeed_m_s,

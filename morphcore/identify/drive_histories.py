@@ -26,7 +26,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.identify.measurement import DIFFERENCE, divided_differences, white_noise
 from morphcore.simulate.hinge_schedules import moved_flight
 from morphcore.simulate.trajectory import Trajectory, require_flight
-from morphdata.faults import refuse
+from morphdata.faults import InvalidInput, refuse
 from morphdata.identify import samples_faults
 from morphdata.measurement import Measurement
 
@@ -140,6 +140,13 @@ def smoothed_samples(
     InvalidInput
         No sample to train on, two samples of one name, or one that the aircraft cannot follow.
     """
+    for number, sample in enumerate(samples):
+        if not isinstance(sample, Trajectory):
+            raise InvalidInput(
+                f"a sample must be a Trajectory, not a {type(sample).__name__}",
+                pointer=f"/samples/{number}",
+                hint="load_trajectory(path) reads one from a file",
+            )
     refuse(samples_faults(samples))
     for number, sample in enumerate(samples):
         require_flight(sample, f"/samples/{number}")

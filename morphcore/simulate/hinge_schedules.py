@@ -28,7 +28,8 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules) -> Followed:
     Parameters
     ----------
     schedules : by the names of drives, their words (``sweep`` for both sides), or ``both``, ``left`` or
-    ``right`` if unambiguous; a document of such; or a flight whose measured angles are followed.
+    ``right`` if unambiguous; a document of such, or its parsed JSON; or a flight whose measured angles are
+    followed.
 
     Returns
     -------
@@ -42,6 +43,8 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules) -> Followed:
     """
     if isinstance(schedules, Trajectory):
         return followed_flight(aircraft, schedules, "/schedules")
+    if isinstance(schedules, Mapping) and not all(hasattr(value, "motion") for value in schedules.values()):
+        schedules = documents.Schedules.parse(dict(schedules), "/schedules")
     if isinstance(schedules, documents.Schedules):
         moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
         keys = schedules.keys_by_drive(aircraft.drives)
