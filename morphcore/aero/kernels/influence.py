@@ -45,7 +45,7 @@ def ring_influence(
     edge_plus, edge_minus : (e,) ring whose circulation runs along the edge, and ring whose circulation runs
     against it; -1 for none.
     leg_start : (l,) corner index on the trailing edge; leg_plus, leg_minus, leg_core : (l,) as for edges.
-    leg_width, leg_chord : (l,) width of the strips beside a leg and mean chord, m: see `vortex.leg_strength`.
+    leg_width, leg_chord : (l,) width of the strips beside a leg and mean chord, m: see `vortex.grown_core`.
     smoothed : True for the core law "smoothed", False for "line".
     wake : (3,) unit vector of the free stream. scratch : (3, p).
     out : (3, r, p) velocity, 1/m.

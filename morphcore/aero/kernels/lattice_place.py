@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.kernels.vortex import (
+    grown_core,
     leg_strength,
     segment_strength,
     smoothed_leg_strength,
@@ -32,7 +33,7 @@ class LatticeParts(NamedTuple):
 
     Lines : (e + l,) bound edges, then legs; ``line_end`` of a leg is -1. line_plus, line_minus : the ring
     whose circulation runs along the line, and the one against it; r for none. line_core : core radius, m, to
-    the fourth, "smoothed" squared; line_width4, line_chord2 : of legs, as in `vortex.leg_strength`.
+    the fourth, "smoothed" squared; line_width4, line_chord2 : of legs, as in `vortex.grown_core`.
     ring_corner : (r, 4); panel_side : (r,). corner, corner_arm and so on : sections and places of riders, as
     in `moving_lattice.Riders`. moment_area : (t,) cm0 times the integral of the chord squared, m^3. slope :
     (r,) of the mean line, nose up. stretch : 1 / beta of Goethert's rule. density :
@@ -223,7 +224,7 @@ def _legs(x, y, z, from_start, px, py, pz, ux, uy, uz, core, width4, chord2, smo
             ax, ay, az = px - x[p], py - y[p], pz - z[p]
             cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
             along, cross2 = ax * ux + ay * uy + az * uz, cx * cx + cy * cy + cz * cz
-            out[p] = leg_strength(from_start[p], along, cross2, core, width4, chord2)
+            out[p] = leg_strength(from_start[p], along, cross2, grown_core(along, core, width4, chord2))
 
 
 @kernel

@@ -44,24 +44,28 @@ def segment_strength(a, b, dot, cross2, length2, core4):
 
 
 @inlined
-def leg_strength(a, along, cross2, core4, width4, chord2):
-    """Factor k of a leg's velocity -k (u x a), 1/m; "line". ``along`` is a . u, else as above.
-
-    Downstream of the start by s the core is ``core4 + width4 (s^2 / (s^2 + chord2))^4``: it grows to the
-    width of the leg's strips (``width4``, m^4), mostly within two chords (``chord2``, m^2). A surface close
-    to the wake of another one then meets a sheet instead of single vortices whose places between its own
-    strips are an accident.
-    """
+def leg_strength(a, along, cross2, core4):
+    """Factor k of a leg's velocity -k (u x a), 1/m; "line". ``along`` is a . u, else as above."""
+    root = sqrt(cross2 * cross2 + core4)
     # along < 0: the point lies downstream of the start, next to the leg
     alongside = along <= 0.0
     above = a - along if alongside else cross2
     below = 1.0 if alongside else a + along
-    behind2 = along * along if alongside else 0.0
-    # the core's fraction is cleared from the root: no second division
-    most = (behind2 + chord2) * (behind2 + chord2)
-    grown = behind2 * behind2
-    root = sqrt((cross2 * cross2 + core4) * (most * most) + width4 * (grown * grown))
-    return above * most / (FOUR_PI * (a + TINY) * below * root)
+    return above / (FOUR_PI * (a + TINY) * below * root)
+
+
+@inlined
+def grown_core(along, core4, width4, chord2):
+    """Core radius to the fourth, m^4, of a wake leg beside a point; "line". ``along`` as in ``leg_strength``.
+
+    Grows downstream from the core at the trailing edge to the width of the leg's strips (``width4``, m^4),
+    most of it within two chords (``chord2``, m^2): a surface close to the wake of another one then meets a
+    sheet instead of single vortices whose places between its own strips are an accident.
+    """
+    behind2 = along * along if along < 0.0 else 0.0
+    grown = behind2 / (behind2 + chord2)
+    grown *= grown
+    return core4 + width4 * grown * grown
 
 
 @inlined
@@ -105,12 +109,12 @@ def leg_velocity(ax, ay, az, ux, uy, uz, core4, width4, chord2):
     """Velocity (3 components, 1/m of unit circulation) of a semi-infinite vortex along u from P + a; "line".
 
     ``u`` is a unit vector. Circulation is right-handed about ``u``; ``width4`` and ``chord2`` as in
-    ``leg_strength``, the others as in ``segment_velocity``.
+    ``grown_core``, the others as in ``segment_velocity``.
     """
     cx, cy, cz = uy * az - uz * ay, uz * ax - ux * az, ux * ay - uy * ax
     a = sqrt(ax * ax + ay * ay + az * az)
     along = ax * ux + ay * uy + az * uz
-    k = leg_strength(a, along, cx * cx + cy * cy + cz * cz, core4, width4, chord2)
+    k = leg_strength(a, along, cx * cx + cy * cy + cz * cz, grown_core(along, core4, width4, chord2))
     return -k * cx, -k * cy, -k * cz
 
 
