@@ -113,16 +113,15 @@ def lattice_parts(
         np.concatenate([table.edge_minus, table.leg_minus]),
     )
     plus, minus = (np.where(rings < 0, table.rings, rings) for rings in ring)
-    of_line = radius[np.concatenate([table.edge_surface, table.leg_surface])]
-    edges = np.ones(table.edge_start.size)
+    surface = np.concatenate([table.edge_surface, table.leg_surface])
     return LatticeParts(
         line_start=np.concatenate([table.edge_start, table.leg_start]),
         line_end=np.concatenate([table.edge_end, np.full(table.leg_start.size, -1)]),
         line_plus=plus,
         line_minus=minus,
-        line_core=of_line ** (2 if core.law == "smoothed" else 4),
-        line_width4=np.concatenate([0.0 * edges, table.leg_width_m**4]),
-        line_chord2=np.concatenate([edges, table.mean_chord_m[table.leg_surface] ** 2]),
+        line_core=radius[surface] ** (2 if core.law == "smoothed" else 4),
+        line_width4=np.concatenate([np.zeros(table.edges), table.leg_width_m**4]),
+        line_chord2=table.mean_chord_m[surface] ** 2,
         ring_corner=table.ring_corner.copy(),
         panel_side=np.array(table.panel_side, dtype=np.float64),
         corner=riders.corner,

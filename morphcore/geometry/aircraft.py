@@ -86,9 +86,9 @@ class Aircraft(Shown):
         InvalidInput : it is neither, or invalid.
         """
         document = documents.Aircraft.parse(document, "/aircraft")
-        masses = document.point_masses or []
+        masses, names = document.point_masses or [], control_names(document.surfaces)
         surfaces = tuple(
-            replace(_named(Surface.of(surface), n, document), point_masses=masses_on(surface.name, masses))
+            replace(_named(Surface.of(surface), n, names), point_masses=masses_on(surface.name, masses))
             for n, surface in enumerate(document.surfaces)
         )
         propulsion = None if document.propulsion is None else Propulsion.of(document.propulsion)
@@ -186,9 +186,8 @@ class Flight(Shown):
         return 0.5 * self.air_density_kg_m3 * self.airspeed_m_s**2
 
 
-def _named(surface: Surface, number: int, document: documents.Aircraft) -> Surface:
+def _named(surface: Surface, number: int, names: Mapping[tuple[int, int], str]) -> Surface:
     """A surface whose controls have the names of their drives in the whole aircraft."""
-    names = control_names(document.surfaces)
     named = tuple(
         replace(control, drive=names[number, place]) for place, control in enumerate(surface.controls)
     )

@@ -38,7 +38,7 @@ from tests.models.chains import (
 )
 from tests.models.test_point_masses import by_hand, of_beams, of_links
 from tests.oracles.clamped_beams import DeadLoad, clamped_equilibrium
-from tests.simulate.flights import fly
+from tests.simulate.flights import assert_mirrored, fly
 
 Array = NDArray[np.float64]
 
@@ -326,16 +326,7 @@ def podded(*, is_even: bool = True) -> Aircraft:
 @pytest.mark.parametrize("kind", ["rigid", "equivalent", "flexible"])
 def test_mirror_images_fly_mirrored(kind: str) -> None:
     """Rows and pods on both sides: a morph of the other side gives the mirrored flight, 1e-9 rad."""
-    aircraft, flight = podded(), example_flight()
-    model: Any = physical_guess(chain_model(aircraft, flight, 3)) if kind == "equivalent" else kind
-    morph, still = ConstantRate(0.0, 0.3, 0.6), Hold()
-    one, other = (
-        fly(aircraft, flight, sides, model=model, duration_s=0.4, output_step_s=0.02).trajectory
-        for sides in ([morph, still], [still, morph])
-    )
-    assert np.abs(one.phi).max() > 1e-3
-    for name, sign in (("phi", 1.0), ("theta", -1.0), ("psi", 1.0)):
-        assert np.abs(getattr(one, name) + sign * getattr(other, name)).max() < 1e-9, name
+    assert_mirrored(podded(), example_flight(), kind)
 
 
 def test_half_an_aircraft_with_pods_flies_like_the_whole() -> None:

@@ -10,13 +10,12 @@ import pytest
 
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.lattice import surface_pose
-from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.models.equivalent import physical_guess
 from morphdata.aircraft import load_aircraft
 from tests.models.chains import EXAMPLES, aircraft_of, example_flight, random_batch, small_model
 from tests.models.test_point_masses import of_beams, of_links
 from tests.oracles.tree import spatial_inertia
-from tests.simulate.flights import fly
+from tests.simulate.flights import assert_mirrored
 
 SHAPE = {"sweep_rad": 0.35, "dihedral_rad": 0.1, "incidence_rad": 0.02}
 
@@ -77,13 +76,4 @@ def test_mass_centre_and_inertia_of_swept_wings() -> None:
 @pytest.mark.parametrize("kind", ["rigid", "equivalent", "flexible"])
 def test_swept_mirror_images_fly_mirrored(kind: str) -> None:
     """A morph of the other side gives the mirrored flight, 1e-9 rad."""
-    aircraft, flight = swept(), example_flight()
-    model: Any = physical_guess(chain_model(aircraft, flight, 3)) if kind == "equivalent" else kind
-    morph, still = ConstantRate(0.0, 0.3, 0.6), Hold()
-    one, other = (
-        fly(aircraft, flight, sides, model=model, duration_s=0.4, output_step_s=0.02).trajectory
-        for sides in ([morph, still], [still, morph])
-    )
-    assert np.abs(one.phi).max() > 1e-3
-    for name, sign in (("phi", 1.0), ("theta", -1.0), ("psi", 1.0)):
-        assert np.abs(getattr(one, name) + sign * getattr(other, name)).max() < 1e-9, name
+    assert_mirrored(swept(), example_flight(), kind)

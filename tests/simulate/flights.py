@@ -22,7 +22,7 @@ from morphcore.models.equivalent import (
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.flight import Simulation, flight_steps
 from morphcore.simulate.plan import FlightPlan, flight_plan
-from morphcore.simulate.schedule import Schedule, Tabulated
+from morphcore.simulate.schedule import ConstantRate, Hold, Schedule, Tabulated
 from morphcore.simulate.time_grid import TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory, load_trajectory
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
@@ -116,3 +116,16 @@ def fly(aircraft: Aircraft, flight: Flight, schedules: Any, **options: Any) -> S
         schedules = dict(zip(aircraft.drives, schedules, strict=True))
     steps = flight_steps(aircraft, flight, schedules, **options)
     return next(step.simulation for step in steps if step.simulation is not None)
+
+
+def assert_mirrored(aircraft: Aircraft, flight: Flight, kind: str) -> None:
+    """A morph of the other side, of an aircraft with two drives, gives the mirrored flight to 1e-9 rad."""
+    model: Any = physical_guess(chain_model(aircraft, flight, 3)) if kind == "equivalent" else kind
+    morph, still = ConstantRate(0.0, 0.3, 0.6), Hold()
+    one, other = (
+        fly(aircraft, flight, sides, model=model, duration_s=0.4, output_step_s=0.02).trajectory
+        for sides in ([morph, still], [still, morph])
+    )
+    assert np.abs(one.phi).max() > 1e-3
+    for name, sign in (("phi", 1.0), ("theta", -1.0), ("psi", 1.0)):
+        assert np.abs(getattr(one, name) + sign * getattr(other, name)).max() < 1e-9, name
