@@ -125,7 +125,7 @@ class SearchedModel(Document):
         description="Aerodynamic corrections that are searched; the others keep their neutral values. "
         "Left out: those that the training samples determine, which are all, but `profile_drag` only if one "
         "is asymmetric (its sweeps differ, or it rolls or yaws, by more than 0.01 rad), and `zero_lift_rad` "
-        "and `cm0` only if `bounds` has them.",
+        "and `cm0` only if `bounds` has them or the samples are far likelier with them.",
     )
     bounds: Annotated[Bounds | None, Option("--bounds", MODEL)] = Field(
         default=None, description="Where the search may look."

@@ -15,14 +15,14 @@ from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, 
 from morphcore.identify.descents import METHODS, PRIOR_RAD, descent
 from morphcore.identify.drive_histories import SmoothedSamples, smoothed_samples
 from morphcore.identify.first_angles import first_angle_columns, with_first_angles
-from morphcore.identify.free_corrections import determined_corrections
+from morphcore.identify.free_corrections import determined_corrections, linearised, spare_corrections
 from morphcore.identify.free_start import with_start
 from morphcore.identify.measurement import Openness, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
 from morphcore.identify.profile import require_names
 from morphcore.identify.result import IdentifyResult, identify_result
-from morphcore.identify.rounds import Prepared, linearised, reviewed
+from morphcore.identify.rounds import Prepared, reviewed
 from morphcore.identify.settings import SearchSettings
 from morphcore.models.equivalent import ChainModel, chain_model
 from morphcore.search.checkpoint import pack, unpack
@@ -43,7 +43,7 @@ from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
 
-VERSION = "identification 6"  # of the checkpoint; another one is not read
+VERSION = "identification 7"  # of the checkpoint; another one is not read
 
 
 class Identification:
@@ -116,25 +116,34 @@ class Identification:
                 hint='use AutoIdentification, or identify(..., links_per_wing="auto")',
             )
         self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
-        free: Sequence[str] | None = self.settings.aero_coefficients
-        bounds = None if self.settings.bounds is None else self.settings.bounds.given()
-        if free is None:
-            training = [sample for sample in samples.given if sample.role == "train"]
-            free = determined_corrections(self.model.parameters, training, bounds or ())
-        self._first_space: SearchSpace = search_space(
+        self._bounds = None if self.settings.bounds is None else self.settings.bounds.given()
+        training = [sample for sample in samples.given if sample.role == "train"]
+        given: Sequence[str] | None = self.settings.aero_coefficients
+        determined = determined_corrections(self.model.parameters, training, self._bounds or ())
+        # that are searched from the beginning
+        self.first_corrections: tuple[str, ...] = determined if given is None else tuple(given)
+        # a rigid wing misses so much that anything would explain it
+        decided = given is not None or self.model.links_per_wing == 1
+        self._spare = (
+            () if decided else spare_corrections(self.model.parameters, training, self.first_corrections)
+        )
+        self.prior_weight = PRIOR_RAD**2  # that the search gives the physical guess by now
+        self._begin(())
+        require_names(self.space, self.uncertainty.profile)
+
+    def _begin(self, further: tuple[str, ...]) -> None:
+        """Take up the search space in which further corrections are free: the flights call for them."""
+        self.further_corrections = further
+        self._first_space = search_space(
             self.model,
             separate_wings=self.settings.separate_wings,
-            aero_coefficients=free,
-            bounds=bounds,
+            aero_coefficients=(*self.first_corrections, *further),
+            bounds=self._bounds,
         )
-        # the same with the bounds that the search has widened by now, and the weight that it gives the prior
-        self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
-        require_names(self.space, self.uncertainty.profile)
-        warm_start = self.search.warm_start
+        self.space = self._first_space  # the same with the bounds that the search has widened by now
+        warm = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
-        self.known: Array = np.stack(
-            [*([] if warm_start is None else [self.space.encode(warm_start)]), self.space.guess]
-        )
+        self.known: Array = np.stack([*([] if warm is None else [self.space.encode(warm)]), self.space.guess])
 
     def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
@@ -205,6 +214,26 @@ class Identification:
         first, now = self._first_space.box, self.space.box
         return self.space.named((now.lower < first.lower) | (now.upper > first.upper))
 
+    @property
+    def spare_corrections(self) -> tuple[str, ...]:
+        """Names of the corrections that are fixed and would be searched if the flights called for them."""
+        return tuple(name for name in self._spare if name not in self.further_corrections)
+
+    def space_with(self, corrections: Sequence[str]) -> SearchSpace:
+        """The search space as it is by now, and with further corrections searched."""
+        if not corrections:
+            return self.space
+        wide = search_space(
+            self.model,
+            separate_wings=self.settings.separate_wings,
+            aero_coefficients=(*self.space.free_aero, *corrections),
+            bounds=self._bounds,
+        )
+        lower, upper = wide.lower.copy(), wide.upper.copy()
+        at = [wide.names.index(name) for name in self.space.names]
+        lower[at], upper[at] = self.space.lower, self.space.upper
+        return wide.widened(Box(lower, upper))
+
     def shapes(self) -> list[tuple[int, int]]:
         """Rows and channels of the residuals of each sample to fit."""
         return [(case.sample.time_s.size, int(case.setup.fitted.sum())) for case in self.training]
@@ -216,9 +245,10 @@ class Identification:
 
     def linearised(self, point: Array) -> tuple[Array, Array]:
         """Residuals (m,) and their Jacobian (m, d) at a search point (d,); the last ones are kept."""
-        if self._linear is None or self._linear[0] is not self.openness or any(self._linear[1] != point):
-            self._linear = (self.openness, point, *linearised(self, point))
-        return self._linear[2:]
+        kept = self._linear
+        if kept is None or kept[0] is not self.openness or not np.array_equal(kept[1], point):
+            kept = self._linear = (self.openness, point, *linearised(self, self.space, point))
+        return kept[2:]
 
     # the iterator
 
@@ -275,11 +305,15 @@ class Identification:
             self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
             if self._round != state.prepared.round:
                 self.openness, self._round = state.prepared.openness, state.prepared.round
+            if self.further_corrections != state.prepared.corrections:
+                self._begin(state.prepared.corrections)
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         if isinstance(state.solver, LeastSquaresState | HybridState):
             own = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
-            self.space = self._first_space.widened(own.box)
             self.prior_weight = float(own.best_weight.max())
+            # the descent before a review that has freed corrections was in a smaller space
+            if own.box.lower.size == self.space.dimension:
+                self.space = self._first_space.widened(own.box)
         return state
 
     def _reviewed(self, state: SearchState, stop: Stop | None) -> SearchState:

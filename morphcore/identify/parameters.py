@@ -282,6 +282,15 @@ class SearchSpace:
         near = BOUND_TOLERANCE * (self.upper - self.lower)
         return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
 
+    def coordinates_of(self, parameter: str) -> NDArray[np.int64]:
+        """Indices of the search coordinates of a parameter, of all surfaces."""
+        found = [
+            np.arange(at.start, at.stop)
+            for unknown, at, _ in self._parts()
+            if unknown.parameter.name == parameter
+        ]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *found])
+
     def named(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
         """Named parameters of some search coordinates (d,); a share of the span stands for its ratio."""
         return tuple(

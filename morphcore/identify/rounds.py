@@ -3,8 +3,9 @@
 Within a descent the noise of the channels, the scale of a robust loss and the set of unknowns are fixed. When
 it has ended, the residuals say more: sigmas that were not given are those of the residuals (iteratively
 reweighted least squares), the start is linearised about what was found, and biases, delays or starts that
-nobody declared are freed where linear algebra predicts that J falls at least tenfold. Then another descent
-goes on from there. What a round goes by is part of the search's state.
+nobody declared are freed where linear algebra predicts that J falls at least tenfold. When all that has
+settled, aerodynamic corrections are freed that the flights call for (`free_corrections`). Then another
+descent goes on from there. What a round goes by is part of the search's state.
 """
 
 from __future__ import annotations
@@ -16,14 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.identify.cost import (
-    DIVERGED_ANGLE,
-    SampleCase,
-    reduced_errors,
-    residuals,
-    shared_trims,
-)
+from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, reduced_errors, shared_trims
 from morphcore.identify.descents import descent
+from morphcore.identify.free_corrections import likelier_corrections
 from morphcore.identify.free_start import free_parts
 from morphcore.identify.measurement import (
     FLOOR,
@@ -35,7 +31,6 @@ from morphcore.identify.measurement import (
 from morphcore.identify.nuisance import linear_columns
 from morphcore.models.equivalent import ParameterBatch
 from morphcore.search.checkpoint import stored
-from morphcore.search.least_squares import differences
 from morphcore.search.run import SearchState
 from morphcore.search.solver import Batch
 from morphcore.stopping import Stop
@@ -43,6 +38,7 @@ from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
+    from morphcore.identify.parameters import SearchSpace
 
 Array = NDArray[np.float64]
 
@@ -72,11 +68,14 @@ class Prepared:
         Of each sample.
     round : int
         Descents before this one.
+    corrections : tuple of str
+        Corrections that are searched because the flights call for them.
     """
 
     step_s: float
     openness: tuple[Openness, ...] = ()
     round: int = 0
+    corrections: tuple[str, ...] = ()
 
 
 def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) -> SearchState | None:
@@ -98,13 +97,20 @@ def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) 
     if not (run.space.dimension and np.isfinite(state.best_cost)):
         return None
     found = next_openness(run, state.best)
-    if found is None:
+    further = likelier_corrections(run, state.best) if found is None else ()
+    if found is None and not further:
         return None
-    freed = any(a.reason != b.reason for a, b in zip(found, run.openness, strict=True))
-    prepared = Prepared(run.step_s, found, number + 1)
+    found = found or run.openness
+    freed = bool(further) or any(a.reason != b.reason for a, b in zip(found, run.openness, strict=True))
+    space, best = run.space_with(further), state.best
+    if further:
+        best = _moved(run, space, best)
+        found = tuple(replace(each, reference=_moved(run, space, each.reference)) for each in found)
+    prepared = Prepared(run.step_s, found, number + 1, (*run.further_corrections, *further))
     run.entered(replace(state, prepared=prepared))
+    run.space = space
     # with other unknowns the best model may lie in another valley
-    points = np.stack([state.best, *(run.known if freed else ())])
+    points = np.stack([best, *(run.known if freed else ())])
     known = run.evaluate(Batch(points), stop)
     leader = int(np.argmin(known.cost))
     if known.cost[leader] > DIVERGED_ANGLE**2 > state.best_cost:
@@ -129,6 +135,11 @@ def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) 
         history=(*state.history, row),
         over=False,
     )
+
+
+def _moved(run: Identification, space: SearchSpace, point: Array) -> Array:
+    """A point of the present search space in another one; an empty one stays."""
+    return space.encode(run.space.decode(point)) if point.size else point
 
 
 def next_openness(run: Identification, best: Array) -> tuple[Openness, ...] | None:
@@ -319,13 +330,3 @@ def _plausible(values: Sequence[tuple[float, str]]) -> bool:
     high = {"bias": MAX_BIAS_RAD, "delay": MAX_DELAY_S}
     judged = [(size, kind) for size, kind in values if kind in low]
     return any(size > low[kind] for size, kind in judged) and all(size < high[kind] for size, kind in judged)
-
-
-def linearised(run: Identification, point: Array) -> tuple[Array, Array]:
-    """Residuals (m,) and their Jacobian (m, d) at a search point (d,)."""
-
-    def errors(points: Array) -> Array:
-        return residuals(run.model, run.space.decode(points), run.training, run.settings.start)
-
-    residual, jacobian = differences(point[None, :], run.space.upper, errors)
-    return residual[0], jacobian[0]

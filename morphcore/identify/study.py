@@ -244,7 +244,7 @@ class Study:
             plan_s=state.plan_s,
             rounds=len(state.rounds),
             search={
-                "aero_coefficients": both_spellings(self.runs[0].space.free_aero),
+                "aero_coefficients": both_spellings(self.runs[0].first_corrections),
                 "method": self.search.method,
                 "seed": self.search.seed,
                 "flights": state.flights,

@@ -30,7 +30,8 @@ class StudyRow(Shown):
     flights of a role, rad^2; None where there is none, or where one diverged. rms_rad : per angle over the
     flights held out, else over the fitted ones. flight_s : median wall time of one flight, s; None before it
     is measured. identify_s : wall time of the identification, s. flights : flown for it.
-    unseen_directions : number of combinations of parameters that the samples cannot see. fit, model,
+    aero_coefficients : names of the corrections that were searched, those included that the samples called
+    for. unseen_directions : number of combinations of parameters that the samples cannot see. fit, model,
     warnings, verdict, measurement : as in the identification's result; model is None where none flew the
     samples to fit. finished : whether the search went to its end.
     """
@@ -44,6 +45,7 @@ class StudyRow(Shown):
     flight_s: float | None
     identify_s: float
     flights: int
+    aero_coefficients: list[str]
     unseen_directions: int
     fit: list[Document]
     model: Document | None
@@ -124,6 +126,7 @@ def study_row(run: Identification, found: IdentifyResult) -> StudyRow:
         flight_s=None,
         identify_s=document["search"]["wall_s"],
         flights=document["search"]["flights"],
+        aero_coefficients=document["search"]["aero_coefficients"],
         unseen_directions=len(document["uncertainty"]["unidentifiable"]),
         fit=fit,
         model=document["model"],

@@ -10,7 +10,7 @@ from morphcore.search.checkpoint import UnreadableCheckpoint, pack, stored, unpa
 
 Phase = Literal["search", "result", "timing", "done"]
 
-VERSION = "study 4"  # of the checkpoint; another one is not read
+VERSION = "study 5"  # of the checkpoint; another one is not read
 
 
 @stored

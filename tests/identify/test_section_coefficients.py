@@ -1,4 +1,4 @@
-"""Zero-lift angle and moment coefficient of the sections, identified on request."""
+"""Zero-lift angle and moment coefficient of the sections, identified where flights or requests ask for it."""
 
 from __future__ import annotations
 
@@ -65,31 +65,76 @@ def measured(name: str, role: Role = "train") -> Trajectory:
     return Trajectory(name, found.time_s, found.drives, found.phi, found.theta, found.psi, role=role)
 
 
-def identified(bounds: dict[str, list[float]] | None) -> IdentifyResult:
+def identified(corrections: list[str] | None) -> IdentifyResult:
     """Three links from three of those flights and an aircraft that knows nothing of camber."""
-    model = EquivalentModel.parse({"links_per_wing": 3, "bounds": bounds})
+    model = EquivalentModel(links_per_wing=3, aero_coefficients=corrections)
     return identify(aircraft(), flight(), [measured(name) for name in FITTED], model=model)
 
 
 @pytest.mark.timeout(600)
 def test_camber_that_the_document_does_not_know_is_found() -> None:
-    """Held-out flights to 1 mrad and tips to 5 per cent, with both free; and the coefficients themselves.
+    """Held-out flights to 1 mrad and tips to 5 per cent, unasked; and the coefficients themselves.
 
-    The chain has the beams' wings, so both are near their truth: 2 per cent and 5. Without them the fit is
-    ten times as far off, and bends the wing instead.
+    The chain has the beams' wings, so both are near their truth: 2 per cent and 5. Where they must keep the
+    values of the document the fit is ten times as far off, and bends the wing instead.
     """
-    with_both, without = identified(BOTH), identified(None)
-    aero = with_both.to_document()["model"]["aero"]
+    unasked, without = identified(None), identified(["lift_factor", "ac_offset_m", "profile_drag", "lag_s"])
+    document = unasked.to_document()
+    assert set(TRUTH) < set(document["search"]["aero_coefficients"])
+    aero = document["model"]["aero"]
     assert aero["zero_lift_rad"] == pytest.approx(TRUTH["zero_lift_rad"], rel=0.02)
     assert aero["cm0"] == pytest.approx(TRUTH["cm0"], rel=0.05)
     for name in HELD_OUT:
         truth = flown("flexible", name, aircraft(**TRUTH))
-        found, blind = (flown(each.parameters, name, aircraft()) for each in (with_both, without))
+        found, blind = (flown(each.parameters, name, aircraft()) for each in (unasked, without))
         assert np.abs(found.euler - truth.euler).max() < 1e-3
         assert np.abs(blind.euler - truth.euler).max() > 3e-3
         for tip in ("tip_left_z", "tip_right_z"):
             error = np.abs(found.extra[tip] - truth.extra[tip]).max()
             assert error < 0.05 * np.abs(truth.extra[tip]).max()
+
+
+def cambered_chain(noise_rad: float = 1e-5, **section: float) -> Identification:
+    """The search for two links from noisy flights of a chain with these sections."""
+    model = chain_model(reference_aircraft(), reference_flight(), 2)
+    truth = physical_guess(model).changed(**{name: np.full((1, 1), value) for name, value in section.items()})
+    samples = [
+        synthetic(truth, name=f"flight_{n}", left_rad=left, right_rad=right, noise_rad=noise_rad, seed=n)
+        for n, (left, right) in enumerate(((0.6, 0.6), (0.7, 0.4)))
+    ]
+    settings = EquivalentModel(links_per_wing=2, step_s=0.01)
+    return Identification(reference_aircraft(), reference_flight(), samples, settings)
+
+
+@pytest.mark.parametrize("noise_rad", [1e-6, 1e-5, 1e-4, 3e-4])
+def test_nothing_is_freed_that_flights_do_not_call_for(noise_rad: float) -> None:
+    """A chain without camber, within little or much noise."""
+    run = cambered_chain(noise_rad)
+    *_, last = run.steps()
+    run.state(last.checkpoint)
+    assert run.further_corrections == ()
+
+
+@pytest.mark.parametrize("section", [{"cm0": -0.05}, TRUTH])
+def test_what_flights_call_for_is_freed_and_found(section: dict[str, float]) -> None:
+    """Coefficients that the flown chain has, to five per cent of the larger one."""
+    run = cambered_chain(**section)
+    *_, last = run.steps()
+    found = run.space.decode(run.state(last.checkpoint).best)
+    assert set(run.further_corrections) >= set(section)
+    for name in TRUTH:
+        assert float(found[name].flat[0]) == pytest.approx(section.get(name, 0.0), abs=4e-3)
+
+
+def test_a_search_that_has_freed_corrections_resumes() -> None:
+    """From any checkpoint, before and after the review that frees them: the same steps to the bit."""
+    steps = list(cambered_chain(**TRUTH).steps())
+    reviewed = [n for n, step in enumerate(steps) if step.phase == "measurement"]
+    assert reviewed
+    for begun in (reviewed[0] - 1, reviewed[0], len(steps) - 2):
+        *_, last = cambered_chain(**TRUTH).steps(steps[begun].checkpoint)
+        assert last.best_cost == steps[-1].best_cost
+        assert last.generation == steps[-1].generation
 
 
 def on_rigid_wings(final_rad: float) -> dict[str, Any]:

@@ -32,6 +32,7 @@ def row(
         flight_s=0.01 * links,
         identify_s=1.0,
         flights=100,
+        aero_coefficients=[],
         unseen_directions=0,
         fit=[{"role": role, "J_rigid": 1.0} for role in roles],
         model={},
