@@ -73,6 +73,12 @@ class SimulationResult(Shown):
             },
             "trajectory": trajectory_document(flown),
             "drives": list(flown.drive_order),
+            **({} if self.simulation.shape is None else {"shape": self.simulation.shape.to_document()}),
+            **(
+                {"sections": [each.to_document() for each in self.simulation.strips]}
+                if self.simulation.strips
+                else {}
+            ),
             "summary": {
                 "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
                 "variation_rad2": attitude_variation(flown),
@@ -138,7 +144,7 @@ class SimulationRun:
             start=flown.start, environment=None if air is None or air.still else air,
             rng=np.random.default_rng(1 if air is None else air.seed), lattice=flown.lattice,
             elements=model.elements if isinstance(model, FlexibleModel) else DEFAULT_ELEMENTS,
-            channels=request.channels, stop=stop,
+            channels=request.channels, points=request.points, shape_times_s=request.shape_times_s, stop=stop,
         ):  # fmt: skip
             wall_s += self.clock() - begin  # excludes the caller's work between two steps
             if step.simulation is not None:

@@ -58,6 +58,11 @@ TORQUE_UNITS = {  # -> N m
     **dict.fromkeys(("nm", "n_m", "n*m", "n.m", "n·m"), 1.0),
     **dict.fromkeys(("knm", "kn_m", "kn*m", "kn.m"), 1e3),
 }
+FORCE_UNITS = {"n": 1.0, "kn": 1e3}  # -> N
+LINE_LOAD_UNITS = {  # -> N/m
+    **dict.fromkeys(("n_m", "n/m"), 1.0),
+    **dict.fromkeys(("kn_m", "kn/m"), 1e3),
+}
 UNIT_IN_BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
 
 
