@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from morphcore.aero.moving_lattice import acting_circulation
 from morphcore.models.flexible import FlexibleModel
+from morphcore.multibody.beam import Sections
 from morphcore.multibody.hinges import hinge_screws
 from morphcore.multibody.kernels.beam import apparent_forces
-from morphcore.multibody.kernels.helix import helix_map, helix_series
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.points import Point, specific_force
 from morphcore.simulate.record import Outputs
@@ -24,7 +24,7 @@ from morphcore.simulate.surface_loads import SurfaceLoads, section_loads
 
 Array = NDArray[np.float64]
 
-NUDGE_S = 1e-4  # over which the helix's map is differentiated: its error is of second order
+NUDGE_S = 1e-4  # by which the strains go on to differentiate the twist of a section: second-order accurate
 
 
 @dataclass
@@ -60,7 +60,14 @@ class FlexibleOutputs:
         self.found = Evaluation()
         self._flight, self._path, self._wind_N, self._outputs = FlexibleFlight(model), path, wind_N, outputs
         self._shapes = set(outputs.shape_rows.tolist())
-        self._places = [_place(model, point) for point in outputs.points if point.surface is not None]
+        self._points = [point for point in outputs.points if point.surface is not None]
+        places = [_place(model, point) for point in self._points]
+        self._carriers = Sections(
+            model.beams,
+            np.array([element for element, _, _ in places], dtype=np.int64),
+            np.array([fraction for _, fraction, _ in places]),
+        )
+        self._arms = [arm for _, _, arm in places]
 
     @property
     def wanted(self) -> bool:
@@ -89,10 +96,12 @@ class FlexibleOutputs:
         self.found.air_B.append(self._air(state, forces, wind_N))
         self.found.torque.append(self._torque(root_W, row))
         self._sections(acting, twists, wind_B)
-        for point, place in zip(
-            (each for each in self._outputs.points if each.surface is not None), self._places, strict=True
-        ):
-            self.found.points.setdefault(point.name, []).append(self._point(place, state))
+        if self._points:
+            twist, rate = self._motion_of_points(state)
+            for number, (point, arm) in enumerate(zip(self._points, self._arms, strict=True)):
+                own = slice(number, number + 1)
+                force = specific_force(arm, twist[own], rate[own])
+                self.found.points.setdefault(point.name, []).append(force[0])
 
     def _at_roots(self, state: FlexibleState, demands: Array) -> Array:
         """Sum (s, 6) about the roots, in their axes, of what the nodes of each surface require."""
@@ -146,11 +155,20 @@ class FlexibleOutputs:
         self.found.circulation.append(np.concatenate(circulation))
         self.found.velocity.append(np.stack([forward, velocity[:, 2]], axis=1))
 
-    def _point(self, place: _Place, state: FlexibleState) -> Array:
-        """Specific force (3,) at a point, in the axes of its section."""
-        twist, rate = place.motion(self._flight, state)
-        force: Array = specific_force(place.arm, twist[None], rate[None])[0]
-        return force
+    def _motion_of_points(self, state: FlexibleState) -> tuple[Array, Array]:
+        """Twists (q, 6) of the sections with points, and their rates relative to free fall, in their axes."""
+        work, poses, carriers = self._flight.work, state.poses, self._carriers
+        strains, ahead = work.strains.copy(), []
+        for step_s in (NUDGE_S, -NUDGE_S):
+            work.strains[:] = strains + step_s * work.rates
+            carriers.place(work, poses)
+            ahead.append(carriers.twists(state.V))
+        work.strains[:] = strains
+        carriers.place(work, poses)
+        falling = state.A.copy()
+        falling[:, 3:] -= np.einsum("nji,j->ni", poses.R, self._flight.gravity_N)
+        rate = carriers.twists(falling) + (ahead[0] - ahead[1]) / (2.0 * NUDGE_S)
+        return carriers.twists(state.V), rate
 
     def surfaces(self) -> SurfaceLoads:
         """Loads of the surfaces at all output times."""
@@ -179,51 +197,14 @@ class FlexibleOutputs:
         return Shape(times_s, position_N, R_NB, tuple(shapes))
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Where a point is: between two nodes, or at one (element -1), and its arm in the section's axes, m."""
-
-    element: int
-    node: int
-    fraction: float
-    arm: Array
-
-    def motion(self, flight: FlexibleFlight, state: FlexibleState) -> tuple[Array, Array]:
-        """Twist (6,) of the section, and its rate relative to free fall, in section axes."""
-        model, poses = flight.model, state.poses
-        falling = state.A.copy()
-        falling[:, 3:] -= np.einsum("nji,j->ni", poses.R, flight.gravity_N)
-        if self.element < 0:
-            return state.V[self.node], falling[self.node]
-        a, b = model.beams.ends[self.element]
-        d, rate = flight.work.strains[self.element], flight.work.rates[self.element]
-        series = helix_series([self.fraction])[0]
-        maps = [_map(d + step * rate, self.fraction, series) for step in (-NUDGE_S, 0.0, NUDGE_S)]
-        apart, change = state.V[b] - state.V[a], (maps[2] - maps[0]) / (2.0 * NUDGE_S)
-        return (
-            state.V[a] + maps[1] @ apart,
-            falling[a] + maps[1] @ (falling[b] - falling[a]) + change @ apart,
-        )
-
-
-def _map(d: Array, fraction: float, series: Array) -> Array:
-    """P (6, 6) of `multibody.kernels.helix`: twist of a section = V_a + P (V_b - V_a)."""
-    blocks = np.empty((2, 3, 3))
-    helix_map(d, fraction, series, blocks)
-    out = np.zeros((6, 6))
-    out[:3, :3] = out[3:, 3:] = blocks[0]
-    out[3:, :3] = blocks[1]
-    return out
-
-
-def _place(model: FlexibleModel, point: Point) -> _Place:
-    names = [surface.name for surface in model.aircraft.surfaces]
-    number = names.index(point.surface or "")
+def _place(model: FlexibleModel, point: Point) -> tuple[int, float, Array]:
+    """Element and fraction of the section that carries a point, as in `Sections`, and the point's arm, m."""
+    number = [surface.name for surface in model.aircraft.surfaces].index(point.surface or "")
     surface, root, tip = model.aircraft.surfaces[number], int(model.roots[number]), int(model.tips[number])
     elements = tip - root
     if elements == 0:
-        return _Place(-1, root, 0.0, point.arm_W(surface, 0.0))
+        return -1 - root, 0.0, point.arm_W(surface, 0.0)
     inside = min(int(point.at * elements), elements - 1)
     first = int(np.flatnonzero(model.beams.ends[:, 0] == root)[0])
     arm = point.arm_W(surface, point.at * surface.length_m)
-    return _Place(first + inside, root + inside, point.at * elements - inside, arm)
+    return first + inside, point.at * elements - inside, arm

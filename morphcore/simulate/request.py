@@ -73,12 +73,7 @@ class SimulationResult(Shown):
             },
             "trajectory": trajectory_document(flown),
             "drives": list(flown.drive_order),
-            **({} if self.simulation.shape is None else {"shape": self.simulation.shape.to_document()}),
-            **(
-                {"sections": [each.to_document() for each in self.simulation.strips]}
-                if self.simulation.strips
-                else {}
-            ),
+            **self._requested(),
             "summary": {
                 "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
                 "variation_rad2": attitude_variation(flown),
@@ -88,6 +83,14 @@ class SimulationResult(Shown):
                 "real_time_factor": flown.duration_s / self.wall_s if self.wall_s > 0.0 else None,
             },
             "warnings": documents(self.simulation.warnings),
+        }
+
+    def _requested(self) -> Document:
+        """Shape and strips, where these are requested."""
+        shape, strips = self.simulation.shape, self.simulation.strips
+        return {
+            **({} if shape is None else {"shape": shape.to_document()}),
+            **({"sections": [each.to_document() for each in strips]} if strips else {}),
         }
 
 

@@ -65,6 +65,8 @@ def section_loads(
     for part in lattices:
         own = slice(first, first + part.spanwise)
         lift.append(density * speed[:, own] * circulation[:, own])
-        coefficient.append(2.0 * circulation[:, own] / (speed[:, own] * part.strip_chord_m))
+        swept = speed[:, own] * part.strip_chord_m
+        none = np.zeros_like(swept)  # where nothing moves through the air
+        coefficient.append(np.divide(2.0 * circulation[:, own], swept, out=none, where=swept > 0.0))
         first = own.stop
     return tuple(lift), tuple(coefficient)
