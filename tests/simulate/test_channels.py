@@ -199,7 +199,7 @@ def test_channels_that_are_not_requested_are_not_computed(monkeypatch: pytest.Mo
         recorded.append(record_rows)
         return fly_batch(*conditions, record_rows=record_rows, **options)
 
-    def refused(*_conditions: Any) -> Any:
+    def refused(*_conditions: Any, **_options: Any) -> Any:
         raise AssertionError("nobody has requested this")
 
     monkeypatch.setattr(flying, "fly_batch", counted)
