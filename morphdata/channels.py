@@ -40,6 +40,8 @@ class ChannelFacts:
         velocity start anew with every simulated flight, and loads are no sensor's reading.
     needs_gravity : bool
         Whether it is a multiple of the weight and so undefined without gravity.
+    side : {"", "left", "right"}
+        The side whose first hinged surface it is of; an aircraft without one lacks it.
     """
 
     name: str
@@ -49,6 +51,7 @@ class ChannelFacts:
     default: bool = False
     fitted: bool = True
     needs_gravity: bool = False
+    side: Literal["", "left", "right"] = ""
 
 
 CHANNELS: list[ChannelFacts] = [
@@ -66,12 +69,14 @@ CHANNELS: list[ChannelFacts] = [
         "m",
         "Tip of the first hinged left surface below its root, along z of the body axes.",
         default=True,
+        side="left",
     ),
     ChannelFacts(
         "tip_right_z",
         "m",
         "Tip of the first hinged right surface below its root, along z of the body axes.",
         default=True,
+        side="right",
     ),
     ChannelFacts(
         "alpha", "rad", "Angle of attack of the body relative to the air, wind subtracted: atan2(w, u)."

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from morphdata.base import Document, Result
-from morphdata.channels import channel_of
+from morphdata.channels import channel_of, column_parts
 from morphdata.faults import Fault
 from morphdata.options import MEASUREMENT, Option
 
@@ -117,6 +117,34 @@ def absent_channels(
                     pointer,
                     f"Add the column, or leave {name} out of measurement.channels.",
                 )
+
+
+def foreign_channels(
+    measurement: Measurement | None, surfaces: Sequence[tuple[str, str, bool]]
+) -> Iterator[Fault]:
+    """Check that the aircraft has the surfaces whose channels are fitted.
+
+    Parameters
+    ----------
+    measurement : Measurement, optional
+    surfaces : of (name, side, whether it has a hinge) of each surface.
+    """
+    parts = column_parts(name for name, _, _ in surfaces)
+    sides = {side for _, side, hinged in surfaces if hinged}
+    for name in () if measurement is None else measurement.names:
+        facts = channel_of(name)
+        if facts is None or not (facts.per == "surface" or facts.side):
+            continue
+        columns = [f"tip_z_{part}" for part in parts]
+        if facts.per == "surface":
+            columns = [f"{facts.name}_{part}" for part in parts]
+        if name not in columns and not (facts.side and facts.side in sides):
+            yield Fault(
+                "unknown_channel",
+                f"This aircraft has no channel {name}.",
+                f"/measurement/channels/{name}",
+                f"Channels of its surfaces are {', '.join(columns)}.",
+            )
 
 
 class Estimate(Result):
