@@ -72,7 +72,7 @@ def unit_pattern(units: Iterable[str]) -> re.Pattern[str]:
     All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match.
     """
     spelt = "|".join(map(re.escape, sorted(units, key=len, reverse=True)))
-    return re.compile(rf"(?P<name>.+?)[_./,:;-]*(?:in_)?[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
+    return re.compile(rf"(?P<name>.+?)(?:[_./,:;-]+in_|[_./,:;-]*)[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
 
 
 def plain(text: str) -> str:

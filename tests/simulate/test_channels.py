@@ -226,7 +226,7 @@ def test_a_flight_with_every_channel_is_a_sample_again(tmp_path: Any) -> None:
     found = flown("equivalent").trajectory
     write_trajectory_csv(found, tmp_path / "flight.csv")
     read = load_trajectory(tmp_path / "flight.csv")
-    assert list(read.extra) == list(found.extra)
+    assert list(read.extra) == list(found.extra) == list(read.channels)
     for name, column in found.extra.items():
         np.testing.assert_allclose(read.extra[name], column, rtol=1e-8, atol=1e-300)
     named = trajectory_document(found)
