@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -53,15 +54,15 @@ def flexible_flight(
     flight.thrust = np.concatenate([trim.moment_B + trim.thrust_moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
     run = FlexibleRun(flight, path, grid, wind_N, begin)
-    further = FlexibleOutputs(model, path, wind_N, outputs)
-    reported = list(enumerate(at)) if further.wanted else []
+    further = FlexibleOutputs(model, path, wind_N, outputs) if outputs.of_states else None
+    reported = deque([] if further is None else enumerate(at))
     for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None
         check_stop(stop)
         last = min(first + CHUNK_STEPS, grid.steps)
         with one_blas_thread():
-            while reported and reported[0][1] <= last:
-                number, row = reported.pop(0)
+            while further is not None and reported and reported[0][1] <= last:
+                number, row = reported.popleft()
                 run.fly_to(int(row))
                 further.evaluate(run.state, int(row), number)
             run.fly_to(last)
@@ -72,10 +73,10 @@ def flexible_flight(
     sines, loads, shape = records[:, RECORD + tips :], None, None
     if outputs.parts & {"loads", "surfaces"}:
         loads = Loads(records[:, 18:24])
-    if "surfaces" in outputs.parts:
+    if further is not None and "surfaces" in outputs.parts:
         loads = Loads(records[:, 18:24], np.array(further.found.torque), further.surfaces())
     chosen = outputs.shape_rows
-    if chosen.size:
+    if further is not None and chosen.size:
         shape = further.shape(times[at][chosen], history[chosen, 9:12], records[chosen, :9].reshape(-1, 3, 3))
     record = FlightRecord(
         euler=history[:, :3],
@@ -97,7 +98,7 @@ def flexible_flight(
             thrust_moment_B=trim.thrust_moment_B[None],
         ),
         shape=shape,
-        point_force={name: np.array(values) for name, values in further.found.points.items()},
+        point_force={} if further is None else further.point_force(),
         points=outputs.points,
     )
     yield 1.0, record

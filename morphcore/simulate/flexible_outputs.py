@@ -69,11 +69,6 @@ class FlexibleOutputs:
         )
         self._arms = [arm for _, _, arm in places]
 
-    @property
-    def wanted(self) -> bool:
-        """Whether anything is evaluated at every output time."""
-        return "surfaces" in self._outputs.parts or bool(self._shapes)
-
     def evaluate(self, state: FlexibleState, row: int, output_row: int) -> None:
         """Evaluate the state at a row of the grid, the ``output_row``-th that is reported."""
         if "surfaces" not in self._outputs.parts and output_row not in self._shapes:
@@ -178,6 +173,10 @@ class FlexibleOutputs:
             model.flight.air_density_kg_m3,
         )  # fmt: skip
         return SurfaceLoads(np.array(found.root_W), np.array(found.air_B), lift, coefficient)
+
+    def point_force(self) -> dict[str, Array]:
+        """Specific force (k, 3) at the points on surfaces, by name."""
+        return {name: np.array(values) for name, values in self.found.points.items()}
 
     def shape(self, times_s: Array, position_N: Array, R_NB: Array) -> Shape:
         """The shape at the requested rows, with the fuselage's position (t, 3) and attitude (t, 3, 3)."""

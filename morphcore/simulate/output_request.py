@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.lattice import surface_lattice
+from morphcore.shown import Shown
 from morphcore.simulate.channels import Channel, parts_of, requested_channels
 from morphcore.simulate.points import points_of
 from morphcore.simulate.record import Outputs, Part
@@ -23,8 +24,8 @@ from morphdata.points import Point
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class SurfaceStrips:
+@dataclass(frozen=True, repr=False)
+class SurfaceStrips(Shown):
     """Strips of a surface from the root: middles as shares of the span, widths across the chord, chords."""
 
     name: str

@@ -30,13 +30,18 @@ Part = Literal["twist", "loads", "surfaces"]
 class Outputs:
     """What a model records besides the motion.
 
-    parts : of the record. points : on surfaces, whose specific force is wanted. shape_rows : (t,) output rows
-    at which the shape is.
+    parts : of the record. points : at which specific force is reported. shape_rows : (t,) output rows of the
+    shape.
     """
 
     parts: frozenset[Part] = frozenset()
     points: tuple[Point, ...] = ()
     shape_rows: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def of_states(self) -> bool:
+        """Whether they need more of the states than the motion that every flight records."""
+        return "surfaces" in self.parts or self.shape_rows.size > 0
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.kinematics import link_poses
 from morphcore.models.links import link_edges
 from morphcore.multibody.kernels.hinge import H_ORIGIN, HINGE_ROWS
+from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -33,8 +34,8 @@ ACROSS = np.array([1.0, -1.0, 1.0])  # reflection about the x-z plane
 LINES = ("axis_N", "leading_N", "trailing_N")
 
 
-@dataclass(frozen=True)
-class SurfaceShape:
+@dataclass(frozen=True, repr=False)
+class SurfaceShape(Shown):
     """One surface at t times and k stations.
 
     name : of the surface. at : (k,) shares of the span, from the root; equal ones are the two sides of a
@@ -61,8 +62,8 @@ class SurfaceShape:
         }
 
 
-@dataclass(frozen=True)
-class Shape:
+@dataclass(frozen=True, repr=False)
+class Shape(Shown):
     """The aircraft at t times.
 
     time_s : (t,). position_N, R_NB : (t, 3) m and (t, 3, 3) of the fuselage. surfaces : in the aircraft's

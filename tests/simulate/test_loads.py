@@ -25,14 +25,24 @@ from morphcore.simulate.flight import Simulation
 from morphcore.simulate.record import Outputs
 from morphcore.simulate.schedule import HingeMotion, Hold
 from morphcore.simulate.shape import SurfaceShape
-from morphcore.simulate.torque import hinge_torques
+from morphcore.simulate.torque import chain_loads, hinge_torques
 from morphcore.simulate.trim import trim, trimmed_state
 from morphdata.channels import CHANNELS as KNOWN
 from morphdata.channels import column_parts
 from morphdata.lattice import Lattice
 from morphdata.points import Point
 from tests.aero.link_loads import lane_loads
-from tests.models.chains import Swing, aircraft_of, airless, example_aircraft, example_flight, flight_of
+from tests.models.chains import (
+    Swing,
+    aircraft_of,
+    airless,
+    example_aircraft,
+    example_flight,
+    flight_of,
+    motion_of,
+)
+from tests.oracles.chain_tree import chain_tree
+from tests.oracles.dynamics import energy
 from tests.simulate.flights import fly, fly_trimmed, plan_of, steps
 from tests.simulate.tailed_aircraft import FLIGHT, document, rigid
 
@@ -353,6 +363,35 @@ def test_hinge_torque_is_what_the_limit_of_optimisations_sees() -> None:
     ).trajectory  # fmt: skip
     values = np.stack([found.extra[f"hinge_torque_sweep_{side}"] for side in ("right", "left")], axis=1)
     np.testing.assert_allclose(values, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("links", [1, 3])
+def test_drives_of_chains_do_the_work_that_energy_and_air_do_not(links: int) -> None:
+    """In air: power of the motors = rate of the energy + losses in joints - power of air and thrust.
+
+    The energy is that of the textbook tree, its rate a central difference over 1 ms.
+    """
+    aircraft, flight = example_aircraft(), example_flight()
+    model = chain_model(aircraft, flight, links, COARSE)
+    batch, plan = physical_guess(model), plan_of(model, SMOOTH, 0.2, 5e-4)
+    whole = fly_trimmed(model, plan, batch)
+    assert whole.trim is not None
+    constants = lane_constants(model, batch, 5e-4)
+    constants.set_thrust(whole.trim.force_B, whole.trim.moment_B)
+    rows, states = np.array([339, 340, 341]), whole.states[339:342, 0]
+    loads = chain_loads(model, plan.instants(rows), constants, states, every_body=True)
+    tree, energies = chain_tree(model, batch), []
+    for row, state in zip(rows, states, strict=True):
+        hinges = np.stack([plan.angles[row], plan.rates[row], plan.accelerations[row]], axis=1)
+        energies.append(energy(tree, motion_of(model, hinges, state), gravity_N(flight)).total)
+    rate = (energies[2] - energies[0]) / 1e-3
+    joint_rates = states[1, 13 + model.coordinates : 13 + 2 * model.coordinates]
+    air = float(np.sum(loads.air_L[1] * loads.twist_L[1]))  # still air: twists are those over ground
+    thrust = float(whole.trim.moment_B[0] @ states[1, 4:7] + whole.trim.force_B[0] @ states[1, 7:10])
+    expected = rate + float(joint_rates @ (tree.damping * joint_rates)) - air - thrust
+    motors = float(loads.torque[1] @ plan.rates[340])
+    assert abs(motors) > 10.0
+    assert motors == pytest.approx(expected, abs=1e-5 * max(abs(rate), abs(air)))
 
 
 def test_drives_of_beams_do_the_work_that_energy_and_air_do_not() -> None:
