@@ -18,7 +18,7 @@ from morphcore.simulate.control_motion import control_angles, of_every_part
 from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
 from morphcore.simulate.record import FlightRecord, Loads, Outputs, require_sound
 from morphcore.simulate.schedule import Schedule
-from morphcore.simulate.shape import Shape, chain_shape, of_both_halves
+from morphcore.simulate.shape import chain_shape, of_both_halves
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.torque import chain_loads
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
@@ -94,7 +94,8 @@ def chain_flight(
     points: dict[str, Array] = {}
     if with_loads:
         loads, points = _loads(flown, batch, plan, constants, np.concatenate(states), at, outputs)
-    shape = _shape(flown, batch, hinges, q_joint, outputs) if outputs.shape_rows.size else None
+    chosen = outputs.shape_rows
+    shape = chain_shape(flown, batch, hinges[chosen], q_joint[chosen]) if chosen.size else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
         spread = model.mirror.spread
         angles, below = model.mirror.spread_hinges(angles), spread(below)
@@ -105,7 +106,6 @@ def chain_flight(
         shape = None if shape is None else of_both_halves(shape, model.mirror, names)
         found = replace(found, q_joint=whole_joints(model, found.q_joint))
     if shape is not None:
-        chosen = outputs.shape_rows
         R_NB = rotation_from_quaternion(quaternion[chosen])
         shape = shape.moved(grid.times_s[at][chosen], history[chosen, POSITION:JOINTS], R_NB)
     angles = np.concatenate([angles, control_angles(model.aircraft, schedules, grid.times_s[at])], axis=1)
@@ -126,13 +126,6 @@ def chain_flight(
         points=outputs.points,
     )
     yield 1.0, record
-
-
-def _shape(
-    model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array, outputs: Outputs
-) -> Shape:
-    """The shape at the requested rows, in B."""
-    return chain_shape(model, batch, hinges[outputs.shape_rows], q_joint[outputs.shape_rows])
 
 
 def _loads(

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.models.kinematics import link_poses, tip_positions
+from morphcore.models.kinematics import level_hinges, link_poses, tip_positions
 from morphcore.models.links import link_edges
-from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.points import ACROSS, Point, specific_force
 from morphcore.simulate.surface_loads import SurfaceLoads, section_loads
 from morphcore.simulate.torque import ChainLoads
@@ -41,13 +40,6 @@ def tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Arra
     R_WL, _ = link_poses(model, _repeated(batch, times), level_hinges(model), _rows(q_joint))
     last = model.surfaces[:, 0] + model.surfaces[:, 1] - 1
     return np.arcsin(np.clip(R_WL[:, last, 0, 2], -1.0, 1.0)).reshape(particles, times, -1)
-
-
-def level_hinges(model: ChainModel) -> Array:
-    """Hinges (s, HINGE_ROWS) at rest in the reference position, so that surfaces stay in wing axes."""
-    level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
-    level[:, :9] = np.eye(3).ravel()
-    return level
 
 
 def surface_loads(

@@ -21,9 +21,9 @@ from morphcore.geometry.lattice import SurfaceLattice, chord_points
 from morphcore.geometry.mirror import Mirror
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
-from morphcore.models.kinematics import link_poses
+from morphcore.models.kinematics import level_hinges, link_poses
 from morphcore.models.links import link_edges
-from morphcore.multibody.kernels.hinge import H_ORIGIN, HINGE_ROWS
+from morphcore.multibody.kernels.hinge import H_ORIGIN
 from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
@@ -136,9 +136,7 @@ def chain_shape(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint
     """
     times = q_joint.shape[0]
     repeated = batch.select(np.zeros(times, dtype=np.int64))
-    level = np.zeros((hinges.shape[1], HINGE_ROWS))
-    level[:, :9] = np.eye(3).ravel()
-    R_WL, r_W = link_poses(model, repeated, level, q_joint)
+    R_WL, r_W = link_poses(model, repeated, level_hinges(model), q_joint)
     chosen, shapes = model.set_of(batch), []
     for number, (surface, part) in enumerate(
         zip(model.aircraft.surfaces, model.lattice.lattices, strict=True)
