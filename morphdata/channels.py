@@ -11,9 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-MODEL_KINDS = ("rigid", "equivalent", "flexible")
 PART = re.compile(r"[a-z0-9_]{1,200}")  # of a surface's or drive's name in a column
-CHAINS = ("rigid", "equivalent")  # models of rigid links
+Per = Literal["", "surface", "strip", "drive", "point"]
 
 
 @dataclass(frozen=True)
@@ -29,47 +28,55 @@ class ChannelFacts:
         ``nz``.
     description : str
         One-line description, with frame and sign.
-    per : {"", "surface", "drive"}
-        Whether it has one column, or one for each surface or drive. The column of the surface "right wing" is
-        ``tip_z_right_wing``: its name in small letters and digits, underscores between (see `column_parts`).
+    per : {"", "surface", "strip", "drive", "point"}
+        Whether it has one column, or one for each surface, strip of a surface or drive. The column of the
+        surface "right wing" is ``tip_z_right_wing``: its name in small letters and digits, underscores
+        between (see `column_parts`); its strips are numbered from the root, ``section_cl_right_wing_1``. A
+        channel of points has its own column for the reference point and one for each given point, ``fz_imu``.
     default : bool
         Whether a flight has it if no channels are requested.
-    models : tuple of str
-        Kinds of models that provide it.
+    fitted : bool
+        Whether an identification can fit it as a measured channel of sample flights. Position and horizontal
+        velocity start anew with every simulated flight, and loads are no sensor's reading.
     needs_gravity : bool
         Whether it is a multiple of the weight and so undefined without gravity.
+    side : {"", "left", "right"}
+        The side whose first hinged surface it is of; an aircraft without one lacks it.
     """
 
     name: str
     unit: str
     description: str
-    per: Literal["", "surface", "drive"] = ""
+    per: Per = ""
     default: bool = False
-    models: tuple[str, ...] = MODEL_KINDS
+    fitted: bool = True
     needs_gravity: bool = False
+    side: Literal["", "left", "right"] = ""
 
 
 CHANNELS: list[ChannelFacts] = [
     ChannelFacts("p", "rad/s", "Roll rate, body axes.", default=True),
     ChannelFacts("q", "rad/s", "Pitch rate, body axes.", default=True),
     ChannelFacts("r", "rad/s", "Yaw rate, body axes.", default=True),
-    ChannelFacts("vx", "m/s", "Velocity of the reference point, north.", default=True),
-    ChannelFacts("vy", "m/s", "Velocity of the reference point, east.", default=True),
+    ChannelFacts("vx", "m/s", "Velocity of the reference point, north.", default=True, fitted=False),
+    ChannelFacts("vy", "m/s", "Velocity of the reference point, east.", default=True, fitted=False),
     ChannelFacts("vz", "m/s", "Velocity of the reference point, down.", default=True),
-    ChannelFacts("x", "m", "Position of the reference point, north.", default=True),
-    ChannelFacts("y", "m", "Position of the reference point, east.", default=True),
-    ChannelFacts("z", "m", "Position of the reference point, down.", default=True),
+    ChannelFacts("x", "m", "Position of the reference point, north.", default=True, fitted=False),
+    ChannelFacts("y", "m", "Position of the reference point, east.", default=True, fitted=False),
+    ChannelFacts("z", "m", "Position of the reference point, down.", default=True, fitted=False),
     ChannelFacts(
         "tip_left_z",
         "m",
         "Tip of the first hinged left surface below its root, along z of the body axes.",
         default=True,
+        side="left",
     ),
     ChannelFacts(
         "tip_right_z",
         "m",
         "Tip of the first hinged right surface below its root, along z of the body axes.",
         default=True,
+        side="right",
     ),
     ChannelFacts(
         "alpha", "rad", "Angle of attack of the body relative to the air, wind subtracted: atan2(w, u)."
@@ -78,12 +85,14 @@ CHANNELS: list[ChannelFacts] = [
         "beta", "rad", "Sideslip relative to the air, wind subtracted: asin(v / V), air from the right."
     ),
     ChannelFacts("airspeed", "m/s", "Speed of the reference point relative to the air, wind subtracted."),
-    ChannelFacts("fx", "m/s^2", "Specific force at the reference point, body x (forward)."),
-    ChannelFacts("fy", "m/s^2", "Specific force at the reference point, body y (right)."),
-    ChannelFacts("fz", "m/s^2", "Specific force at the reference point, body z (down): -g at rest."),
-    ChannelFacts("nx", "1", "Load factor forward: fx / g.", needs_gravity=True),
-    ChannelFacts("ny", "1", "Load factor to the right: fy / g.", needs_gravity=True),
-    ChannelFacts("nz", "1", "Load factor upward: -fz / g, +1 in level flight.", needs_gravity=True),
+    ChannelFacts("fx", "m/s^2", "Specific force, body x (forward).", per="point"),
+    ChannelFacts("fy", "m/s^2", "Specific force, body y (right).", per="point"),
+    ChannelFacts("fz", "m/s^2", "Specific force, body z (down): -g at rest.", per="point"),
+    ChannelFacts("nx", "1", "Load factor forward: fx / g.", per="point", needs_gravity=True),
+    ChannelFacts("ny", "1", "Load factor to the right: fy / g.", per="point", needs_gravity=True),
+    ChannelFacts(
+        "nz", "1", "Load factor upward: -fz / g, +1 in level flight.", per="point", needs_gravity=True
+    ),
     ChannelFacts("tip_z", "m", "Tip below its root along z of the body axes.", per="surface"),
     ChannelFacts("tip_twist", "rad", "Elastic twist of the tip against the root, nose up.", per="surface"),
     ChannelFacts(
@@ -91,7 +100,59 @@ CHANNELS: list[ChannelFacts] = [
         "N m",
         "Torque of the drive's motors, along its positive coordinate.",
         per="drive",
-        models=CHAINS,
+        fitted=False,
+    ),
+    ChannelFacts(
+        "root_shear",
+        "N",
+        "Force of the loads on the surface, upward along -z of its root's axes.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "root_bending",
+        "N m",
+        "Moment of the loads on the surface about its root, that bends the tip up.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "root_torsion",
+        "N m",
+        "Moment of the loads on the surface about its elastic axis, nose up.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "surface_lift",
+        "N",
+        "Lift of the surface: force of the air across the flight path, upward in the plane of symmetry.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "surface_drag",
+        "N",
+        "Drag of the surface: force of the air against the flight path.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "surface_side_force",
+        "N",
+        "Side force of the surface: force of the air across the flight path, to the right.",
+        per="surface",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "section_lift",
+        "N/m",
+        "Lift per length of span of the strip, normal to its own motion.",
+        per="strip",
+        fitted=False,
+    ),
+    ChannelFacts(
+        "section_cl", "1", "Lift coefficient of the strip, by its own speed.", per="strip", fitted=False
     ),
 ]
 

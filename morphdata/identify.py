@@ -15,7 +15,7 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Auto, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
-from morphdata.measurement import Measurement, absent_channels
+from morphdata.measurement import Measurement, absent_channels, foreign_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.parameters import MAX_LINKS, parameters_in
 from morphdata.renamed import RENAMED, both_spellings, current_name
@@ -268,6 +268,10 @@ class SamplesRequest(Request):
         drives = self.aircraft.drives
         for number, sample in samples.items():
             yield from (fault.under(f"/samples/{number}") for fault in sample.drive_faults(drives))
+        yield from foreign_channels(
+            self.measurement,
+            [(each.name, each.side, bool(each.all_hinges)) for each in self.aircraft.surfaces],
+        )
         yield from absent_channels(
             self.measurement,
             [(f"/samples/{n}", sample.role, tuple(sample.channels)) for n, sample in samples.items()],

@@ -8,14 +8,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from morphdata.base import Document, Result
-from morphdata.channels import is_channel
+from morphdata.channels import channel_of, column_parts
 from morphdata.faults import Fault
 from morphdata.options import MEASUREMENT, Option
 
 ANGLES = ("phi", "theta", "psi")
 ANGLE_COLUMNS = tuple(f"{name}_rad" for name in ANGLES)  # as files and documents call them
-# they start anew with every simulated flight, or say nothing that the drives cause
-UNFITTED = ("vx", "vy", "x", "y", "z", "hinge_torque")
 MAX_CHANNELS = 64
 
 Loss = Literal["linear", "huber", "soft_l1"]
@@ -72,19 +70,21 @@ class Measurement(Document):
     def faults(self) -> Iterator[Fault]:
         """Check that every channel is one that can be fitted."""
         for name in self.channels or {}:
-            if name not in ANGLES and not is_channel(name):
+            facts = channel_of(name)
+            if name not in ANGLES and facts is None:
                 yield Fault(
                     "unknown_channel",
                     f"There is no channel {name}.",
                     f"/channels/{name}",
                     "Channels are phi, theta, psi and those of simulated flights: p, q, r, tip_left_z, ...",
                 )
-            elif name in UNFITTED or name.startswith("hinge_torque_"):
+            elif facts is not None and not (facts.fitted and (facts.per != "point" or name == facts.name)):
                 yield Fault(
                     "channel_not_fitted",
                     f"The channel {name} cannot be fitted.",
                     f"/channels/{name}",
-                    "Leave it out; attitude, rates, air data, specific force and tips can be.",
+                    "Leave it out; attitude, rates, air data, specific force at the reference point and tips "
+                    "can be.",
                 )
         if self.channels is not None and not self.channels:
             yield Fault(
@@ -117,6 +117,34 @@ def absent_channels(
                     pointer,
                     f"Add the column, or leave {name} out of measurement.channels.",
                 )
+
+
+def foreign_channels(
+    measurement: Measurement | None, surfaces: Sequence[tuple[str, str, bool]]
+) -> Iterator[Fault]:
+    """Check that the aircraft has the surfaces whose channels are fitted.
+
+    Parameters
+    ----------
+    measurement : Measurement, optional
+    surfaces : of (name, side, whether it has a hinge) of each surface.
+    """
+    parts = column_parts(name for name, _, _ in surfaces)
+    sides = {side for _, side, hinged in surfaces if hinged}
+    for name in () if measurement is None else measurement.names:
+        facts = channel_of(name)
+        if facts is None or not (facts.per == "surface" or facts.side):
+            continue
+        columns = [f"tip_z_{part}" for part in parts]
+        if facts.per == "surface":
+            columns = [f"{facts.name}_{part}" for part in parts]
+        if name not in columns and not (facts.side and facts.side in sides):
+            yield Fault(
+                "unknown_channel",
+                f"This aircraft has no channel {name}.",
+                f"/measurement/channels/{name}",
+                f"Channels of its surfaces are {', '.join(columns)}.",
+            )
 
 
 class Estimate(Result):

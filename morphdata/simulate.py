@@ -10,16 +10,17 @@ from pydantic import ConfigDict, Field
 
 from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document, Result
-from morphdata.channel_choice import CHANNELS_TEXT, RequestedChannels, channels_faults
+from morphdata.channel_choice import OutputChoice
 from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
-from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
+from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
 from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
+from morphdata.shape import FlownShape, SurfaceSections
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
 from morphdata.warnings import Warnings
 
@@ -81,7 +82,7 @@ EXAMPLE_SIMULATION: dict[str, Any] = {
 }
 
 
-class SimulateRequest(Request):
+class SimulateRequest(Request, OutputChoice):
     """Aircraft, flight condition, a model, and the schedules of the drives."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SIMULATION]})
@@ -96,9 +97,6 @@ class SimulateRequest(Request):
     )
     environment: Annotated[Environment | None, Option("--environment", SCHEDULE)] = Field(
         default=None, description="Gust and turbulence; default: still air."
-    )
-    channels: Annotated[RequestedChannels | None, Option("--channels", OUTPUT)] = Field(
-        default=None, description=CHANNELS_TEXT
     )
 
     @property
@@ -131,9 +129,9 @@ class SimulateRequest(Request):
                 "/duration_s",
                 f"At most {MAX_STEPS[self.model.kind]}: reduce duration_s, or choose a longer model.step_s.",
             )
-        gravity_m_s2 = self.flight.gravity_m_s2
-        for fault in channels_faults(self.channels or [], self.model.kind, gravity_m_s2):
-            yield fault.under("/channels")
+        surfaces = [surface.name for surface in self.aircraft.surfaces]
+        end_s = (self.rows - 1) * self.output_step_s
+        yield from self.output_faults(surfaces, self.flight.gravity_m_s2, (0.0, end_s))
         if self.model.kind != "rigid":
             yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         if isinstance(self.model, KnownModel):
@@ -206,6 +204,12 @@ class SimulateResult(Result):
     trajectory: SimulatedTrajectory
     drives: list[str] = Field(
         default=[], description="Names of the aircraft's drives, whose columns the trajectory has."
+    )
+    shape: FlownShape | None = Field(
+        default=None, description="Poses at `shape_times_s`; absent if none are requested."
+    )
+    sections: list[SurfaceSections] | None = Field(
+        default=None, description="The strips, if a channel of theirs is requested."
     )
     summary: FlightSummary
     warnings: Warnings = Field(default=[])

@@ -37,8 +37,9 @@ from morphcore.simulate.time_grid import STEP_S
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
+from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel
-from morphdata.measurement import Measurement
+from morphdata.measurement import Measurement, foreign_channels
 from morphdata.uncertainty import UncertaintySettings
 
 Array = NDArray[np.float64]
@@ -98,6 +99,8 @@ class Identification:
         self._cases: tuple[tuple[Openness, ...], tuple[SampleCase, ...]] | None = None
         self._linear: tuple[tuple[Openness, ...], Array, Array, Array] | None = None
         self.measurement = measurement or Measurement()
+        surfaces = [(each.name, each.side, bool(each.hinges)) for each in aircraft.surfaces]
+        refuse(foreign_channels(self.measurement, surfaces))
         if not isinstance(samples, SmoothedSamples):
             samples = smoothed_samples(aircraft, samples, measurement)
         self.samples, self.histories = samples.smooth, samples.histories

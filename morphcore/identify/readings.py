@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, euler_rates, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
-from morphcore.models.kinematics import link_poses, tip_positions
-from morphcore.multibody.kernels.hinge import HINGE_ROWS
-from morphcore.simulate.channels import CHANNELS, Channel, parts_of
+from morphcore.simulate.chain_outputs import tips_twist, tips_z
+from morphcore.simulate.channels import CHANNELS, parts_of
 from morphcore.simulate.plan import FlightPlan
 from morphcore.simulate.record import FlightRecord, Loads
 from morphcore.simulate.trim import Trim
+from morphdata.channels import channel_of
 from morphdata.measurement import ANGLES
 
 Array = NDArray[np.float64]
@@ -110,13 +110,6 @@ def readings(
     return Readings(plan.grid.start_s, step, values, slopes)
 
 
-def channel_of(column: str) -> Channel | None:
-    """Find the channel of a column: its name, or that before the part of a surface; None where none is."""
-    exact = [channel for channel in CHANNELS if channel.name == column]
-    parts = [channel for channel in CHANNELS if column.startswith(f"{channel.name}_")]
-    return next(iter([*exact, *parts]), None)
-
-
 def _columns(
     model: ChainModel,
     batch: ParameterBatch,
@@ -127,7 +120,9 @@ def _columns(
     whole: ChainModel,
 ) -> dict[str, Array]:
     """Columns (p, K) of channels beside the attitude, all states as the rows of one record."""
-    channels = list(dict.fromkeys(channel for name in names if (channel := channel_of(name)) is not None))
+    known_channels = {channel.name: channel for channel in CHANNELS}
+    facts = dict.fromkeys(each.name for name in names if (each := channel_of(name)) is not None)
+    channels = [known_channels[name] for name in facts]
     particles, times = states.shape[:2]
     flat = states.reshape(particles * times, -1)
     R_NB = rotation_from_quaternion(flat[:, :OMEGA])
@@ -135,13 +130,15 @@ def _columns(
     velocity_B = flat[:, VELOCITY:POSITION] if known >= POSITION else np.zeros((flat.shape[0], 3))
     loads = None
     if "loads" in parts_of(channels):
-        rates = np.gradient(states[..., VELOCITY:POSITION], plan.grid.step_s, axis=1, edge_order=2)
-        loads = Loads(velocity_rate_B=rates.reshape(-1, 3))
-    tips_z = twist = np.zeros((flat.shape[0], 0))
+        rates = np.gradient(states[..., OMEGA:POSITION], plan.grid.step_s, axis=1, edge_order=2)
+        loads = Loads(twist_rate_B=rates.reshape(-1, 6))
+    below = twist = np.zeros((flat.shape[0], 0))
     if known > JOINTS or any(name.startswith("tip_") for name in names):
-        tips_z, twist = _tips(model, batch, plan, states)
+        q_joint = states[..., JOINTS : JOINTS + model.coordinates]
+        below = tips_z(model, batch, plan.hinges, q_joint).reshape(flat.shape[0], -1)
+        twist = tips_twist(model, batch, q_joint).reshape(flat.shape[0], -1)
         if plan.halved and whole.mirror is not None:  # the other half did the same
-            tips_z, twist = whole.mirror.spread(tips_z), whole.mirror.spread(twist)
+            below, twist = whole.mirror.spread(below), whole.mirror.spread(twist)
     record = FlightRecord(
         euler=euler_from_quaternion(flat[:, :OMEGA]),
         omega_B=flat[:, OMEGA:VELOCITY],
@@ -149,7 +146,7 @@ def _columns(
         position_N=np.zeros((flat.shape[0], 3)),
         wind_N=np.tile(plan.wind_N, (particles, 1)),
         angles=np.zeros((flat.shape[0], 0)),
-        tips_z=tips_z,
+        tips_z=below,
         trim=found,
         tips_twist=twist,
         loads=loads,
@@ -158,19 +155,3 @@ def _columns(
     for channel in channels:
         columns |= channel.columns(record, whole.aircraft, model.flight)
     return {name: columns[name].reshape(particles, times) for name in names}
-
-
-def _tips(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, states: Array) -> tuple[Array, Array]:
-    """Tips below their roots along z of B, m, and their twist, rad: (p K, surfaces of the whole aircraft)."""
-    particles, times = states.shape[:2]
-    repeated = batch.select(np.repeat(np.arange(particles), times))
-    q_joint = states[..., JOINTS : JOINTS + model.coordinates].reshape(particles * times, -1)
-    level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
-    level[:, :9] = np.eye(3).ravel()
-    tips_W = tip_positions(model, repeated, level, q_joint).reshape(particles, times, -1, 3)
-    down_W = plan.hinges[:, :, 6:9]  # third row of R_BW
-    tips_z = np.einsum("ksi,pksi->pks", down_W, tips_W).reshape(particles * times, -1)
-    R_WL, _ = link_poses(model, repeated, level, q_joint)
-    last = model.surfaces[:, 0] + model.surfaces[:, 1] - 1
-    twist = np.arcsin(np.clip(R_WL[:, last, 0, 2], -1.0, 1.0))
-    return tips_z, twist

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges
-from morphcore.multibody.kernels.hinge import H_ORIGIN
+from morphcore.multibody.kernels.hinge import H_ORIGIN, HINGE_ROWS
 
 Array = NDArray[np.float64]
 
@@ -82,6 +82,13 @@ def link_poses(
     return R_BL, r_B
 
 
+def level_hinges(model: ChainModel) -> Array:
+    """Hinges (s, HINGE_ROWS) at rest in the reference position, so that surfaces stay in wing axes."""
+    level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
+    level[:, :9] = np.eye(3).ravel()
+    return level
+
+
 def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint: Array) -> Array:
     """Tips of the elastic axes (p, s, 3) in B relative to each surface's root, m."""
     R_BL, r_B = link_poses(model, batch, hinges, q_joint)
@@ -100,8 +107,7 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
 
 def tip_bending(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
     """Displacement (p, s) of the tips by the joints' angles q_joint (p, coordinates), over the span."""
-    level = np.zeros((len(model.aircraft.surfaces), H_ORIGIN + 3))
-    level[:, :9] = np.eye(3).ravel()
+    level = level_hinges(model)
     bent = tip_positions(model, batch, level, q_joint)
     straight = tip_positions(model, batch, level, np.zeros_like(q_joint))
     spans = np.array([surface.length_m for surface in model.aircraft.surfaces])

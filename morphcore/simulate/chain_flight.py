@@ -11,21 +11,23 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
-from morphcore.models.kinematics import link_poses, tip_bending, tip_positions, whole_joints
-from morphcore.multibody.kernels.hinge import HINGE_ROWS
+from morphcore.models.kinematics import tip_bending, whole_joints
 from morphcore.simulate.batch import fly_batch
+from morphcore.simulate.chain_outputs import point_forces, surface_loads, tips_twist, tips_z
 from morphcore.simulate.control_motion import control_angles, of_every_part
 from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
-from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Outputs, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.shape import chain_shape, of_both_halves
 from morphcore.simulate.time_grid import TimeGrid
-from morphcore.simulate.torque import torques_and_rates
+from morphcore.simulate.torque import chain_loads
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.simulate.wake import trimmed_schedules
 from morphcore.stopping import Stop
 
 Array = NDArray[np.float64]
 
+NOTHING_MORE = Outputs()
 LARGEST_JOINT_ANGLE_RAD = 0.5 * np.pi  # at this torsion the flap and edgewise axes of a gimbal coincide
 
 
@@ -36,7 +38,7 @@ def chain_flight(
     grid: TimeGrid,
     at: NDArray[np.int64],
     *,
-    parts: frozenset[Part] = frozenset(),
+    outputs: Outputs = NOTHING_MORE,
     start: StartMode,
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
@@ -45,8 +47,7 @@ def chain_flight(
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
-    `flight.simulate`.
+    at : (k,) rows of the grid to report. outputs : what to record besides. Others as in `flight.simulate`.
     """
     times, schedules = grid.halves_s, of_every_part(model.aircraft, schedules)
     begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
@@ -65,10 +66,11 @@ def chain_flight(
     constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)
     rows, chunks, states = JOINTS + flown.coordinates, [], []
-    wanted = flown.state_rows if "loads" in parts else rows
+    with_loads = bool(outputs.parts & {"loads", "surfaces"})
+    wanted = flown.state_rows if with_loads else rows
     for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
         chunks.append(chunk.rows[:, :rows, 0].copy())  # copied: a view would keep the whole states alive
-        if "loads" in parts:  # only the reported rows of the states are kept
+        if with_loads:  # only the reported rows of the states are kept
             inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
             states.append(chunk.rows[at[inside] - chunk.first, :, 0])
         yield chunk.first / grid.steps, None
@@ -84,18 +86,28 @@ def chain_flight(
     history = history[at]
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
-    angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
-    bending = tip_bending(flown, _repeated(batch, at.size), history[:, JOINTS:])
-    tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
-    loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
+    angles, hinges, q_joint = plan.angles[at], plan.hinges[at], history[:, JOINTS:]
+    below = tips_z(flown, batch, hinges, q_joint[None])[0]
+    bending = tip_bending(flown, batch.select(np.zeros(at.size, dtype=np.int64)), q_joint)
+    twist = tips_twist(flown, batch, q_joint[None])[0] if "twist" in outputs.parts else None
+    loads: Loads | None = None
+    points: dict[str, Array] = {}
+    if with_loads:
+        loads, points = _loads(flown, batch, plan, constants, np.concatenate(states), at, outputs)
+    chosen = outputs.shape_rows
+    shape = chain_shape(flown, batch, hinges[chosen], q_joint[chosen]) if chosen.size else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
         spread = model.mirror.spread
-        angles, tips_z = model.mirror.spread_hinges(angles), spread(tips_z)
+        angles, below = model.mirror.spread_hinges(angles), spread(below)
         bending = spread(bending)
-        tips_twist = None if tips_twist is None else spread(tips_twist)
-        if loads is not None and loads.hinge_torque is not None:
-            loads = replace(loads, hinge_torque=model.mirror.spread_hinges(loads.hinge_torque))
+        twist = None if twist is None else spread(twist)
+        loads = None if loads is None else _of_both_halves(loads, model)
+        names = [surface.name for surface in model.aircraft.surfaces]
+        shape = None if shape is None else of_both_halves(shape, model.mirror, names)
         found = replace(found, q_joint=whole_joints(model, found.q_joint))
+    if shape is not None:
+        R_NB = rotation_from_quaternion(quaternion[chosen])
+        shape = shape.moved(grid.times_s[at][chosen], history[chosen, POSITION:JOINTS], R_NB)
     angles = np.concatenate([angles, control_angles(model.aircraft, schedules, grid.times_s[at])], axis=1)
     record = FlightRecord(
         euler=euler_from_quaternion(quaternion),
@@ -104,47 +116,46 @@ def chain_flight(
         position_N=history[:, POSITION:JOINTS],
         wind_N=plan.wind_N[at],
         angles=angles,
-        tips_z=tips_z,
+        tips_z=below,
         trim=found,
-        tips_twist=tips_twist,
+        tips_twist=twist,
         loads=loads,
         bending=bending,
+        shape=shape,
+        point_force=points,
+        points=outputs.points,
     )
     yield 1.0, record
 
 
-def _tips_z(
-    model: ChainModel, batch: ParameterBatch, plan: FlightPlan, q_joint: Array, at: NDArray[np.int64]
-) -> Array:
-    """Tips below their roots along z of B, (k, s), m."""
-    # in wing axes all times form one batch; the hinges' rotation is applied afterwards
-    tips_W = tip_positions(model, _repeated(batch, at.size), _level_hinges(model), q_joint)
-    down_W = plan.hinges[at][:, :, 6:9]  # third row of R_BW
-    return np.asarray(np.einsum("ksi,ksi->ks", down_W, tips_W))
-
-
-def _tips_twist(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
-    """Twist (k, s), rad, of tips relative to their roots: torsion of Rx(flap) Ry(torsion) Rz(edgewise)."""
-    R_WL, _ = link_poses(model, _repeated(batch, q_joint.shape[0]), _level_hinges(model), q_joint)
-    last = model.surfaces[:, 0] + model.surfaces[:, 1] - 1
-    return np.arcsin(np.clip(R_WL[:, last, 0, 2], -1.0, 1.0))
-
-
-def _level_hinges(model: ChainModel) -> Array:
-    """Hinges (s, HINGE_ROWS) at rest in the reference position, so that surfaces stay in wing axes."""
-    level = np.zeros((len(model.aircraft.surfaces), HINGE_ROWS))
-    level[:, :9] = np.eye(3).ravel()
-    return level
-
-
-def _repeated(batch: ParameterBatch, times: int) -> ParameterBatch:
-    """One parameter set repeated for a number of times."""
-    return batch.select(np.zeros(times, dtype=np.int64))
-
-
 def _loads(
-    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array, at: NDArray[np.int64]
-) -> Loads:
-    """Accelerations and torques of whole states (k, state_rows) at the rows ``at`` of the grid."""
-    torque, rates = torques_and_rates(model, plan.instants(at), constants, states)
-    return Loads(velocity_rate_B=rates, hinge_torque=torque)
+    model: ChainModel,
+    batch: ParameterBatch,
+    plan: FlightPlan,
+    constants: LaneConstants,
+    states: Array,
+    at: NDArray[np.int64],
+    outputs: Outputs,
+) -> tuple[Loads, dict[str, Array]]:
+    """Accelerations and loads of whole states (k, state_rows) at the rows ``at`` of the grid, and points."""
+    of_surfaces = "surfaces" in outputs.parts
+    found = chain_loads(model, plan.instants(at), constants, states, every_body=of_surfaces)
+    if not of_surfaces:
+        return Loads(found.twist_rate_B, found.torque), {}
+    q_joint = states[:, JOINTS : JOINTS + model.coordinates]
+    surfaces = surface_loads(model, batch, plan.hinges[at], q_joint, found)
+    points = point_forces(model, batch, outputs.points, found)
+    return Loads(found.twist_rate_B, found.torque, surfaces), points
+
+
+def _of_both_halves(loads: Loads, model: ChainModel) -> Loads:
+    """The whole aircraft's loads from those of one half, when both move alike."""
+    mirror = model.mirror
+    if mirror is None:
+        return loads
+    torque, surfaces = loads.hinge_torque, loads.surfaces
+    return replace(
+        loads,
+        hinge_torque=None if torque is None else mirror.spread_hinges(torque),
+        surfaces=None if surfaces is None else surfaces.of_both_halves(mirror),
+    )

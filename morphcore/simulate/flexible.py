@@ -351,6 +351,12 @@ class FlexibleRun:
         flight.structure(state.poses, state.V, state.A)
         self._form_matrix()
 
+    @property
+    def state(self) -> FlexibleState:
+        """The state at the last row, which the next step overwrites."""
+        now = self._state
+        return FlexibleState(NodePoses(now.R, now.x), now.V, now.A, now.a, now.lag, now.circulation)
+
     def fly_to(self, row: int) -> None:
         """Continue the flight to a row of the grid.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, set_in_motion
+from morphcore.simulate.flexible_outputs import FlexibleOutputs
 from morphcore.simulate.flexible_start import start_flexible
 from morphcore.simulate.kernels.flexible_step import RECORD
-from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Outputs, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import StartMode, Trim
@@ -21,6 +23,7 @@ from morphcore.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
+NOTHING_MORE = Outputs()
 CHUNK_STEPS = 100  # steps of the default lattice: about a tenth of a second
 
 
@@ -30,7 +33,7 @@ def flexible_flight(
     grid: TimeGrid,
     at: NDArray[np.int64],
     *,
-    parts: frozenset[Part] = frozenset(),
+    outputs: Outputs = NOTHING_MORE,
     start: StartMode,
     air_velocity_N: Callable[[Array], Array] | None,
     stop: Stop | None,
@@ -39,8 +42,7 @@ def flexible_flight(
 
     Parameters
     ----------
-    at : (k,) rows of the grid to report. parts : parts of the record to fill in. Others as in
-    `flight.simulate`.
+    at : (k,) rows of the grid to report. outputs : what to record besides. Others as in `flight.simulate`.
     """
     times = grid.times_s
     wind_N = (
@@ -52,16 +54,30 @@ def flexible_flight(
     flight.thrust = np.concatenate([trim.moment_B + trim.thrust_moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
     run = FlexibleRun(flight, path, grid, wind_N, begin)
+    further = FlexibleOutputs(model, path, wind_N, outputs) if outputs.of_states else None
+    reported = deque([] if further is None else enumerate(at))
     for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None
         check_stop(stop)
+        last = min(first + CHUNK_STEPS, grid.steps)
         with one_blas_thread():
-            run.fly_to(min(first + CHUNK_STEPS, grid.steps))
+            while further is not None and reported and reported[0][1] <= last:
+                number, row = reported.popleft()
+                run.fly_to(int(row))
+                further.evaluate(run.state, int(row), number)
+            run.fly_to(last)
     history = _history(run.records)
     require_sound(history, history[:, 6:9], model.flight, times)
     history, records = history[at], run.records[at]
     tips = model.roots.size
-    sines = records[:, RECORD + tips :]
+    sines, loads, shape = records[:, RECORD + tips :], None, None
+    if outputs.parts & {"loads", "surfaces"}:
+        loads = Loads(records[:, 18:24])
+    if further is not None and "surfaces" in outputs.parts:
+        loads = Loads(records[:, 18:24], np.array(further.found.torque), further.surfaces())
+    chosen = outputs.shape_rows
+    if further is not None and chosen.size:
+        shape = further.shape(times[at][chosen], history[chosen, 9:12], records[chosen, :9].reshape(-1, 3, 3))
     record = FlightRecord(
         euler=history[:, :3],
         omega_B=history[:, 3:6],
@@ -70,8 +86,8 @@ def flexible_flight(
         wind_N=wind_N[at],
         angles=np.concatenate([path.angle[at], path.controls[at]], axis=1),
         tips_z=history[:, 12:],
-        tips_twist=np.arcsin(np.clip(sines, -1.0, 1.0)) if "twist" in parts else None,
-        loads=Loads(records[:, 21:24]) if "loads" in parts else None,
+        tips_twist=np.arcsin(np.clip(sines, -1.0, 1.0)) if "twist" in outputs.parts else None,
+        loads=loads,
         trim=Trim(
             alpha=np.array([trim.alpha]),
             force_B=trim.force_B[None],
@@ -81,6 +97,9 @@ def flexible_flight(
             residual=np.array([trim.residual]),
             thrust_moment_B=trim.thrust_moment_B[None],
         ),
+        shape=shape,
+        point_force={} if further is None else further.point_force(),
+        points=outputs.points,
     )
     yield 1.0, record
 

@@ -21,7 +21,7 @@ from morphcore.models.flexible import flexible_model
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.chain_flight import chain_flight
-from morphcore.simulate.channels import channel_columns, parts_of, requested_channels
+from morphcore.simulate.channels import channel_columns
 from morphcore.simulate.flexible import FLEXIBLE_STEP_S
 from morphcore.simulate.flexible_flight import flexible_flight
 from morphcore.simulate.hinge_schedules import (
@@ -30,8 +30,10 @@ from morphcore.simulate.hinge_schedules import (
     hinge_schedules,
     require_ranges,
 )
-from morphcore.simulate.record import FlightRecord, Part, recorded_trajectory
+from morphcore.simulate.output_request import SurfaceStrips, requested_outputs
+from morphcore.simulate.record import FlightRecord, Outputs, recorded_trajectory
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.shape import Shape
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
@@ -54,6 +56,7 @@ from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.points import Point
 from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
@@ -84,6 +87,10 @@ class Simulation(Shown):
         By side, the tip of its first hinged surface at the start, m below its root.
     trim_drives : mapping of str to float
         Angles, rad, of the flight's trim drive at the start; empty without one.
+    shape : Shape or None
+        Poses and edges of all surfaces at the requested times.
+    strips : tuple of SurfaceStrips
+        Where the strips of the surfaces are, if a channel of theirs was requested.
     """
 
     trajectory: Trajectory
@@ -92,6 +99,8 @@ class Simulation(Shown):
     warnings: tuple[ResultWarning, ...] = ()
     start_tips_z: Mapping[str, float] = field(default_factory=dict)
     trim_drives: Mapping[str, float] = field(default_factory=dict)
+    shape: Shape | None = None
+    strips: tuple[SurfaceStrips, ...] = ()
 
     def summary(self) -> Summary:
         """The start of the flight, and the range of its attitude."""
@@ -134,6 +143,8 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
     channels: Sequence[str] | None = None,
+    points: Sequence[Point] | None = None,
+    shape_times_s: Sequence[float] | None = None,
     stop: Stop | None = None,
 ) -> Simulation:
     """Fly one aircraft through prescribed motions of its drives.
@@ -173,6 +184,10 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     channels : sequence of str, optional
         Names of ``morphdata.channels.CHANNELS``: the columns of ``trajectory.extra``, conventions in
         `morphcore.simulate.channels`. None: those of the example flights.
+    points : sequence of Point, optional
+        Points besides the reference point at which the channels fx, fy, fz, nx, ny and nz are reported.
+    shape_times_s : sequence of float, optional
+        Times at which ``Simulation.shape`` holds the shape of the bent aircraft: that of the nearest row.
     stop : callable, optional
         Called several times a second; True raises Interrupted.
 
@@ -184,8 +199,8 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     Raises
     ------
     InvalidInput
-        A schedule leaves its hinge's range or moves no drive, a channel is unknown or not available for this
-        model, or an argument is invalid.
+        A schedule leaves its hinge's range or moves no drive, a channel or the surface of a point is unknown,
+        or an argument is invalid.
     TrimNotFound
         There is no steady level flight.
     FlightDiverged
@@ -206,7 +221,8 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     steps = flight_steps(
         Aircraft.of(aircraft), Flight.of(flight), schedules, model=model, duration_s=duration_s,
         output_step_s=output_step_s, step_s=step_s, start=start, environment=environment, rng=rng,
-        lattice=lattice, elements=elements, channels=channels, stop=stop,
+        lattice=lattice, elements=elements, channels=channels, points=points, shape_times_s=shape_times_s,
+        stop=stop,
     )  # fmt: skip
     return next(step.simulation for step in steps if step.simulation is not None)
 
@@ -226,16 +242,18 @@ def flight_steps(  # noqa: PLR0913 - as above
     lattice: Lattice = DEFAULT_LATTICE,
     elements: int = DEFAULT_ELEMENTS,
     channels: Sequence[str] | None = None,
+    points: Sequence[Point] | None = None,
+    shape_times_s: Sequence[float] | None = None,
     stop: Stop | None = None,
 ) -> Iterator[FlightStep]:
     """Fly as `simulate` does, step by step: yield the fraction flown several times a second, then the flight.
 
     Aircraft and flight are resolved; they need not be within the limits of documents.
     """
-    wanted = requested_channels(channels, _kind(model), flight.gravity_m_s2)
     flyer = _flyer(aircraft, flight, model, lattice, elements)
     longest_s = flyer.step_s if step_s is None else step_s
     times = _output_times(schedules, duration_s, output_step_s, longest_s)
+    wanted = requested_outputs(aircraft, flight, times, channels, points, shape_times_s)
     grid = time_grid(times, longest_s)
     followed = followed_schedules(aircraft, schedules)
     require_ranges(aircraft, followed, grid.times_s, "/schedules")
@@ -252,19 +270,25 @@ def flight_steps(  # noqa: PLR0913 - as above
             grid = time_grid(times, longest_s)
         air = _air(environment, flight, rng)
         at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
-        flown = flyer.fly(each, grid, at, parts=parts_of(wanted), start=start, air_velocity_N=air, stop=stop)
+        flown = flyer.fly(each, grid, at, outputs=wanted.outputs, start=start, air_velocity_N=air, stop=stop)
         for fraction, record in flown:
             if record is None:
                 yield FlightStep(fraction)
             else:
-                columns = channel_columns(wanted, record, aircraft, flight)
+                columns = channel_columns(wanted.channels, record, aircraft, flight)
                 trajectory = recorded_trajectory(aircraft, times, record, columns)
                 warnings = _warnings(aircraft, flight, times, record, smooth)
                 drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
                 if start == "trim":
                     warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0]))
                 tips = _start_tips(aircraft, record)
-                yield FlightStep(1.0, Simulation(trajectory, record.trim, longest_s, warnings, tips, drives))
+                yield FlightStep(
+                    1.0,
+                    Simulation(
+                        trajectory, record.trim, longest_s, warnings, tips, drives, record.shape,
+                        wanted.strips(aircraft, lattice),
+                    ),
+                )  # fmt: skip
 
 
 def _warnings(
@@ -350,7 +374,7 @@ class _Fly(Protocol):
         grid: TimeGrid,
         at: NDArray[np.int64],
         *,
-        parts: frozenset[Part],
+        outputs: Outputs,
         start: StartMode,
         air_velocity_N: Callable[[Array], Array] | None,
         stop: Stop | None,
@@ -369,10 +393,6 @@ class _Flyer:
     step_s: float
     obstacle: Callable[[], Obstacle | None]
     chain: tuple[ChainModel, ParameterBatch] | None = None
-
-
-def _kind(model: ModelChoice) -> str:
-    return "equivalent" if isinstance(model, ParameterBatch) else model
 
 
 def _flyer(aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: Lattice, elements: int) -> _Flyer:

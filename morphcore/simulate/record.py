@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 
 from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
+from morphcore.simulate.points import Point
+from morphcore.simulate.shape import Shape
+from morphcore.simulate.surface_loads import SurfaceLoads
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import Trim
 
@@ -18,20 +22,40 @@ Array = NDArray[np.float64]
 LARGEST_SPEED_RATIO = 10.0  # multiple of the airspeed at the start that no glide reaches
 
 
-Part = Literal["twist", "loads"]  # parts of a record that models omit unless requested
+# parts of a record that models omit unless requested: twist of the tips, accelerations, loads of the surfaces
+Part = Literal["twist", "loads", "surfaces"]
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a model records besides the motion.
+
+    parts : of the record. points : at which specific force is reported. shape_rows : (t,) output rows of the
+    shape.
+    """
+
+    parts: frozenset[Part] = frozenset()
+    points: tuple[Point, ...] = ()
+    shape_rows: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def of_states(self) -> bool:
+        """Whether they need more of the states than the motion that every flight records."""
+        return "surfaces" in self.parts or self.shape_rows.size > 0
 
 
 @dataclass(frozen=True)
 class Loads:
-    """Accelerations and hinge torques at the output times (k times, s surfaces).
+    """Accelerations and loads at the output times (k times, s surfaces, h hinges).
 
-    velocity_rate_B : (k, 3) time derivative of the components in B of the reference point's velocity, m/s^2.
-    hinge_torque : (k, s) of the motors along the hinges' positive coordinates, N m, 0 without a hinge; None
-    for the flexible model.
+    twist_rate_B : (k, 6) time derivative of the components in B of omega and of the reference point's
+    velocity, rad/s^2 and m/s^2. hinge_torque : (k, h) of the motors along the hinges' positive coordinates,
+    N m. surfaces : loads of the surfaces. Both are None unless requested.
     """
 
-    velocity_rate_B: Array
+    twist_rate_B: Array
     hinge_torque: Array | None = None
+    surfaces: SurfaceLoads | None = None
 
 
 @dataclass(frozen=True)
@@ -42,7 +66,9 @@ class FlightRecord:
     point; wind_N : (k, 3) m/s of the air there; angles : (k, h + c) of all hinges, then of all controls, rad;
     tips_z : (k, s) tips below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the
     tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`). bending :
-    (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None.
+    (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None. shape :
+    at the requested rows. point_force : by name (k, 3) specific force at the requested points of surfaces, in
+    their own axes, m/s^2. points : all that were requested.
     """
 
     euler: Array
@@ -56,6 +82,9 @@ class FlightRecord:
     tips_twist: Array | None = None
     loads: Loads | None = None
     bending: Array | None = None
+    shape: Shape | None = None
+    point_force: Mapping[str, Array] = field(default_factory=dict)
+    points: tuple[Point, ...] = ()
 
 
 def require_sound(

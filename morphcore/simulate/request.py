@@ -73,6 +73,7 @@ class SimulationResult(Shown):
             },
             "trajectory": trajectory_document(flown),
             "drives": list(flown.drive_order),
+            **self._requested(),
             "summary": {
                 "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
                 "variation_rad2": attitude_variation(flown),
@@ -82,6 +83,14 @@ class SimulationResult(Shown):
                 "real_time_factor": flown.duration_s / self.wall_s if self.wall_s > 0.0 else None,
             },
             "warnings": documents(self.simulation.warnings),
+        }
+
+    def _requested(self) -> Document:
+        """Shape and strips, where these are requested."""
+        shape, strips = self.simulation.shape, self.simulation.strips
+        return {
+            **({} if shape is None else {"shape": shape.to_document()}),
+            **({"sections": [each.to_document() for each in strips]} if strips else {}),
         }
 
 
@@ -138,7 +147,7 @@ class SimulationRun:
             start=flown.start, environment=None if air is None or air.still else air,
             rng=np.random.default_rng(1 if air is None else air.seed), lattice=flown.lattice,
             elements=model.elements if isinstance(model, FlexibleModel) else DEFAULT_ELEMENTS,
-            channels=request.channels, stop=stop,
+            channels=request.channels, points=request.points, shape_times_s=request.shape_times_s, stop=stop,
         ):  # fmt: skip
             wall_s += self.clock() - begin  # excludes the caller's work between two steps
             if step.simulation is not None:

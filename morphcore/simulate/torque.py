@@ -1,6 +1,8 @@
-"""Torque of the hinge motors and acceleration of the fuselage along a flown flight."""
+"""Torque of the hinge motors, loads of the surfaces and acceleration of the fuselage along a flown flight."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,28 @@ LAG_DECAYS = (L_SLOW_DECAY, L_FAST_DECAY)  # each before its weight
 CHUNK = 64  # instants at a time: bounds the memory of the interpolated operators
 
 
+@dataclass(frozen=True)
+class ChainLoads:
+    """Loads of a chain at t instants (s surfaces, h hinges, l links, strips of all surfaces).
+
+    torque : (t, h) of the hinge motors, N m along the positive angles. twist_rate_B : (t, 6) time derivative
+    of the components of omega_B and v_B by the equations of motion, rad/s^2 and m/s^2. root_W : (t, s, 6)
+    moment and force on each surface at the root of its elastic axis, in W, N m and N. air_L, twist_L,
+    acceleration_L : (t, l, 6) force vector of the air on each link, its twist relative to the air, and its
+    spatial acceleration relative to free fall, in its own axes at its origin. sections : (t, strips, 3)
+    circulation times width, m^3/s, velocity along the chord and normal to it, m/s. The last four are empty
+    unless requested.
+    """
+
+    torque: Array
+    twist_rate_B: Array
+    root_W: Array
+    air_L: Array
+    twist_L: Array
+    acceleration_L: Array
+    sections: Array
+
+
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
     """Torque of the hinge motors at every grid time, (steps + 1, h), N m along the positive angles.
 
@@ -33,24 +57,26 @@ def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants,
     constants : of the flown parameter set, thrust included. states : (steps + 1, state_rows) all rows of its
     state at the grid times.
     """
-    torque, _ = torques_and_rates(model, plan, constants, states)
-    return torque
+    return chain_loads(model, plan, constants, states).torque
 
 
-def torques_and_rates(
-    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array
-) -> tuple[Array, Array]:
-    """Torque as in `hinge_torques`, and the time derivative (t, 3) of v_B by the equations of motion, m/s^2.
+def chain_loads(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array, *, every_body: bool = False
+) -> ChainLoads:
+    """Inverse dynamics of states (t, state_rows), as in `hinge_torques`.
 
     Parameters
     ----------
     plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
-    states : (t, state_rows).
+    every_body : whether the motion of the links and their air loads are reported, too.
     """
     rows, columns = model.lattice.operator_shape
     surfaces, hinges_of = model.aircraft.surfaces, model.aircraft.hinge_columns
-    velocity_rates = np.empty((states.shape[0], 3))
-    out = np.empty((states.shape[0], len(model.aircraft.hinges)))
+    count = states.shape[0]
+    out, twist_rates = np.empty((count, len(model.aircraft.hinges))), np.empty((count, 6))
+    roots = np.empty((count, len(surfaces), 6))
+    reported = count if every_body else 0
+    bodies, sections = np.empty((reported, model.links, 18)), np.empty((reported, model.lattice.strips, 3))
     first_hinges = np.array([0, *(own.stop for own in hinges_of)], dtype=np.int64)
     accelerations = plan.surface_accelerations
     width = constants.rows.shape[-1]
@@ -59,8 +85,8 @@ def torques_and_rates(
     laid = closing_half_a_step(model, constants.rows[0])
     inputs, outputs = np.zeros((columns, width)), np.zeros((rows, width))
     shared = shared_numbers(model)
-    for first in range(0, states.shape[0], CHUNK):
-        part = slice(first, min(first + CHUNK, states.shape[0]))
+    for first in range(0, count, CHUNK):
+        part = slice(first, min(first + CHUNK, count))
         operators, strips = plan.table.between(part.start, part.stop)
         screws = np.concatenate(
             [
@@ -73,9 +99,10 @@ def torques_and_rates(
             lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], accelerations[part],
             first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
-            inputs, outputs, rates, out[part], velocity_rates[part],
+            inputs, outputs, rates, out[part], twist_rates[part], roots[part], bodies[part], sections[part],
         )  # fmt: skip
-    return out, velocity_rates
+    air, twist, acceleration = np.split(bodies, 3, axis=2)
+    return ChainLoads(out, twist_rates, roots, air, twist, acceleration, sections)
 
 
 def closing_half_a_step(model: ChainModel, rows: Array) -> Array:

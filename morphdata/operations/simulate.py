@@ -49,5 +49,5 @@ SIMULATE = Operation(
     cost=_cost,
     summary=_summary,
     begin="worker.operations.simulation:begin",
-    files=("result.json", "flight.*"),
+    files=("result.json", "flight.*", "shape.*"),
 )

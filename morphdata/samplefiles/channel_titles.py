@@ -8,7 +8,9 @@ from morphdata.channels import ChannelFacts, channel_of
 from morphdata.samplefiles.units import (
     ACCELERATION_UNITS,
     ANGLE_UNITS,
+    FORCE_UNITS,
     LENGTH_UNITS,
+    LINE_LOAD_UNITS,
     RATE_UNITS,
     SPEED_UNITS,
     TORQUE_UNITS,
@@ -24,6 +26,8 @@ FACTORS = {  # SI unit of a channel -> units that its columns may be in, and the
     "m": LENGTH_UNITS,
     "m/s^2": ACCELERATION_UNITS,
     "N m": TORQUE_UNITS,
+    "N": FORCE_UNITS,
+    "N/m": LINE_LOAD_UNITS,
     "1": {"1": 1.0, "-": 1.0, "g": 1.0},
 }
 PATTERNS = {unit: unit_pattern(factors) for unit, factors in FACTORS.items()}
@@ -34,13 +38,17 @@ def channel_meant(title: str) -> tuple[str, float | None] | None:
 
     >>> channel_meant("q_deg_s"), channel_meant("Tip_right_z [mm]"), channel_meant("fold_left")
     (('q', 0.017453292519943295), ('tip_right_z', 0.001), None)
+    >>> channel_meant("section_cl_fin_1"), channel_meant("nz [1]")
+    (('section_cl_fin_1', None), ('nz', 1.0))
     """
     whole = plain(title)
     # the unit first: `tip_z_wing_mm` is the column of the surface `wing`
     for unit, pattern in PATTERNS.items():
         match = pattern.fullmatch(whole)
         facts = None if match is None else channel_of(_base(match))
-        if match is not None and facts is not None and facts.unit == unit:
+        if match is None or facts is None or facts.unit != unit:
+            continue
+        if not whole.endswith("1") or _base(match) == facts.name:  # the 1 of a strip or point is no unit
             return _base(match), FACTORS[unit][match["unit"]]
     return (whole, None) if channel_of(whole) is not None else None
 

@@ -58,6 +58,11 @@ TORQUE_UNITS = {  # -> N m
     **dict.fromkeys(("nm", "n_m", "n*m", "n.m", "n·m"), 1.0),
     **dict.fromkeys(("knm", "kn_m", "kn*m", "kn.m"), 1e3),
 }
+FORCE_UNITS = {"n": 1.0, "kn": 1e3}  # -> N
+LINE_LOAD_UNITS = {  # -> N/m
+    **dict.fromkeys(("n_m", "n/m"), 1.0),
+    **dict.fromkeys(("kn_m", "kn/m"), 1e3),
+}
 UNIT_IN_BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
 
 
@@ -67,7 +72,7 @@ def unit_pattern(units: Iterable[str]) -> re.Pattern[str]:
     All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match.
     """
     spelt = "|".join(map(re.escape, sorted(units, key=len, reverse=True)))
-    return re.compile(rf"(?P<name>.+?)[_./,:;-]*(?:in_)?[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
+    return re.compile(rf"(?P<name>.+?)(?:[_./,:;-]+in_|[_./,:;-]*)[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
 
 
 def plain(text: str) -> str:

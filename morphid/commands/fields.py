@@ -157,6 +157,14 @@ def _list_form(flag: str, item: Any) -> Form:
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")], remark)
     if _kinds(item) == [str]:
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")])
+    if float in _kinds(item):
+
+        def read(text: str) -> list[float]:
+            return _numbers(flag, text, float, ",".join("1" for _ in text.split(",")))
+
+        return Form(str, "S,S,...", read)
+    if isinstance(item, type) and issubclass(item, BaseModel):
+        return Form(Path, "FILE", read_json)
     return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
 
 

@@ -17,7 +17,7 @@ from morphcore.models.equivalent import chain_model, lane_constants
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.trim import trimmed_state
 from morphdata.identify import EquivalentModel
-from morphdata.measurement import Measurement
+from morphdata.measurement import Measurement, foreign_channels
 from tests.identify.disturbed import (
     CHANNELS,
     LINKS,
@@ -168,6 +168,23 @@ def test_a_measurement_that_makes_no_sense_is_refused(measurement: dict[str, Any
     with pytest.raises(InvalidInput) as caught:
         Measurement.parse(measurement, "/measurement")
     assert caught.value.pointer == pointer
+
+
+def test_a_channel_of_no_surface_is_refused_with_those_there_are() -> None:
+    """By service and library alike, before anything is flown."""
+    measurement = Measurement.parse({"channels": {"tip_z_tail": {"sigma": 1e-3}, "tip_z": {"sigma": 1e-3}}})
+    with pytest.raises(InvalidInput) as caught:
+        Identification(reference_aircraft(), reference_flight(), [flown("rate_0.8")], measurement=measurement)
+    assert [fault.pointer for fault in caught.value.faults] == [
+        "/measurement/channels/tip_z_tail",
+        "/measurement/channels/tip_z",
+    ]
+    assert "tip_z_right_wing, tip_z_left_wing" in caught.value.hint
+    one_side = replace(reference_aircraft(), surfaces=reference_aircraft().surfaces[:1])
+    surfaces = [(each.name, each.side, bool(each.hinges)) for each in one_side.surfaces]
+    tips = Measurement.parse({"channels": {"tip_left_z": {}, "tip_right_z": {}, "q": {}}})
+    (fault,) = foreign_channels(tips, surfaces)
+    assert fault.pointer == "/measurement/channels/tip_left_z"
 
 
 def test_a_channel_that_a_sample_lacks_is_refused() -> None:

@@ -89,6 +89,24 @@ def test_wings_sweep_and_fold_by_a_table_in_degrees(tmp_path: Path) -> None:
     assert np.abs(flown.phi).max() > 1e-4  # unlike folds roll
 
 
+def test_points_and_shape_are_options(tmp_path: Path) -> None:
+    """`--points` reads a list of points, `--shape-times` takes seconds with commas between."""
+    points, plots = tmp_path / "points.json", tmp_path / "plots"
+    points.write_text('[{"name": "imu", "position_m": [1, 0, 0]}]')
+    more = ("--channels", "nz", "--points", points, "--shape-times", "0,0.15", "--plots", plots)
+    words = ("--rate", "1", "--final", "0.2", *COARSE, *more, "--json", tmp_path / "out.json")
+    ended = RUNNER.invoke(app, command("simulate", *words))
+    assert ended.exit_code == Exit.OK, ended.output
+    result = json.loads((tmp_path / "out.json").read_text())
+    assert list(result["trajectory"])[-2:] == ["nz", "nz_imu"]
+    assert result["shape"]["time_s"] == pytest.approx([0.0, 0.15])
+    assert (plots / "shape.csv").is_file()
+    assert (plots / "shape.npz").is_file()
+    ended = RUNNER.invoke(app, command("simulate", "--rate", "1", "--final", "0.2", "--shape-times", "now"))
+    assert ended.exit_code == Exit.USAGE
+    assert "write --shape-times 1" in ended.output
+
+
 def test_the_flexible_model_flies_too() -> None:
     """`--model flexible` bends: its tips are up before the morph, those of the rigid one are not."""
     tips = {}

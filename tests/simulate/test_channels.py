@@ -32,7 +32,6 @@ COARSE = Lattice(chordwise=1, spanwise=4)
 WIND_N = np.array([4.0, -9.0, 2.0])
 SMOOTH = [Swing(0.15, 5.0), Swing(0.1, 4.0)]  # right, left: no corner of the rate
 EVERY = [each.name for each in KNOWN]
-OF_BEAMS = [each.name for each in KNOWN if "flexible" in each.models]
 MODELS = ["rigid", "equivalent", "flexible"]
 
 
@@ -42,7 +41,7 @@ def flown(
     """0.4 s of the example aircraft on a coarse lattice, in a steady wind."""
     flight = replace(example_flight(), wind_N=WIND_N)
     if channels is None:
-        channels = OF_BEAMS if kind == "flexible" else EVERY
+        channels = EVERY
     model: Any = physical_guess(example_model(3)) if kind == "equivalent" else kind
     options = {"step_s": 0.001 if kind == "flexible" else 0.0025, "duration_s": 0.4, **options}
     return fly(
@@ -66,13 +65,15 @@ def test_both_lists_hold_the_same_channels() -> None:
     """What documents know is what can be computed, in the same order; units are one of few."""
     assert [channel.name for channel in CHANNELS] == EVERY
     assert len(set(EVERY)) == len(EVERY)
-    assert {channel.unit for channel in CHANNELS} == {"rad/s", "m/s", "m", "rad", "m/s^2", "1", "N m"}
+    assert {channel.unit for channel in CHANNELS} == {
+        "rad/s", "m/s", "m", "rad", "m/s^2", "1", "N m", "N", "N/m",
+    }  # fmt: skip
 
 
 def test_the_page_on_formats_lists_them(root: Path) -> None:
     """docs/formats.md has a row for every channel, with its unit and meaning."""
     text = (root / "docs" / "formats.md").read_text(encoding="utf-8")
-    per = {"": "", "surface": " (per surface)", "drive": " (per drive)"}
+    per = {each: f" (per {each})" if each else "" for each in ("", "surface", "strip", "drive", "point")}
     for each in KNOWN:
         unit = "" if each.unit == "1" else each.unit
         assert f"| `{each.name}`{per[each.per]} | {unit} | {each.description} |" in text
@@ -198,12 +199,12 @@ def test_channels_that_are_not_requested_are_not_computed(monkeypatch: pytest.Mo
         recorded.append(record_rows)
         return fly_batch(*conditions, record_rows=record_rows, **options)
 
-    def refused(*_conditions: Any) -> Any:
+    def refused(*_conditions: Any, **_options: Any) -> Any:
         raise AssertionError("nobody has requested this")
 
     monkeypatch.setattr(flying, "fly_batch", counted)
-    monkeypatch.setattr(flying, "torques_and_rates", refused)
-    monkeypatch.setattr(flying, "_tips_twist", refused)
+    for name in ("chain_loads", "surface_loads", "tips_twist", "chain_shape"):
+        monkeypatch.setattr(flying, name, refused)
     flown("equivalent", ["alpha", "q"], duration_s=0.05)
     assert recorded == [13 + 12]  # the fuselage's, and the joints' angles
     with pytest.raises(AssertionError, match="requested"):
@@ -225,7 +226,7 @@ def test_a_flight_with_every_channel_is_a_sample_again(tmp_path: Any) -> None:
     found = flown("equivalent").trajectory
     write_trajectory_csv(found, tmp_path / "flight.csv")
     read = load_trajectory(tmp_path / "flight.csv")
-    assert list(read.extra) == list(found.extra)
+    assert list(read.extra) == list(found.extra) == list(read.channels)
     for name, column in found.extra.items():
         np.testing.assert_allclose(read.extra[name], column, rtol=1e-8, atol=1e-300)
     named = trajectory_document(found)
@@ -247,7 +248,6 @@ def test_a_flight_with_every_channel_is_a_sample_again(tmp_path: Any) -> None:
     [
         (["q", "gamma"], "rigid", 9.81, "/channels/1", "'alpha'"),
         (["q", "q"], "rigid", 9.81, "/channels/1", "Leave one out"),
-        (["hinge_torque"], "flexible", 9.81, "/channels/0", "rigid, equivalent"),
         (["nz"], "rigid", 0.0, "/channels/0", "fx, fy, fz"),
     ],
 )

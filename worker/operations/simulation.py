@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from morphcore.export.flight_plots import flight_plots
+from morphcore.export.shape_files import shape_files
 from morphcore.simulate.flight import write_trajectory_csv
 from morphcore.simulate.request import SimulationRun, simulation_from_document
 from morphcore.simulate.trajectory import Trajectory
@@ -35,10 +36,14 @@ class SimulationWork:
         *,
         files: bool = True,
     ) -> Outcome:
-        """Return the flight, with its table and its plot if wanted."""
+        """Return the flight, with its tables and its plot if wanted."""
         result = self._run.result()
         document = result.to_document()
-        written = {"flight.csv": _table(result.trajectory), **flight_plots(document)} if files else {}
+        if not files:
+            return Outcome(document, result_file(document))
+        shape = result.simulation.shape
+        written = {"flight.csv": _table(result.trajectory), **flight_plots(document)}
+        written |= {} if shape is None else shape_files(shape)
         return Outcome(document, {**result_file(document), **written})
 
     def best_so_far(self, checkpoint: bytes) -> None:  # noqa: ARG002 - as above

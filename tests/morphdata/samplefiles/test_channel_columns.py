@@ -111,6 +111,11 @@ def test_a_row_of_units_counts_for_channels(tmp_path: Path) -> None:
         ("fz [m/s²]", ("fz", 1.0)),
         ("hinge_torque_fold_left [N m]", ("hinge_torque_fold_left", 1.0)),
         ("tip_z_right_wing_cm", ("tip_z_right_wing", 1e-2)),
+        ("tip_z_fin_cm", ("tip_z_fin", 1e-2)),  # no "in cm" of the surface f
+        ("root_bending_fin [kN m]", ("root_bending_fin", 1e3)),
+        ("section_lift_fin_1_n_m", ("section_lift_fin_1", 1.0)),
+        ("section_cl_fin_1", ("section_cl_fin_1", None)),
+        ("nz_imu1", ("nz_imu1", None)),
         ("q", ("q", None)),
         ("q0", None),
         ("q [m]", None),

@@ -55,6 +55,31 @@ def test_the_table_is_a_sample(worker: RealWorker, tmp_path: Path) -> None:
     assert np.allclose(flown.theta, worker.result(job_id)["trajectory"]["theta_rad"], atol=1e-9)
 
 
+def test_loads_points_and_shape_are_in_result_and_files(worker: RealWorker) -> None:
+    """What a request adds arrives in the result, in the table and in files of the shape."""
+    request = {
+        **simulation(),
+        "channels": ["nz", "root_bending", "section_cl"],
+        "points": [{"name": "tip", "surface": "left wing", "at": 1}],
+        "shape_times_s": [0.0, 0.5],
+    }
+    job_id = worker.add("simulate", request)
+    assert worker.run() is Ending.SUCCEEDED, worker.job(job_id).error
+    result = SimulateResult.model_validate(worker.result(job_id))
+    columns = worker.result(job_id)["trajectory"]
+    assert columns["nz_tip"][0] == pytest.approx(columns["nz"][0])
+    assert columns["root_bending_left_wing_nm"][0] > 1000.0
+    assert result.shape is not None
+    assert result.shape.time_s == pytest.approx([0.0, 0.5])
+    assert [len(each.leading_n_m) for each in result.shape.surfaces] == [2, 2]
+    assert result.sections is not None
+    assert f"section_cl_left_wing_{len(result.sections[1].at)}" in columns
+    files = worker.files(job_id)
+    assert {"shape.csv", "shape.npz"} < set(files)
+    assert undeclared(files, "simulate") == []
+    assert "nz_tip" in files["flight.csv"].decode().partition("\n")[0].split(",")
+
+
 def test_a_flight_is_cancelled_within_two_seconds(worker: RealWorker) -> None:
     """A long flight of the flexible model stops soon after the request, without a partial result."""
     job_id = worker.add("simulate", simulation(60.0, kind="flexible"))
