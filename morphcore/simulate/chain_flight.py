@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
@@ -16,7 +17,7 @@ from morphcore.multibody.kernels.hinge import HINGE_ROWS
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.control_motion import control_angles, of_every_part
 from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
-from morphcore.simulate.record import FlightRecord, Loads, Part, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Part, air_at_reference, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.torque import torques_and_rates
@@ -38,7 +39,7 @@ def chain_flight(
     *,
     parts: frozenset[Part] = frozenset(),
     start: StartMode,
-    air_velocity_N: Callable[[Array], Array] | None,
+    air: MovingAir | None,
     stop: Stop | None,
 ) -> Iterator[tuple[float, FlightRecord | None]]:
     """Fly one parameter set; yield the fraction flown after every chunk, and the record with the last.
@@ -55,7 +56,7 @@ def chain_flight(
         model,
         schedules,
         grid,
-        air_velocity_N=air_velocity_N,
+        air=air,
         may_halve=model.is_even(batch),
         wake_alpha=begin.alpha,
     )
@@ -102,7 +103,7 @@ def chain_flight(
         omega_B=history[:, OMEGA:VELOCITY],
         velocity_N=velocity_N,
         position_N=history[:, POSITION:JOINTS],
-        wind_N=plan.wind_N[at],
+        wind_N=air_at_reference(model.flight, air, grid.times_s[at]),
         angles=angles,
         tips_z=tips_z,
         trim=found,

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
 from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.trajectory import Trajectory
@@ -56,6 +57,12 @@ class FlightRecord:
     tips_twist: Array | None = None
     loads: Loads | None = None
     bending: Array | None = None
+
+
+def air_at_reference(flight: Flight, air: MovingAir | None, times_s: Array) -> Array:
+    """Velocity (k, 3) m/s in N of the air at the reference point: uniform wind, gust and turbulence."""
+    wind_N = np.tile(flight.wind_N, (times_s.size, 1))
+    return wind_N if air is None else wind_N + air.at_reference(times_s)
 
 
 def require_sound(

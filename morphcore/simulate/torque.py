@@ -44,7 +44,7 @@ def torques_and_rates(
 
     Parameters
     ----------
-    plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
+    plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `air` have a row for each state.
     states : (t, state_rows).
     """
     rows, columns = model.lattice.operator_shape
@@ -72,8 +72,8 @@ def torques_and_rates(
         torques(
             lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], accelerations[part],
-            first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
-            inputs, outputs, rates, out[part], velocity_rates[part],
+            first_hinges, screws, operators, plan.air(part.start, part.stop), laid,
+            states[part], zero, block, scratch, inputs, outputs, rates, out[part], velocity_rates[part],
         )  # fmt: skip
     return out, velocity_rates
 
