@@ -62,7 +62,7 @@ class Wave:
         factor = np.interp(right_m, self.right_m, self.factor)
         out = np.zeros((*np.broadcast_shapes(along_m.shape, right_m.shape), 3))
         for axis in np.flatnonzero(own.any(axis=0)):
-            out[..., axis] = factor * np.interp(along_m, places, own[:, axis])
+            out[..., axis] = factor * np.interp(along_m, places, own[:, axis], left=0.0)
         return out
 
 

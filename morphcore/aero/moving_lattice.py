@@ -105,20 +105,20 @@ class MovingLattice:
         Beyond the limits of their sections these are cut off.
         """
         out = np.empty((self.at.R_BS.shape[0], 6))
-        lagged, _, _ = self.limited(lagged, twists, wind_B)
+        lagged, _ = self.limited(lagged, twists, wind_B)
         section_forces(self.parts, self.at, lagged, twists, wind_B, 0.0, out)
         return out
 
-    def limited(self, lagged: Array, twists: Array, wind_B: Array) -> tuple[Array, float, int]:
+    def limited(self, lagged: Array, twists: Array, wind_B: Array) -> tuple[Array, Array]:
         """Circulations (r,) within the limits of their sections, outside gusts.
 
-        Also the largest ratio of a section's lift to its limit before, and its strip; 0 without limits.
+        And the worst section before (3,), `lattice_gusts.limit_circulation`; zeros without limits.
         """
+        acting, worst, none = np.array(lagged, dtype=np.float64), np.zeros(3), np.zeros(0)
         if not self.parts.limits.size:
-            return lagged, 0.0, 0
-        acting, worst, none = np.array(lagged, dtype=np.float64), np.zeros(2), np.zeros(0)
+            return acting, worst
         limit_circulation(self.parts, self.at, np.eye(3), none, twists, wind_B, acting, worst)
-        return acting, float(worst[0]), int(worst[1])
+        return acting, worst
 
 
 def lattice_parts(

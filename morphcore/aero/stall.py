@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +38,49 @@ def strip_half_areas(lattices: Sequence[SurfaceLattice]) -> Array:
     return np.concatenate([0.5 * lattice.panel_area_m2.sum(axis=0) for lattice in lattices])
 
 
-def strip_name(
-    surfaces: Sequence[Surface], lattices: Sequence[SurfaceLattice], strip: int
-) -> tuple[int, float]:
-    """The surface of a strip, and the strip's middle as a share of its span."""
-    number = 0
-    while strip >= lattices[number].spanwise:
-        strip -= lattices[number].spanwise
-        number += 1
-    edges = lattices[number].strip_edges_m
-    return number, float(0.5 * (edges[strip] + edges[strip + 1]) / surfaces[number].length_m)
+@dataclass(frozen=True)
+class StallRecord:
+    """How near sections came to the limits of their lift, at k times.
+
+    ratio : (k,) the largest ratio of a section's lift to its limit, as if it did not stall. surface, at,
+    limit : (k,) of that section: number of its surface, share of the span, and the limiting lift coefficient.
+    """
+
+    names: tuple[str, ...]
+    ratio: Array
+    surface: NDArray[np.int64]
+    at: Array
+    limit: Array
+
+    def worst(self, row: int) -> tuple[str, float, float, float]:
+        """Name of the surface, share of the span, lift coefficient and its limit at one of the times."""
+        limit = float(self.limit[row])
+        name = self.names[int(self.surface[row])]
+        return name, float(self.at[row]), float(self.ratio[row]) * limit, limit
+
+
+def stall_record(lift: Array, surfaces: Sequence[Surface], lattices: Sequence[SurfaceLattice]) -> StallRecord:
+    """The record for lift coefficients (k, strips) of all strips, as if none stalled."""
+    limits = lift_limits(surfaces, lattices)
+    share = lift / np.where(lift > 0.0, limits[:, 1], limits[:, 0])
+    rows, worst = np.arange(lift.shape[0]), np.argmax(share, axis=1)
+    return record_of(share[rows, worst], worst, lift[rows, worst] > 0.0, surfaces, lattices)
+
+
+def record_of(
+    ratio: Array,
+    strip: NDArray[np.int64],
+    upper: NDArray[np.bool_],
+    surfaces: Sequence[Surface],
+    lattices: Sequence[SurfaceLattice],
+) -> StallRecord:
+    """The record for the largest ratios, their strips, and whether of the upper limit, (k,) each."""
+    limits = lift_limits(surfaces, lattices)
+    number = np.concatenate([np.full(each.spanwise, k) for k, each in enumerate(lattices)])
+    middles = [
+        0.5 * (each.strip_edges_m[1:] + each.strip_edges_m[:-1]) / surface.length_m
+        for surface, each in zip(surfaces, lattices, strict=True)
+    ]
+    names = tuple(surface.name for surface in surfaces)
+    limit = limits[strip, np.asarray(upper, dtype=np.int64)]
+    return StallRecord(names, ratio, number[strip], np.concatenate(middles)[strip], limit)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.environment import MovingAir
+from morphcore.aero.stall import StallRecord, stalls
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
@@ -19,8 +20,9 @@ from morphcore.simulate.control_motion import control_angles, of_every_part
 from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
 from morphcore.simulate.record import FlightRecord, Loads, Part, air_at_reference, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.section_lift import require_attached, stall_of_flight
 from morphcore.simulate.time_grid import TimeGrid
-from morphcore.simulate.torque import torques_and_rates
+from morphcore.simulate.torque import closing_half_a_step, torques_and_rates
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.simulate.wake import trimmed_schedules
 from morphcore.stopping import Stop
@@ -61,15 +63,16 @@ def chain_flight(
         wake_alpha=begin.alpha,
     )
     flown = plan.flown(model)
-    found = trim(flown, batch, plan, start=start).require()
+    found = require_attached(flown, batch, plan, trim(flown, batch, plan, start=start), start)
     constants = lane_constants(flown, batch, grid.step_s)
     constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)
     rows, chunks, states = JOINTS + flown.coordinates, [], []
-    wanted = flown.state_rows if "loads" in parts else rows
+    whole = "loads" in parts or stalls(flown.aircraft.surfaces)
+    wanted = flown.state_rows if whole else rows
     for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
         chunks.append(chunk.rows[:, :rows, 0].copy())  # copied: a view would keep the whole states alive
-        if "loads" in parts:  # only the reported rows of the states are kept
+        if whole:  # only the reported rows of the states are kept
             inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
             states.append(chunk.rows[at[inside] - chunk.first, :, 0])
         yield chunk.first / grid.steps, None
@@ -88,7 +91,8 @@ def chain_flight(
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
     bending = tip_bending(flown, _repeated(batch, at.size), history[:, JOINTS:])
     tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
-    loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
+    loads = _loads(flown, plan, constants, np.concatenate(states), at) if "loads" in parts else None
+    stall = _stall(flown, plan, constants, np.concatenate(states), at) if states else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
         spread = model.mirror.spread
         angles, tips_z = model.mirror.spread_hinges(angles), spread(tips_z)
@@ -110,6 +114,7 @@ def chain_flight(
         tips_twist=tips_twist,
         loads=loads,
         bending=bending,
+        stall=stall,
     )
     yield 1.0, record
 
@@ -149,3 +154,11 @@ def _loads(
     """Accelerations and torques of whole states (k, state_rows) at the rows ``at`` of the grid."""
     torque, rates = torques_and_rates(model, plan.instants(at), constants, states)
     return Loads(velocity_rate_B=rates, hinge_torque=torque)
+
+
+def _stall(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array, at: NDArray[np.int64]
+) -> StallRecord | None:
+    """How near sections came to their limits, in whole states (k, state_rows) at the rows ``at``."""
+    rows = closing_half_a_step(model, constants.rows[0])
+    return stall_of_flight(model, plan.instants(at), constants, rows, states)

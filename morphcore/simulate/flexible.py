@@ -311,8 +311,8 @@ class FlexibleRun:
 
     Attributes
     ----------
-    records : (steps + 1, RECORD + 2 s) of the steps flown, `kernels.flexible_step`; two more if sections
-    stall. row : the last one.
+    records : (steps + 1, RECORD + 2 s) of the steps flown, `kernels.flexible_step`; three more if
+    sections stall. row : the last one.
     """
 
     def __init__(
@@ -355,9 +355,9 @@ class FlexibleRun:
             pace=np.zeros(1),
             turn=np.zeros((7, 3)),
             vector=np.zeros((3, 6)),
-            stall=np.zeros(2),
+            stall=np.zeros(3),
         )
-        stalls = 2 * int(flight.lattice.parts.limits.size > 0)
+        stalls = 3 * int(flight.lattice.parts.limits.size > 0)
         self.records: Array = np.zeros((grid.steps + 1, RECORD + 2 * model.roots.size + stalls))
         flight.structure(state.poses, state.V, state.A)
         self._form_matrix()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from morphcore.aero.environment import MovingAir
 from morphcore.aero.gust_lag import before_wagner
+from morphcore.aero.stall import StallRecord, record_of, stalls
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, set_in_motion
@@ -86,6 +87,7 @@ def flexible_flight(
             residual=np.array([trim.residual]),
             thrust_moment_B=trim.thrust_moment_B[None],
         ),
+        stall=_stall(model, records[:, RECORD + 2 * tips :]),
     )
     yield 1.0, record
 
@@ -98,3 +100,12 @@ def _history(records: Array, tips: int) -> Array:
     return np.concatenate(
         [euler, records[:, 9:12], velocity_N, records[:, 15:18], records[:, RECORD : RECORD + tips]], axis=1
     )
+
+
+def _stall(model: FlexibleModel, worst: Array) -> StallRecord | None:
+    """How near sections came to their limits, from the ends (k, 3) of a run's records; or None."""
+    surfaces, lattices = model.aircraft.surfaces, model.lattice.lattices
+    if not stalls(surfaces):
+        return None
+    ratio, strip, upper = worst.T
+    return record_of(ratio, strip.astype(np.int64), upper > 0.0, surfaces, lattices)

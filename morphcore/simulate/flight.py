@@ -44,8 +44,10 @@ from morphcore.validity import (
     air_warnings,
     bending_warnings,
     deflection_warnings,
+    gust_warnings,
     light_wing_warnings,
     overlap_warnings,
+    stall_warnings,
     steep_warning,
     trim_warnings,
     wake_warnings,
@@ -258,6 +260,7 @@ def flight_steps(  # noqa: PLR0913 - as above
                 columns = channel_columns(wanted, record, aircraft, flight)
                 trajectory = recorded_trajectory(aircraft, times, record, columns)
                 warnings = _warnings(aircraft, flight, times, record, smooth)
+                warnings += tuple(gust_warnings(environment, flight, grid.step_s))
                 drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
                 if start == "trim":
                     warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0]))
@@ -284,6 +287,7 @@ def _warnings(
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
         *deflection_warnings(aircraft, record.angles),
+        *stall_warnings(record.stall, times, "the flight", "/aircraft/surfaces"),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.environment import MovingAir
+from morphcore.aero.stall import StallRecord
 from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.trajectory import Trajectory
@@ -43,7 +44,8 @@ class FlightRecord:
     point; wind_N : (k, 3) m/s of the air there; angles : (k, h + c) of all hinges, then of all controls, rad;
     tips_z : (k, s) tips below their roots along z of B, m. trim : the start. tips_twist : (k, s) twist of the
     tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`). bending :
-    (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None.
+    (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None. stall :
+    how near sections came to the limits of their lift; None without limits.
     """
 
     euler: Array
@@ -57,6 +59,7 @@ class FlightRecord:
     tips_twist: Array | None = None
     loads: Loads | None = None
     bending: Array | None = None
+    stall: StallRecord | None = None
 
 
 def air_at_reference(flight: Flight, air: MovingAir | None, times_s: Array) -> Array:

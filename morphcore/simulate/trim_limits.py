@@ -38,6 +38,16 @@ def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
     )
 
 
+def stalled(name: str, at: float, needed: float, limit: float, airspeed_m_s: float) -> Limit:
+    """A section at a share of a surface's span would need a lift coefficient beyond its limit."""
+    return Limit(
+        f"it needs a lift coefficient of {needed:.3g} at {100.0 * at:.0f} per cent of the span of {name!r}, "
+        f"whose sections stall at {limit:.3g}",
+        f"fly faster (from about {airspeed_m_s * (needed / limit) ** 0.5:.3g} m/s) or lighter, or check "
+        "cl_max and cl_min of the surface",
+    )
+
+
 def lost(share: float, alpha: float, bent: tuple[str, float], sound: float = 0.0) -> Limit:
     """The equilibrium was followed from rigid wings to a ``share`` of their flexibility.
 

@@ -90,8 +90,8 @@ def _in_section(R, cx, cy, u, v, w):
 def limit_circulation(parts, place, R_NB, gust, twists, wind_B, acting, worst):
     """Cut off the acting circulations (r,) at the limits of their sections' lift, in place.
 
-    A strip's rings are reduced alike. worst : (2,) gets the largest ratio of lift to its limit before, and
-    the strip's number.
+    A strip's rings are reduced alike. worst : (3,) gets the largest ratio of lift to its limit before, the
+    strip's number, and 1 for its upper limit, 0 for its lower one.
     """
     worst[:] = 0.0
     strips, flow = parts.drag.size, place.drag_velocity
@@ -112,6 +112,7 @@ def limit_circulation(parts, place, R_NB, gust, twists, wind_B, acting, worst):
         ratio = gamma / (speed * (high if gamma > 0.0 else low))
         if ratio > worst[0]:
             worst[0], worst[1] = ratio, t
+            worst[2] = 1.0 if gamma > 0.0 else 0.0
         place.share[t] = kept(gamma, low, high, speed)
     for p in range(acting.size):
         acting[p] *= place.share[parts.ring_strip[p]]

@@ -148,7 +148,7 @@ class State(NamedTuple):
 class Scratch(NamedTuple):
     """Room for one step (n nodes, k sections, r rings): right (n, 6); twists, forces (k, 6); others (r,).
 
-    stall : (2,) of the last iteration, `lattice_gusts.limit_circulation`.
+    stall : (3,) of the last iteration, `lattice_gusts.limit_circulation`.
     """
 
     R_NS: Array
@@ -209,8 +209,8 @@ def _record(structure, state, scratch, out):
         out[RECORD + s] = total
         out[RECORD + tips + s] = sine
     if out.size > RECORD + 2 * tips:
-        out[RECORD + 2 * tips] = scratch.stall[0]
-        out[RECORD + 2 * tips + 1] = scratch.stall[1]
+        for i in range(3):
+            out[RECORD + 2 * tips + i] = scratch.stall[i]
 
 
 @inlined
