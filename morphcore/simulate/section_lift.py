@@ -12,7 +12,7 @@ from morphcore.aero.kernels.gust_loads import GUST_COLUMNS, UNIFORM
 from morphcore.aero.kernels.loads import CHORD_X, CHORD_Y, OUTPUTS
 from morphcore.aero.stall import StallRecord, stall_record, stalls, strip_half_areas
 from morphcore.errors import TrimNotFound
-from morphcore.lanes import lane_type
+from morphcore.lanes import TOGETHER, lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import axis_rows_of_scratch, constant_rows, link_rows_of_scratch
 from morphcore.simulate.batch import shared_numbers
@@ -37,12 +37,13 @@ def section_lifts(
     `torque.closing_half_a_step`). states : (t, state_rows).
     """
     operator_rows, columns = model.lattice.operator_shape
-    width = constants.rows.shape[-1]
+    width = TOGETHER  # of the kernel that trims have compiled already
     rates, zero = np.zeros((1, model.state_rows, width)), np.zeros((model.state_rows, width))
     scratch = np.zeros((model.scratch_rows, width))
     inputs, outputs = np.zeros((columns, width)), np.zeros((operator_rows, width))
     shared, accelerations = shared_numbers(model, limited=False), plan.surface_accelerations
     overlap = rows[constant_rows(model.links, model.coordinates)[-1] :, 0]
+    spread = np.repeat(rows[None, :, :1], width, axis=2)
     half_areas = strip_half_areas(model.lattice.lattices)
     out = np.empty((states.shape[0], model.lattice.strips))
     for n, state in enumerate(states):
@@ -51,7 +52,7 @@ def section_lifts(
         block = np.ascontiguousarray(np.broadcast_to(state[None, :, None], (1, state.size, width)))
         rates_of_blocks(
             lane_type(width), 0, 1, model.surfaces, constants.ranges[:1], shared, strips,
-            plan.hinges[n : n + 1], accelerations[n], operators, air, rows[None], zero, block, scratch,
+            plan.hinges[n : n + 1], accelerations[n], operators, air, spread, zero, block, scratch,
             inputs, outputs, rates,
         )  # fmt: skip
         circulation = outputs[: OUTPUTS * model.lattice.strips : OUTPUTS, 0]

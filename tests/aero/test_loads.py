@@ -252,7 +252,7 @@ def test_a_sudden_gust_builds_lift_up_as_kuessner_says():
     flight = replace(example_flight(), gravity_m_s2=0.0)
     model = chain_model(replace(aircraft, fuselage=heavy), flight, 1, Lattice(chordwise=2, spanwise=4))
     batch, grid = dragless(model), steps(0.1, 0.0005)
-    air = MovingAir((step_gust([0.0, 0.0, -2.0], start_m=0.15),), 150.0)
+    air = MovingAir((step_gust([0.0, 0.0, -2.0], start_m=0.15, spacing_m=0.002),), 150.0)
     plan = flight_plan(model, [Hold(), Hold()], grid, air=air, wake_alpha=0.0)
     _, state = settled(model, batch, (0.0, 0.0), (0.0, 0.0, 0.0, 150.0, 0.0, 0.0))
     states = fly_free(model, plan, batch, state[None]).states[:, 0]
@@ -295,10 +295,10 @@ def test_a_gust_that_is_the_same_everywhere_is_wind(links):
     np.testing.assert_allclose(wrenches[1] / scale, wrenches[0] / scale, rtol=0.0, atol=1e-10)
 
 
-def step_gust(velocity_N, *, start_m):
-    """Air of one velocity from a place on, 3 km long, the same everywhere across the path."""
+def step_gust(velocity_N, *, start_m, spacing_m=0.05):
+    """Air of one velocity from a place on, the same everywhere across the path."""
     everywhere = np.zeros(1), np.ones(1)
-    return Wave(start_m, 0.05, np.tile(np.array(velocity_N, dtype=float), (60_000, 1)), *everywhere)
+    return Wave(start_m, spacing_m, np.tile(np.array(velocity_N, dtype=float), (60_000, 1)), *everywhere)
 
 
 def test_damping_in_roll_heave_and_pitch():
