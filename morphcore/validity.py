@@ -67,11 +67,13 @@ class AirMotion:
     """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
     The incidence is that of the body, or of the section that incidence, hinges and twist incline furthest.
+    stall : how near sections came to the limits of their lift; None without limits.
     """
 
     time_s: Array
     incidence: Array
     airspeed: Array
+    stall: StallRecord | None = None
 
 
 def air_motion(
@@ -100,7 +102,7 @@ def air_motion(
 
 
 def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:
-    """Incidence beyond the linear range of the lift, and compressible flow computed without ``mach``.
+    """Incidence beyond the linear range of the lift, stalled sections, compressible flow without ``mach``.
 
     Parameters
     ----------
@@ -121,6 +123,7 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
                     pointer,
                 )
             )
+        found += stall_warnings(motion.stall, motion.time_s, name, pointer)
     fastest = max([flight.airspeed_m_s, *(float(motion.airspeed.max()) for _, _, motion in motions)])
     mach = fastest / standard_atmosphere(flight.altitude_m).speed_of_sound_m_s
     if flight.mach is None and mach > LARGEST_MACH:

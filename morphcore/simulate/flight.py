@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -47,7 +47,6 @@ from morphcore.validity import (
     gust_warnings,
     light_wing_warnings,
     overlap_warnings,
-    stall_warnings,
     steep_warning,
     trim_warnings,
     wake_warnings,
@@ -278,6 +277,7 @@ def _warnings(
     """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
     wind_N = air_at_reference(flight, smooth, times)
     motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
+    motion = replace(motion, stall=record.stall)
     bending = np.zeros((0, 0)) if record.bending is None else record.bending
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
@@ -287,7 +287,6 @@ def _warnings(
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
         *deflection_warnings(aircraft, record.angles),
-        *stall_warnings(record.stall, times, "the flight", "/aircraft/surfaces"),
     )
 
 

@@ -10,16 +10,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import moving_air
 from morphcore.aero.kernels.stall import KNEE, capped, kept
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.simulate.chain_motion import chain_motion
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold
+from morphcore.simulate.trim import trim, trimmed_state
+from morphcore.validity import air_warnings
 from morphdata.aircraft import Aircraft as Document
 from morphdata.environment import Environment
 from morphdata.lattice import Lattice
 from tests.models.chains import EXAMPLES, aircraft_of, example_flight
-from tests.simulate.flights import fly
+from tests.simulate.flights import fly, steps
 
 Array = NDArray[np.float64]
 KINDS = ("rigid", "equivalent", "flexible")
@@ -109,6 +114,52 @@ def test_a_trim_that_needs_stalled_wings_is_refused(kind: str, limit: float) -> 
     speed = float(refused.value.hint.split("about ")[1].split(" m/s")[0])
     free = replace(example_flight(), start=None)
     flown(aircraft, kind, replace(free, airspeed_m_s=1.05 * speed))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_mirrored_gusts_stall_mirrored_wings(kind: str) -> None:
+    """The right wing stalls in one gust, the left one in its mirror image: mirrored to 1e-9 rad."""
+    rows = [{"y_m": -1.0, "factor": 0.1}, {"y_m": 1.0, "factor": 1.0}]
+    image = [{"y_m": -1.0, "factor": 1.0}, {"y_m": 1.0, "factor": 0.1}]
+    one, other = (
+        flown(
+            limited(cl_max=0.55, cl_min=-0.2), kind, duration_s=0.3,
+            environment=Environment.parse(
+                {"gust": {"amplitude_m_s": 15.0, "gradient_m": 15.0, "spanwise": spanwise}}
+            ),
+        )
+        for spanwise in (rows, image)
+    )  # fmt: skip
+    assert [[each.code for each in found.warnings] for found in (one, other)] == [["stalled"]] * 2
+    assert np.abs(one.trajectory.phi).max() > 1e-3
+    for name, sign in (("phi", 1.0), ("theta", -1.0), ("psi", 1.0)):
+        apart = getattr(one.trajectory, name) + sign * getattr(other.trajectory, name)
+        assert np.abs(apart).max() < 1e-9, name
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_trim_on_the_bend_of_the_lift_curve(kind: str) -> None:
+    """Sections need 0.41 of at most 0.43, where the curve bends: the trim is found at a larger incidence."""
+    near, free = (
+        flown(each, kind, duration_s=0.04).trim.alpha[0] for each in (limited(cl_max=0.43), limited())
+    )
+    assert free + 1e-4 < near < free + 5e-3
+
+
+def test_flights_of_a_search_warn_too() -> None:
+    """The motion on which the warnings of identifications and optimisations rest knows of the stall."""
+    flight = replace(example_flight(), start=None)
+    gust = Environment.parse({"gust": {"amplitude_m_s": 15.0, "gradient_m": 30.0}})
+    air = moving_air(gust, flight, [0.0, 0.4])
+    for aircraft, codes in ((limited(cl_max=0.5), ["stalled"]), (limited(cl_max=5.0), []), (limited(), [])):
+        model = chain_model(aircraft, flight, 2, SMALL)
+        batch = physical_guess(model)
+        plan = flight_plan(model, [Hold(), Hold()], steps(0.4, 0.005), air=air)
+        found = trim(model, batch, plan)
+        constants = lane_constants(model, batch, plan.grid.step_s)
+        constants.set_thrust(*found.acting_B)
+        motion = chain_motion(model, plan, constants, trimmed_state(model, batch, plan, found))
+        assert [each.code for each in air_warnings(flight, [("a sample", "/samples/0", motion)])] == codes
 
 
 @pytest.mark.parametrize(
