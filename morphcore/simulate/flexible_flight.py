@@ -56,7 +56,7 @@ def flexible_flight(
     gusts = None
     if air is not None:
         table = GustTable(air, model.lattice, trim.alpha, before_wagner(), times, path.angle)
-        gusts = table.between(0, times.size)
+        gusts = table.every()
     run = FlexibleRun(flight, path, grid, wind_N, begin, gusts)
     for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None

@@ -15,6 +15,8 @@ from morphcore.shown import Shown
 
 Array = NDArray[np.float64]
 
+PIECE = 1000  # times
+
 
 @dataclass(frozen=True, repr=False)
 class GustTable(Shown):
@@ -51,6 +53,14 @@ class GustTable(Shown):
         followed = self.air.followed(self.lag, semichords, along, right)
         return np.ascontiguousarray(np.concatenate([gust, followed], axis=2).reshape(along.shape[0], -1))
 
+    def every(self) -> Array:
+        """All rows (k, 6 m), a piece at a time to bound the memory."""
+        count = self.times_s.size
+        out = np.empty((count, 6 * self.lattice.strips))
+        for first in range(0, count, PIECE):
+            out[first : first + PIECE] = self.between(first, first + PIECE)
+        return out
+
     def leading_edges(self, angles: Array) -> tuple[Array, Array]:
         """Places (k, m) of the strips' leading edges ahead of the reference point, and right of it, m."""
         ahead, right = [], []
@@ -67,3 +77,12 @@ class GustTable(Shown):
             ahead.append(places_B @ path_B)
             right.append(places_B[..., 1])
         return np.concatenate(ahead, axis=1), np.concatenate(right, axis=1)
+
+
+def air_rows(wind_N: Array, gusts: GustTable | None, first: int, last: int) -> Array:
+    """Rows of the air for the kernels at the times first..last - 1.
+
+    They hold the uniform wind (3), of ``wind_N`` (k, 3), then what `GustTable.between` gives.
+    """
+    own = wind_N[first:last]
+    return own if gusts is None else np.concatenate([own, gusts.between(first, last)], axis=1)

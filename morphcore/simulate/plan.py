@@ -25,7 +25,7 @@ from morphcore.simulate.control_motion import (
     lagged_deflections,
     of_every_part,
 )
-from morphcore.simulate.gust_table import GustTable
+from morphcore.simulate.gust_table import GustTable, air_rows
 from morphcore.simulate.operator_table import ControlTable, OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
@@ -66,7 +66,7 @@ class Middles(Shown):
 
     def air(self, first: int, last: int) -> Array:
         """Rows of the air for the kernels: the uniform wind (3), then what `GustTable.between` gives."""
-        return _air_rows(self.wind_N, self.gusts, first, last)
+        return air_rows(self.wind_N, self.gusts, first, last)
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,7 +93,7 @@ class FlightPlan(Shown):
 
     def air(self, first: int, last: int) -> Array:
         """Rows of the air at grid times, as `Middles.air`."""
-        return _air_rows(self.wind_N, self.gusts, first, last)
+        return air_rows(self.wind_N, self.gusts, first, last)
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies this plan: the given one, or one half of it."""
@@ -427,11 +427,6 @@ def _plan(
         halved=bool(model.lattice.images),
         gusts=gusts and gusts.at(slice(0, None, 2)),
     )
-
-
-def _air_rows(wind_N: Array, gusts: GustTable | None, first: int, last: int) -> Array:
-    own = wind_N[first:last]
-    return own if gusts is None else np.concatenate([own, gusts.between(first, last)], axis=1)
 
 
 def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
