@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,7 @@ def sears_at_leading_edge(k: float) -> complex:
     return complex((c * (jv(0, k) - 1j * jv(1, k)) + 1j * jv(1, k)) * np.exp(-1j * k))
 
 
+@cache
 def kuessner() -> CubicSpline:
     """Küssner's function over 150 semichords, by Fourier's integral of Sears' function.
 
@@ -99,9 +101,6 @@ def kuessner() -> CubicSpline:
     real = np.array([sears_at_leading_edge(each).real for each in k])
     values = [2.0 / np.pi * np.trapezoid(real * np.sin(k * s) / k, k) for s in at]
     return CubicSpline(at, values)
-
-
-KUESSNER = kuessner()
 
 
 def duhamel(time_s: Array, gradient_m: float, start_s: float) -> Array:
@@ -118,7 +117,7 @@ def duhamel(time_s: Array, gradient_m: float, start_s: float) -> Array:
         if end <= 0.0:
             out.append(0.0)
             continue
-        out.append(quad(lambda x, t=t: slope(x) * KUESSNER((t - x) / SEMICHORD_S), 0.0, end, limit=200)[0])
+        out.append(quad(lambda x, t=t: slope(x) * kuessner()((t - x) / SEMICHORD_S), 0.0, end, limit=200)[0])
     return np.array(out)
 
 
