@@ -21,15 +21,15 @@ class TrimNotFound(NotFlyable):
     residual : what is left: of a chain the last Newton step, rad; of beams the largest imbalance of the angle
     of attack and the elements' strains, rad and m. iterations : Newton steps taken.
     limit : what was found on the way, a clause: where the equilibrium was lost, and at what shape.
-    hint : what would trim.
+    hint : what would trim. A residual of 0 is not mentioned: there is a root, but not one to be flown.
     """
 
     code = "trim_not_found"
 
     def __init__(self, *, residual: float, iterations: int, limit: str = "", hint: str = "") -> None:
-        found = f"{limit}; " if limit else ""
+        left = [f"residual {residual:.3g} after {iterations} Newton steps"] if residual else []
         super().__init__(
-            f"no trimmed level flight found: {found}residual {residual:.3g} after {iterations} Newton steps",
+            f"no trimmed level flight found: {'; '.join([limit][: len(limit)] + left)}",
             pointer="/flight",
             hint=hint,
         )

@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.apparent_mass import share_of_mass
+from morphcore.aero.environment import turbulence_scales
+from morphcore.aero.stall import StallRecord
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.overlap import overlapping_surfaces
 from morphcore.geometry.wake_contact import surfaces_in_wakes
 from morphdata.atmosphere import standard_atmosphere
 from morphdata.drives import without_side
+from morphdata.environment import Environment
 
 Array = NDArray[np.float64]
 
@@ -38,6 +41,8 @@ LARGEST_DEFLECTION_RAD = np.radians(20.0)
 # tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.6 mrad off, see
 # `bending_warnings`
 LARGEST_BENDING = 0.15
+MIN_STEPS_IN_GUST = 8.0  # a step then meets a 1 - cos gust within 4 per cent of its peak
+MIN_STEPS_IN_SCALE = 2.0  # of turbulence: shorter waves than its scale have a tenth of the energy
 NEAREST_WAKE_CHORDS = 0.75  # see `wake_warnings`
 LARGEST_ERROR = 0.05  # share of the motion, rms
 MIN_ERROR_RAD = 1e-4  # rad rms, resolution of the integration (simulate/time_grid.py)
@@ -62,11 +67,13 @@ class AirMotion:
     """Motion through the air over a flight of k times: incidence (rad) and airspeed (m/s), both (k,).
 
     The incidence is that of the body, or of the section that incidence, hinges and twist incline furthest.
+    stall : how near sections came to the limits of their lift; None without limits.
     """
 
     time_s: Array
     incidence: Array
     airspeed: Array
+    stall: StallRecord | None = None
 
 
 def air_motion(
@@ -95,7 +102,7 @@ def air_motion(
 
 
 def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:
-    """Incidence beyond the linear range of the lift, and compressible flow computed without ``mach``.
+    """Incidence beyond the linear range of the lift, stalled sections, compressible flow without ``mach``.
 
     Parameters
     ----------
@@ -116,6 +123,7 @@ def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) 
                     pointer,
                 )
             )
+        found += stall_warnings(motion.stall, motion.time_s, name, pointer)
     fastest = max([flight.airspeed_m_s, *(float(motion.airspeed.max()) for _, _, motion in motions)])
     mach = fastest / standard_atmosphere(flight.altitude_m).speed_of_sound_m_s
     if flight.mach is None and mach > LARGEST_MACH:
@@ -189,6 +197,50 @@ def deflection_warnings(aircraft: Aircraft, angles: Array) -> list[ResultWarning
         )
         for drive, deflection in furthest.items()
         if deflection > LARGEST_DEFLECTION_RAD
+    ]
+
+
+def stall_warnings(record: StallRecord | None, time_s: Array, name: str, pointer: str) -> list[ResultWarning]:
+    """Sections whose lift was cut off at the limit of their polar, at any of the times (k,)."""
+    if record is None or not (record.ratio > 1.0).any():
+        return []
+    row = int(np.argmax(record.ratio))
+    first = float(time_s[int(np.argmax(record.ratio > 1.0))])
+    surface, at, needed, limit = record.worst(row)
+    return [
+        ResultWarning(
+            "stalled",
+            f"sections stall in {name} from t = {first:.2f} s on: at {time_s[row]:.2f} s attached flow would "
+            f"give a lift coefficient of {needed:.3g} at {100.0 * at:.0f} per cent of the span of "
+            f"{surface!r}, whose limit is {limit:.3g}",
+            "their lift is cut off at the limit; drag, moment and hysteresis of separated flow are not "
+            "modelled: trust the result only up to that time",
+            pointer,
+        )
+    ]
+
+
+def gust_warnings(environment: Environment | None, flight: Flight, step_s: float) -> list[ResultWarning]:
+    """A gust or turbulence too short for the time step (s)."""
+    found = []
+    if environment is not None and environment.gust is not None:
+        steps = 2.0 * environment.gust.gradient_m / (flight.airspeed_m_s * step_s)
+        if steps < MIN_STEPS_IN_GUST:
+            found.append(("the gust passes", steps, MIN_STEPS_IN_GUST, "/environment/gust/gradient_m"))
+    if environment is not None and environment.turbulence is not None:
+        length = float(turbulence_scales(environment.turbulence, flight.altitude_m)[1].min())
+        steps = length / (flight.airspeed_m_s * step_s)
+        if steps < MIN_STEPS_IN_SCALE:
+            passes = "the shortest length scale of the turbulence passes"
+            found.append((passes, steps, MIN_STEPS_IN_SCALE, "/environment/turbulence"))
+    return [
+        ResultWarning(
+            "gust_unresolved",
+            f"{what} in {steps:.2g} time steps of {1e3 * step_s:.3g} ms, which do not resolve it",
+            f"choose model.step_s of at most {1e3 * step_s * steps / enough:.2g} ms",
+            pointer,
+        )
+        for what, steps, enough, pointer in found
     ]
 
 

@@ -199,6 +199,13 @@ class Surface(Document):
         description="Moment coefficient of the sections about their aerodynamic centre, nose up positive; in "
         "incompressible flow.",
     )
+    cl_max: Annotated[float, Field(gt=0.0, le=10.0)] | None = Field(
+        default=None,
+        description="Largest lift coefficient of the sections, at which they stall; default: no limit.",
+    )
+    cl_min: Annotated[float, Field(ge=-10.0, lt=0.0)] | None = Field(
+        default=None, description="The smallest, negative; default: no limit."
+    )
     twist_rad: Annotated[float, Field(ge=-0.5, le=0.5)] = Field(
         default=0.0, description="Twist of the tip against the root, rad, nose up positive; linear."
     )

@@ -19,6 +19,7 @@ from morphcore.aero.kernels.lattice_forces import (
     place_lattice,
     section_forces,
 )
+from morphcore.aero.kernels.lattice_gusts import add_gust_forces, limit_circulation
 from morphcore.aero.kernels.lattice_place import LatticeParts, lattice_place
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.aero.vlm import RingTable, prandtl_glauert
@@ -26,6 +27,9 @@ from morphdata.lattice import VortexCore
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+NO_GUST: Array = np.zeros(0)
+LEVEL: Array = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,8 @@ class Riders:
     squared, m^3. control_chord, drag_chord : (r, 2), (t, 2) x and y of the unit vector of the chord, forward,
     in section axes, at control points and strips. slope : (r,) of the mean line, nose up (twist less
     zero-lift angle). lag_time : (2, r) both time constants of Jones' function, s. control_slope : (c, r)
-    slopes of the panels per unit deflection of each control; None: no control.
+    slopes of the panels per unit deflection of each control; None: no control. limits : (t, 2) as in
+    `LatticeParts`; None: no section stalls.
     """
 
     sections: int
@@ -55,6 +60,7 @@ class Riders:
     slope: Array
     lag_time: Array
     control_slope: Array | None = None
+    limits: Array | None = None
 
 
 class MovingLattice:
@@ -96,11 +102,31 @@ class MovingLattice:
             self._factors = lu_factor(self.at.influence[: self._rings].T, check_finite=False)
         return np.asarray(lu_solve(self._factors, right, check_finite=False))
 
-    def section_forces(self, lagged: Array, twists: Array, wind_B: Array) -> Array:
-        """Force vectors (k, 6) on the sections, in their axes, for the acting circulations (r,)."""
+    def section_forces(
+        self, lagged: Array, twists: Array, wind_B: Array, gust: Array = NO_GUST, R_NB: Array = LEVEL
+    ) -> Array:
+        """Force vectors (k, 6) on the sections, in their axes, for the acting circulations (r,).
+
+        Beyond the limits of their sections these are cut off. gust, R_NB : as in `lattice_gusts`.
+        """
         out = np.empty((self.at.R_BS.shape[0], 6))
+        lagged, _ = self.limited(lagged, twists, wind_B, gust, R_NB)
         section_forces(self.parts, self.at, lagged, twists, wind_B, 0.0, out)
+        if gust.size:
+            add_gust_forces(self.parts, self.at, R_NB, gust, twists, wind_B, out)
         return out
+
+    def limited(
+        self, lagged: Array, twists: Array, wind_B: Array, gust: Array = NO_GUST, R_NB: Array = LEVEL
+    ) -> tuple[Array, Array]:
+        """Circulations (r,) within the limits of their sections.
+
+        And the worst section before (3,), `lattice_gusts.limit_circulation`; zeros without limits.
+        """
+        acting, worst = np.array(lagged, dtype=np.float64), np.zeros(3)
+        if self.parts.limits.size:
+            limit_circulation(self.parts, self.at, R_NB, gust, twists, wind_B, acting, worst)
+        return acting, worst
 
 
 def lattice_parts(
@@ -139,7 +165,20 @@ def lattice_parts(
         stretch=1.0 / prandtl_glauert(mach),
         density=float(density),
         control_slope=np.zeros((0, table.rings)) if riders.control_slope is None else riders.control_slope,
+        ring_strip=_ring_strips(table),
+        limits=np.zeros((0, 2)) if riders.limits is None else riders.limits,
     )
+
+
+def _ring_strips(table: RingTable) -> IntArray:
+    """The strip (r,) of each ring, numbered through all surfaces."""
+    out, strips = np.zeros(table.rings, dtype=np.int64), 0
+    for surface in range(int(table.panel_surface.max()) + 1):
+        own = np.flatnonzero(table.panel_surface == surface)
+        spanwise = int((table.panel_row[own] == 0).sum())
+        out[own] = strips + np.arange(own.size) % spanwise
+        strips += spanwise
+    return out
 
 
 def acting_circulation(circulation: Array, lag: Array) -> Array:

@@ -44,6 +44,7 @@ class Surface(Shown):
     none. The lattice stays flat: ``twist_rad`` (of the tip against the root, nose up) and ``zero_lift_rad``
     are slopes of the mean line in its boundary condition. ``stations`` take precedence over the other fields;
     with them ``profile_drag`` is the mean over the area, and the elastic axis is still straight along y.
+    ``cl_max`` and ``cl_min`` limit the lift coefficient of the sections; None: they do not stall.
     """
 
     name: str
@@ -69,6 +70,8 @@ class Surface(Shown):
     stations: SpanStations | None = None
     point_masses: tuple[PointMass, ...] = ()
     controls: tuple[Control, ...] = ()
+    cl_max: float | None = None
+    cl_min: float | None = None
 
     @classmethod
     def of(cls, document: documents.Surface) -> Surface:
@@ -101,6 +104,8 @@ class Surface(Shown):
             controls=tuple(
                 Control.of(control, document.side, control.name) for control in document.all_controls
             ),
+            cl_max=document.cl_max,
+            cl_min=document.cl_min,
         )
 
     @property

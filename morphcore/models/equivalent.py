@@ -23,7 +23,7 @@ from morphcore.models.kernels.layout import (
     FORCE_C,
     LINKS_C,
     MOMENT_C,
-    joint_rows_of_scratch,
+    axis_rows_of_scratch,
     state_rows,
 )
 from morphcore.models.links import beam_division, link_edges
@@ -175,7 +175,7 @@ class ChainModel(Shown):
     @property
     def scratch_rows(self) -> int:
         """Number of rows of a block's scratch."""
-        return int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
+        return int(axis_rows_of_scratch(self.links, self.coordinates)[-1])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

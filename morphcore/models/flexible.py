@@ -18,6 +18,7 @@ from morphcore.aero.apparent_mass import apparent_inertia, spatial
 from morphcore.aero.kernels.loads import JONES_B1, JONES_B2
 from morphcore.aero.moving_lattice import Riders
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
+from morphcore.aero.stall import lift_limits
 from morphcore.frames import skew
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
 from morphcore.geometry.control_slopes import panel_slopes
@@ -118,11 +119,18 @@ def flexible_model(
         roots=np.array(roots, dtype=np.int64),
         tips=np.array(tips, dtype=np.int64),
         rest_W=np.concatenate(rest_W),
-        riders=replace(_joined(riders), control_slope=slopes),
+        riders=replace(_joined(riders), control_slope=slopes, limits=_circulation_limits(parts)),
         element=np.concatenate([element for element, _ in places]),
         fraction=np.concatenate([fraction for _, fraction in places]),
         apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],
     )
+
+
+def _circulation_limits(parts: AircraftLattice) -> Array:
+    """Limits (t, 2) of all strips' circulation over the speed, m; (0, 2) if no section stalls."""
+    limits = lift_limits(parts.aircraft.surfaces, parts.lattices)
+    chords = np.concatenate([lattice.strip_chord_m for lattice in parts.lattices])
+    return 0.5 * chords[: limits.shape[0], None] * limits
 
 
 def _apparent_at(surface: Surface, flight: Flight, stations: Array) -> Array:

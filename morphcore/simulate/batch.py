@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.stall import lift_limits, strip_half_areas
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants, from_lanes, to_lanes
 from morphcore.models.kernels.layout import JOINTS, state_rows
@@ -39,14 +40,19 @@ class Chunk:
     rows: Array
 
 
-def shared_numbers(model: ChainModel) -> Array:
-    """Density, gravity, the fuselage's spatial inertia (21), whether there is apparent mass; for kernels."""
+def shared_numbers(model: ChainModel, *, limited: bool = True) -> Array:
+    """Density, gravity, the fuselage's spatial inertia (21), whether there is apparent mass; for kernels.
+
+    If sections stall and ``limited``, also the limits of all strips (`aero.kernels.stall.limit_lift`).
+    """
     fuselage = model.aircraft.fuselage
     x, y, z = fuselage.centre_of_mass_B
     m = fuselage.mass_kg
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     inertia = fuselage.inertia_B + m * cross @ cross.T
     upper = np.triu_indices(3)
+    lattices = model.lattice.lattices
+    limits = lift_limits(model.aircraft.surfaces, lattices) if limited else np.zeros((0, 2))
     return np.concatenate(
         [
             [model.flight.air_density_kg_m3, model.flight.gravity_m_s2],
@@ -54,6 +60,7 @@ def shared_numbers(model: ChainModel) -> Array:
             (m * cross).ravel(),
             (m * np.eye(3))[upper],
             [float(model.flight.apparent_mass)],
+            (limits * strip_half_areas(lattices)[: limits.shape[0], None]).ravel(),
         ]
     )
 
@@ -119,11 +126,11 @@ def fly_batch(
         check_stop(stop)
         last = min(first + length, plan.grid.steps)
         operators, strips = plan.middle.table.between(first, last)
-        hinges, wind_N = plan.middle.hinges[first:last], plan.middle.wind_N[first:last]
+        hinges, air = plan.middle.hinges[first:last], plan.middle.air(first, last)
         accelerations = mean_accelerations[first:last]
         record = np.empty((last - first, record_rows, count, width))
         common = (
-            model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, wind_N,
+            model.surfaces, constants.ranges, shared, strips, hinges, accelerations, operators, air,
             constants.rows, plan.grid.step_s, first, blocks, slopes,
         )  # fmt: skip
         own = (middle, scratch, inputs, outputs)

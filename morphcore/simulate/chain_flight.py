@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
+from morphcore.aero.stall import StallRecord, stalls
 from morphcore.frames import euler_from_quaternion, rotation_from_quaternion
 from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatch, lane_constants
 from morphcore.models.kernels.layout import JOINTS, OMEGA, POSITION, VELOCITY
@@ -16,11 +18,12 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_outputs import point_forces, surface_loads, tips_twist, tips_z
 from morphcore.simulate.control_motion import control_angles, of_every_part
 from morphcore.simulate.plan import FlightPlan, flight_plan, start_at
-from morphcore.simulate.record import FlightRecord, Loads, Outputs, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Outputs, air_at_reference, require_sound
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.section_lift import require_attached, stall_of_flight
 from morphcore.simulate.shape import chain_shape, of_both_halves
 from morphcore.simulate.time_grid import TimeGrid
-from morphcore.simulate.torque import chain_loads
+from morphcore.simulate.torque import chain_loads, closing_half_a_step
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
 from morphcore.simulate.wake import trimmed_schedules
 from morphcore.stopping import Stop
@@ -40,7 +43,7 @@ def chain_flight(
     *,
     outputs: Outputs = NOTHING_MORE,
     start: StartMode,
-    air_velocity_N: Callable[[Array], Array] | None,
+    air: MovingAir | None,
     stop: Stop | None,
 ) -> Iterator[tuple[float, FlightRecord | None]]:
     """Fly one parameter set; yield the fraction flown after every chunk, and the record with the last.
@@ -56,21 +59,22 @@ def chain_flight(
         model,
         schedules,
         grid,
-        air_velocity_N=air_velocity_N,
+        air=air,
         may_halve=model.is_even(batch),
         wake_alpha=begin.alpha,
     )
     flown = plan.flown(model)
-    found = trim(flown, batch, plan, start=start).require()
+    found = require_attached(flown, batch, plan, trim(flown, batch, plan, start=start), start)
     constants = lane_constants(flown, batch, grid.step_s)
     constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)
     rows, chunks, states = JOINTS + flown.coordinates, [], []
     with_loads = bool(outputs.parts & {"loads", "surfaces"})
-    wanted = flown.state_rows if with_loads else rows
+    whole = with_loads or stalls(flown.aircraft.surfaces)
+    wanted = flown.state_rows if whole else rows
     for chunk in fly_batch(flown, plan, constants, state, record_rows=wanted, stop=stop):
         chunks.append(chunk.rows[:, :rows, 0].copy())  # copied: a view would keep the whole states alive
-        if with_loads:  # only the reported rows of the states are kept
+        if whole:  # only the reported rows of the states are kept
             inside = (at >= chunk.first) & (at < chunk.first + chunk.rows.shape[0])
             states.append(chunk.rows[at[inside] - chunk.first, :, 0])
         yield chunk.first / grid.steps, None
@@ -90,10 +94,9 @@ def chain_flight(
     below = tips_z(flown, batch, hinges, q_joint[None])[0]
     bending = tip_bending(flown, batch.select(np.zeros(at.size, dtype=np.int64)), q_joint)
     twist = tips_twist(flown, batch, q_joint[None])[0] if "twist" in outputs.parts else None
-    loads: Loads | None = None
-    points: dict[str, Array] = {}
-    if with_loads:
-        loads, points = _loads(flown, batch, plan, constants, np.concatenate(states), at, outputs)
+    reported = np.concatenate(states) if states else np.zeros((0, wanted))
+    loads, points = _loads(flown, batch, plan, constants, reported, at, outputs)
+    stall = _stall(flown, plan, constants, reported, at) if states else None
     chosen = outputs.shape_rows
     shape = chain_shape(flown, batch, hinges[chosen], q_joint[chosen]) if chosen.size else None
     if plan.halved and model.mirror is not None:  # the other half moved alike
@@ -114,7 +117,7 @@ def chain_flight(
         omega_B=history[:, OMEGA:VELOCITY],
         velocity_N=velocity_N,
         position_N=history[:, POSITION:JOINTS],
-        wind_N=plan.wind_N[at],
+        wind_N=air_at_reference(model.flight, air, grid.times_s[at]),
         angles=angles,
         tips_z=below,
         trim=found,
@@ -124,6 +127,7 @@ def chain_flight(
         shape=shape,
         point_force=points,
         points=outputs.points,
+        stall=stall,
     )
     yield 1.0, record
 
@@ -136,9 +140,14 @@ def _loads(
     states: Array,
     at: NDArray[np.int64],
     outputs: Outputs,
-) -> tuple[Loads, dict[str, Array]]:
-    """Accelerations and loads of whole states (k, state_rows) at the rows ``at`` of the grid, and points."""
+) -> tuple[Loads | None, dict[str, Array]]:
+    """Accelerations and loads of whole states (k, state_rows) at the rows ``at`` of the grid, and points.
+
+    None and nothing where no loads were requested.
+    """
     of_surfaces = "surfaces" in outputs.parts
+    if not (of_surfaces or "loads" in outputs.parts):
+        return None, {}
     found = chain_loads(model, plan.instants(at), constants, states, every_body=of_surfaces)
     if not of_surfaces:
         return Loads(found.twist_rate_B, found.torque), {}
@@ -159,3 +168,11 @@ def _of_both_halves(loads: Loads, model: ChainModel) -> Loads:
         hinge_torque=None if torque is None else mirror.spread_hinges(torque),
         surfaces=None if surfaces is None else surfaces.of_both_halves(mirror),
     )
+
+
+def _stall(
+    model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array, at: NDArray[np.int64]
+) -> StallRecord | None:
+    """How near sections came to their limits, in whole states (k, state_rows) at the rows ``at``."""
+    rows = closing_half_a_step(model, constants.rows[0])
+    return stall_of_flight(model, plan.instants(at), constants, rows, states)

@@ -306,15 +306,23 @@ class FlexibleRun:
 
     Parameters
     ----------
-    wind_N : (steps + 1, 3) at the grid's times, m/s. state : at the first of them.
+    wind_N : (steps + 1, 3) at the grid's times, m/s. state : at the first of them. gusts : (steps + 1, 6 t)
+    of all strips (`gust_table.GustTable`); None without.
 
     Attributes
     ----------
-    records : (steps + 1, RECORD + 2 s) of the steps flown, `kernels.flexible_step`. row : the last one.
+    records : (steps + 1, RECORD + 2 s) of the steps flown, `kernels.flexible_step`; three more if
+    sections stall. row : the last one.
     """
 
     def __init__(
-        self, flight: FlexibleFlight, path: HingePath, grid: TimeGrid, wind_N: Array, state: FlexibleState
+        self,
+        flight: FlexibleFlight,
+        path: HingePath,
+        grid: TimeGrid,
+        wind_N: Array,
+        state: FlexibleState,
+        gusts: Array | None = None,
     ) -> None:
         model, rule = flight.model, Stepper(grid.step_s)
         self.grid, self.row = grid, 0
@@ -328,6 +336,7 @@ class FlexibleRun:
             acceleration=path.acceleration,
             wind_N=np.array(wind_N, dtype=np.float64),
             deflection=path.deflection,
+            gusts=np.zeros((grid.steps + 1, 0)) if gusts is None else gusts,
         )
         self._rule = rule.coefficients(model.riders.lag_time)
         self._state, self._trial = _state_arrays(state), _state_arrays(state)
@@ -346,8 +355,10 @@ class FlexibleRun:
             pace=np.zeros(1),
             turn=np.zeros((7, 3)),
             vector=np.zeros((3, 6)),
+            stall=np.zeros(3),
         )
-        self.records: Array = np.zeros((grid.steps + 1, RECORD + 2 * model.roots.size))
+        stalls = 3 * int(flight.lattice.parts.limits.size > 0)
+        self.records: Array = np.zeros((grid.steps + 1, RECORD + 2 * model.roots.size + stalls))
         flight.structure(state.poses, state.V, state.A)
         self._form_matrix()
 

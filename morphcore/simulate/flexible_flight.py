@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
+from morphcore.aero.gust_lag import before_wagner
+from morphcore.aero.stall import StallRecord, record_of, stalls
 from morphcore.frames import euler_from_rotation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleRun, set_in_motion
 from morphcore.simulate.flexible_outputs import FlexibleOutputs
 from morphcore.simulate.flexible_start import start_flexible
+from morphcore.simulate.gust_table import GustTable
 from morphcore.simulate.kernels.flexible_step import RECORD
-from morphcore.simulate.record import FlightRecord, Loads, Outputs, require_sound
+from morphcore.simulate.record import FlightRecord, Loads, Outputs, air_at_reference, require_sound
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import StartMode, Trim
@@ -35,7 +39,7 @@ def flexible_flight(
     *,
     outputs: Outputs = NOTHING_MORE,
     start: StartMode,
-    air_velocity_N: Callable[[Array], Array] | None,
+    air: MovingAir | None,
     stop: Stop | None,
 ) -> Iterator[tuple[float, FlightRecord | None]]:
     """Fly the flexible model; yield the fraction flown after every chunk, and the record with the last.
@@ -45,16 +49,18 @@ def flexible_flight(
     at : (k,) rows of the grid to report. outputs : what to record besides. Others as in `flight.simulate`.
     """
     times = grid.times_s
-    wind_N = (
-        np.tile(model.flight.wind_N, (times.size, 1)) if air_velocity_N is None else air_velocity_N(times)
-    )
+    wind_N = np.tile(model.flight.wind_N, (times.size, 1))
     flight = FlexibleFlight(model)
     with one_blas_thread():
         path, trim = start_flexible(flight, schedules, grid, wind_N[0], start)
     flight.thrust = np.concatenate([trim.moment_B + trim.thrust_moment_B, trim.force_B])
     begin = set_in_motion(flight, path, wind_N[0], trim.state)
-    run = FlexibleRun(flight, path, grid, wind_N, begin)
-    further = FlexibleOutputs(model, path, wind_N, outputs) if outputs.of_states else None
+    gusts = None
+    if air is not None:
+        table = GustTable(air, model.lattice, trim.alpha, before_wagner(), times, path.angle)
+        gusts = table.every()
+    run = FlexibleRun(flight, path, grid, wind_N, begin, gusts)
+    further = FlexibleOutputs(model, path, wind_N, outputs, gusts) if outputs.of_states else None
     reported = deque([] if further is None else enumerate(at))
     for first in range(0, grid.steps, CHUNK_STEPS):
         yield first / grid.steps, None
@@ -66,11 +72,11 @@ def flexible_flight(
                 run.fly_to(int(row))
                 further.evaluate(run.state, int(row), number)
             run.fly_to(last)
-    history = _history(run.records)
+    history = _history(run.records, model.roots.size)
     require_sound(history, history[:, 6:9], model.flight, times)
     history, records = history[at], run.records[at]
     tips = model.roots.size
-    sines, loads, shape = records[:, RECORD + tips :], None, None
+    sines, loads, shape = records[:, RECORD + tips : RECORD + 2 * tips], None, None
     if outputs.parts & {"loads", "surfaces"}:
         loads = Loads(records[:, 18:24])
     if further is not None and "surfaces" in outputs.parts:
@@ -83,7 +89,7 @@ def flexible_flight(
         omega_B=history[:, 3:6],
         velocity_N=history[:, 6:9],
         position_N=history[:, 9:12],
-        wind_N=wind_N[at],
+        wind_N=air_at_reference(model.flight, air, times[at]),
         angles=np.concatenate([path.angle[at], path.controls[at]], axis=1),
         tips_z=history[:, 12:],
         tips_twist=np.arcsin(np.clip(sines, -1.0, 1.0)) if "twist" in outputs.parts else None,
@@ -100,16 +106,25 @@ def flexible_flight(
         shape=shape,
         point_force={} if further is None else further.point_force(),
         points=outputs.points,
+        stall=_stall(model, records[:, RECORD + 2 * tips :]),
     )
     yield 1.0, record
 
 
-def _history(records: Array) -> Array:
+def _history(records: Array, tips: int) -> Array:
     """Euler angles, omega_B, velocity_N, position_N, and the tips' z from a run's records."""
     R_NB = records[:, :9].reshape(-1, 3, 3)
     velocity_N = np.einsum("kij,kj->ki", R_NB, records[:, 12:15])
     euler = np.stack([euler_from_rotation(R) for R in R_NB])
-    tips = (records.shape[1] - RECORD) // 2
     return np.concatenate(
         [euler, records[:, 9:12], velocity_N, records[:, 15:18], records[:, RECORD : RECORD + tips]], axis=1
     )
+
+
+def _stall(model: FlexibleModel, worst: Array) -> StallRecord | None:
+    """How near sections came to their limits, from the ends (k, 3) of a run's records; or None."""
+    surfaces, lattices = model.aircraft.surfaces, model.lattice.lattices
+    if not stalls(surfaces):
+        return None
+    ratio, strip, upper = worst.T
+    return record_of(ratio, strip.astype(np.int64), upper > 0.0, surfaces, lattices)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.kernels.gust_loads import GUST, GUST_COLUMNS
 from morphcore.aero.moving_lattice import acting_circulation
 from morphcore.models.flexible import FlexibleModel
 from morphcore.multibody.beam import Sections
@@ -54,10 +55,20 @@ class FlexibleOutputs:
     wind_N : ndarray, shape (steps + 1, 3)
         At the grid's times, m/s.
     outputs : Outputs
+    gusts : ndarray, shape (steps + 1, 6 t), optional
+        Of all strips, as in `flexible.FlexibleRun`.
     """
 
-    def __init__(self, model: FlexibleModel, path: HingePath, wind_N: Array, outputs: Outputs) -> None:
+    def __init__(
+        self,
+        model: FlexibleModel,
+        path: HingePath,
+        wind_N: Array,
+        outputs: Outputs,
+        gusts: Array | None = None,
+    ) -> None:
         self.found = Evaluation()
+        self._gusts = np.zeros((wind_N.shape[0], 0)) if gusts is None else gusts
         self._flight, self._path, self._wind_N, self._outputs = FlexibleFlight(model), path, wind_N, outputs
         self._shapes = set(outputs.shape_rows.tolist())
         self._points = [point for point in outputs.points if point.surface is not None]
@@ -83,14 +94,16 @@ class FlexibleOutputs:
         flight.lattice.deflect(self._path.deflection[row])
         flight.place_lattice(poses, wind_N, state.V)
         twists, wind_B = flight.sections.twists(state.V), wind_N @ poses.R[0]
+        gust, R_NB = self._gusts[row], poses.R[0]
         acting = acting_circulation(state.circulation, state.lag)
-        forces = flight.lattice.section_forces(acting, twists, wind_B)
+        forces = flight.lattice.section_forces(acting, twists, wind_B, gust, R_NB)
         flight.sections.subtract(forces, demands)
         root_W = self._at_roots(state, demands)
         self.found.root_W.append(root_W)
         self.found.air_B.append(self._air(state, forces, wind_N))
         self.found.torque.append(self._torque(root_W, row))
-        self._sections(acting, twists, wind_B)
+        held, _ = flight.lattice.limited(acting, twists, wind_B, gust, R_NB)
+        self._sections(held, twists, wind_B, R_NB.T @ gust.reshape(-1, GUST_COLUMNS)[:, GUST : GUST + 3].T)
         if self._points:
             twist, rate = self._motion_of_points(state)
             for number, (point, arm) in enumerate(zip(self._points, self._arms, strict=True)):
@@ -136,15 +149,19 @@ class FlexibleOutputs:
             torque[own] = screws[0] @ root_W[number]
         return torque
 
-    def _sections(self, acting: Array, twists: Array, wind_B: Array) -> None:
-        """Circulation of each strip, and the velocity of its middle through the air in its own plane."""
+    def _sections(self, acting: Array, twists: Array, wind_B: Array, gust_B: Array) -> None:
+        """Circulation of each strip, and the velocity of its middle through the air in its own plane.
+
+        gust_B : (3, t) of all strips; (3, 0) without.
+        """
         riders, lattice = self._flight.model.riders, self._flight.lattice
         circulation, ring = [], 0
         for part in self._flight.model.lattice.lattices:
             circulation.append(acting[ring + part.rings - part.spanwise : ring + part.rings])
             ring += part.rings
         own, middles = twists[riders.drag], lattice.at.R_BS[riders.drag]
-        wind_S = np.einsum("tji,j->ti", middles, wind_B)
+        air_B = np.tile(wind_B[:, None], middles.shape[0]) + (gust_B if gust_B.size else 0.0)
+        wind_S = np.einsum("tji,jt->ti", middles, air_B)
         velocity = own[:, 3:] - wind_S
         forward = np.einsum("tj,tj->t", riders.drag_chord, velocity[:, :2])
         self.found.circulation.append(np.concatenate(circulation))

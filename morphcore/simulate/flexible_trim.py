@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.stall import record_of, stalls
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.frames import quaternion_from_euler, rotation_from_quaternion
 from morphcore.geometry.propulsion import thrust_direction_B, thrust_moment_B
@@ -15,7 +16,7 @@ from morphcore.multibody.strain_poses import StrainPoses
 from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
 from morphcore.simulate.trim import StartMode
-from morphcore.simulate.trim_limits import STALL_RAD, Limit, is_sound, lost, no_lift
+from morphcore.simulate.trim_limits import STALL_RAD, Limit, is_sound, lost, no_lift, stalled
 
 Array = NDArray[np.float64]
 
@@ -193,8 +194,7 @@ def trim_flexible(
             hint='give alpha_rad, force_b_n and moment_b_n_m, or use start = "trim"',
         )
     balance = _Balance(flight, path, wind_N, start)
-    with np.errstate(over="ignore", invalid="ignore"):
-        root = _equilibrium(balance)
+    root = _attached(balance)
     state, demands = balance.state(root.x)
     given, propulsion = balance.given, flight.model.aircraft.propulsion
     if given is not None:
@@ -204,6 +204,42 @@ def trim_flexible(
     of_thrust_B = thrust_moment_B(propulsion, total[3:])
     moment_B = total[:3] - of_thrust_B
     return FlexibleTrim(float(root.x[-1]), total[3:].copy(), moment_B, state, root.size, of_thrust_B)
+
+
+def _attached(balance: _Balance) -> Root:
+    """The equilibrium, in which no section may stall unless the start is given.
+
+    Where sections stall, there may be none. Then it is sought without their limits, to state the lift
+    coefficient that it would need.
+    """
+    flight, model = balance.flight, balance.flight.model
+    lattice, surfaces = flight.lattice, model.aircraft.surfaces
+    with np.errstate(over="ignore", invalid="ignore"):
+        if balance.given is not None or not stalls(surfaces):
+            return _equilibrium(balance)
+        parts, failure = lattice.parts, None
+        try:
+            root = _equilibrium(balance)
+        except TrimNotFound as error:
+            failure = error
+            lattice.parts = parts._replace(limits=np.zeros((0, 2)))
+            try:
+                root = _equilibrium(balance)
+            except TrimNotFound:
+                raise failure from None
+            finally:
+                lattice.parts = parts
+        state, _ = balance.state(root.x)
+        twists, wind_B = flight.sections.twists(state.V), balance.wind_N @ state.poses.R[0]
+        _, (ratio, strip, upper) = lattice.limited(state.circulation, twists, wind_B)
+    if ratio > 1.0:
+        at, lattices = np.array([int(strip)]), model.lattice.lattices
+        record = record_of(np.array([ratio]), at, np.array([upper > 0.0]), surfaces, lattices)
+        limit = stalled(*record.worst(0), model.flight.airspeed_m_s)
+        raise TrimNotFound(residual=0.0, iterations=0, limit=limit.found, hint=limit.hint)
+    if failure is not None:
+        raise failure
+    return root
 
 
 def _equilibrium(balance: _Balance) -> Root:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.environment import air_velocity
+from morphcore.aero.environment import MovingAir, moving_air
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import Obstacle, naming_obstacles, obstacle
@@ -31,7 +31,7 @@ from morphcore.simulate.hinge_schedules import (
     require_ranges,
 )
 from morphcore.simulate.output_request import SurfaceStrips, requested_outputs
-from morphcore.simulate.record import FlightRecord, Outputs, recorded_trajectory
+from morphcore.simulate.record import FlightRecord, Outputs, air_at_reference, recorded_trajectory
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.shape import Shape
 from morphcore.simulate.step_choice import busiest_part, choose_step
@@ -46,6 +46,7 @@ from morphcore.validity import (
     air_warnings,
     bending_warnings,
     deflection_warnings,
+    gust_warnings,
     light_wing_warnings,
     overlap_warnings,
     steep_warning,
@@ -258,19 +259,17 @@ def flight_steps(  # noqa: PLR0913 - as above
     followed = followed_schedules(aircraft, schedules)
     require_ranges(aircraft, followed, grid.times_s, "/schedules")
     each = hinge_schedules(aircraft, followed)
-    gusts = None if environment is None else environment.model_copy(update={"turbulence": None})
-    smooth = _air(gusts, flight, None)
+    air, smooth = _airs(environment, aircraft, flight, grid.times_s, rng)
     with naming_obstacles(flyer.obstacle):
         if step_s is None and flyer.chain is not None:
             chain, batch = flyer.chain
             longest_s = choose_step(
                 chain, [(each, busiest_part(each, times))], batch, start=start,
-                air_velocity_N=smooth, may_halve=chain.is_even(batch), stop=stop,
+                air=smooth, may_halve=chain.is_even(batch), stop=stop,
             ).step_s  # fmt: skip
             grid = time_grid(times, longest_s)
-        air = _air(environment, flight, rng)
         at = np.arange(0, grid.steps + 1, grid.steps // (times.size - 1))
-        flown = flyer.fly(each, grid, at, outputs=wanted.outputs, start=start, air_velocity_N=air, stop=stop)
+        flown = flyer.fly(each, grid, at, outputs=wanted.outputs, start=start, air=air, stop=stop)
         for fraction, record in flown:
             if record is None:
                 yield FlightStep(fraction)
@@ -278,6 +277,7 @@ def flight_steps(  # noqa: PLR0913 - as above
                 columns = channel_columns(wanted.channels, record, aircraft, flight)
                 trajectory = recorded_trajectory(aircraft, times, record, columns)
                 warnings = _warnings(aircraft, flight, times, record, smooth)
+                warnings += tuple(gust_warnings(environment, flight, grid.step_s))
                 drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
                 if start == "trim":
                     warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0]))
@@ -296,11 +296,12 @@ def _warnings(
     flight: Flight,
     times: Array,
     record: FlightRecord,
-    smooth_air_N: Callable[[Array], Array] | None,
+    smooth: MovingAir | None,
 ) -> tuple[ResultWarning, ...]:
     """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
-    wind_N = np.tile(flight.wind_N, (times.size, 1)) if smooth_air_N is None else smooth_air_N(times)
+    wind_N = air_at_reference(flight, smooth, times)
     motion = air_motion(aircraft, times, record.euler, record.velocity_N, wind_N, record.angles)
+    motion = replace(motion, stall=record.stall)
     bending = np.zeros((0, 0)) if record.bending is None else record.bending
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
@@ -376,7 +377,7 @@ class _Fly(Protocol):
         *,
         outputs: Outputs,
         start: StartMode,
-        air_velocity_N: Callable[[Array], Array] | None,
+        air: MovingAir | None,
         stop: Stop | None,
     ) -> Iterator[tuple[float, FlightRecord | None]]: ...
 
@@ -424,11 +425,19 @@ def _chain_flyer(chain: ChainModel, batch: ParameterBatch) -> _Flyer:
     )
 
 
-def _air(
-    environment: Environment | None, flight: Flight, rng: np.random.Generator | None
-) -> Callable[[Array], Array] | None:
-    """Wind at some times, in addition to the flight's own."""
-    return None if environment is None else lambda moments: air_velocity(environment, flight, moments, rng)
+def _airs(
+    environment: Environment | None,
+    aircraft: Aircraft,
+    flight: Flight,
+    times_s: Array,
+    rng: np.random.Generator | None,
+) -> tuple[MovingAir | None, MovingAir | None]:
+    """The flight's gust and turbulence, and the gust alone."""
+    if environment is None:
+        return None, None
+    gust = environment.model_copy(update={"turbulence": None})
+    air, smooth = (moving_air(each, flight, times_s, rng, aircraft) for each in (environment, gust))
+    return air, smooth
 
 
 def _output_times(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
+from morphcore.aero.gust_lag import KUESSNER
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
@@ -23,6 +25,7 @@ from morphcore.simulate.control_motion import (
     lagged_deflections,
     of_every_part,
 )
+from morphcore.simulate.gust_table import GustTable, air_rows
 from morphcore.simulate.operator_table import ControlTable, OperatorTable
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
@@ -51,7 +54,7 @@ class Middles(Shown):
     """Data in the middles of the steps, read by the stages of a flight.
 
     angles, rates : (steps, h) of all hinges, rad and rad/s. hinges : (steps, s, HINGE_ROWS) for the kernels.
-    wind_N : (steps, 3) m/s. table : the plan's own, at the positions of the middles.
+    wind_N : (steps, 3) m/s. table : the plan's own, at the positions of the middles. gusts : None without.
     """
 
     angles: Array
@@ -59,6 +62,11 @@ class Middles(Shown):
     hinges: Array
     wind_N: Array
     table: OperatorTable
+    gusts: GustTable | None = None
+
+    def air(self, first: int, last: int) -> Array:
+        """Rows of the air for the kernels: the uniform wind (3), then what `GustTable.between` gives."""
+        return air_rows(self.wind_N, self.gusts, first, last)
 
 
 @dataclass(frozen=True, repr=False)
@@ -67,8 +75,8 @@ class FlightPlan(Shown):
 
     aircraft : the model, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
     hinges, rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the kernels. wind_N : (steps + 1, 3)
-    m/s. middle : hinges, wind and lattices between the grid times. halved : the aircraft is one half of a
-    symmetric one whose other half moves alike.
+    m/s, the uniform wind. middle : hinges, wind and lattices between the grid times. halved : the aircraft is
+    one half of a symmetric one whose other half moves alike. gusts : None without.
     """
 
     grid: TimeGrid
@@ -81,6 +89,11 @@ class FlightPlan(Shown):
     table: OperatorTable
     middle: Middles
     halved: bool = False
+    gusts: GustTable | None = None
+
+    def air(self, first: int, last: int) -> Array:
+        """Rows of the air at grid times, as `Middles.air`."""
+        return air_rows(self.wind_N, self.gusts, first, last)
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies this plan: the given one, or one half of it."""
@@ -108,12 +121,14 @@ class FlightPlan(Shown):
             hinges=np.ascontiguousarray(self.hinges[own]),
             wind_N=np.ascontiguousarray(self.wind_N[own]),
             table=self.table.at(own),
+            gusts=self.gusts and self.gusts.at(own),
             middle=Middles(
                 self.angles[between],
                 self.rates[between],
                 np.ascontiguousarray(self.hinges[between]),
                 np.ascontiguousarray(self.wind_N[between]),
                 self.table.at(between),
+                self.gusts and self.gusts.at(between),
             ),
         )
 
@@ -127,6 +142,7 @@ class FlightPlan(Shown):
             hinges=np.ascontiguousarray(self.hinges[rows]),
             wind_N=np.ascontiguousarray(self.wind_N[rows]),
             table=self.table.at(rows),
+            gusts=self.gusts and self.gusts.at(rows),
         )
 
     @cached_property
@@ -161,7 +177,7 @@ def flight_plan(
     schedules: Sequence[Schedule],
     grid: TimeGrid,
     *,
-    air_velocity_N: Callable[[Array], Array] | None = None,
+    air: MovingAir | None = None,
     node_spacing_rad: float = NODE_SPACING_RAD,
     may_halve: bool = False,
     start: StartMode = "trim",
@@ -173,6 +189,8 @@ def flight_plan(
     at the first hinge angles (`wake.nominal_start`), where also the trim drive is. With ``wake_alpha`` or
     ``start="given"`` all drives follow their schedules.
 
+    air : gust and turbulence. They begin with the flight, whose start is trimmed in the uniform wind.
+
     With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
     plan is for half of it: ``plan.flown(model)`` is the model to fly, provided that both wings have the same
     parameters.
@@ -183,11 +201,13 @@ def flight_plan(
         begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
         schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
     motion = _motion(model.aircraft, schedules, times)
-    if may_halve and air_velocity_N is None:
+    if may_halve and air is None:
         model, motion = _halved(model, motion)
-    wind_N = None if air_velocity_N is None else air_velocity_N(times)
+    gusts = None
+    if air is not None:
+        gusts = GustTable(air, model.lattice, wake_alpha, KUESSNER, times, motion.angles)
     table = _operator_table(model, motion, node_spacing_rad, wake_alpha, 0.5 * grid.step_s)
-    return _plan(model, grid, motion, table, wind_N)
+    return _plan(model, grid, motion, table, gusts)
 
 
 @dataclass(frozen=True)
@@ -381,12 +401,11 @@ def _plan(
     grid: TimeGrid,
     motion: _Motion,
     table: OperatorTable,
-    wind_N: Array | None = None,
+    gusts: GustTable | None = None,
 ) -> FlightPlan:
-    """A plan from a motion, a table and wind at the grid's times and middles in alternation."""
+    """A plan from a motion, a table and gusts at the grid's times and middles in alternation."""
     hinges = surface_rows(model.aircraft, motion.angles, motion.rates)
-    if wind_N is None:
-        wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
+    wind_N = np.tile(model.flight.wind_N, (2 * grid.steps + 1, 1))
     own, between = (table.at(part) for part in (slice(0, None, 2), slice(1, None, 2)))
     return FlightPlan(
         grid,
@@ -403,8 +422,10 @@ def _plan(
             np.ascontiguousarray(hinges[1::2]),
             np.ascontiguousarray(wind_N[1::2]),
             between,
+            gusts and gusts.at(slice(1, None, 2)),
         ),
         halved=bool(model.lattice.images),
+        gusts=gusts and gusts.at(slice(0, None, 2)),
     )
 
 

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.environment import MovingAir
+from morphcore.aero.stall import StallRecord
 from morphcore.errors import FlightDiverged
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.simulate.points import Point
@@ -68,7 +70,8 @@ class FlightRecord:
     tips relative to their roots, nose up, rad, and loads : both None unless requested (`Part`). bending :
     (k, s) displacement of the tips by bending over the span if the lattice does not bend; else None. shape :
     at the requested rows. point_force : by name (k, 3) specific force at the requested points of surfaces, in
-    their own axes, m/s^2. points : all that were requested.
+    their own axes, m/s^2. points : all that were requested. stall : how near sections came to the limits of
+    their lift; None without limits.
     """
 
     euler: Array
@@ -85,6 +88,13 @@ class FlightRecord:
     shape: Shape | None = None
     point_force: Mapping[str, Array] = field(default_factory=dict)
     points: tuple[Point, ...] = ()
+    stall: StallRecord | None = None
+
+
+def air_at_reference(flight: Flight, air: MovingAir | None, times_s: Array) -> Array:
+    """Velocity (k, 3) m/s in N of the air at the reference point: uniform wind, gust and turbulence."""
+    wind_N = np.tile(flight.wind_N, (times_s.size, 1))
+    return wind_N if air is None else wind_N + air.at_reference(times_s)
 
 
 def require_sound(

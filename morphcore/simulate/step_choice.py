@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from morphcore.aero.environment import MovingAir
 from morphcore.frames import euler_from_quaternion, wrap_angle
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants, physical_guess
 from morphcore.simulate.batch import fly_batch
@@ -47,7 +48,7 @@ def choose_step(
     batch: ParameterBatch | None = None,
     *,
     start: StartMode = "trim",
-    air_velocity_N: Callable[[Array], Array] | None = None,
+    air: MovingAir | None = None,
     may_halve: bool = False,
     candidates_s: Sequence[float] = CANDIDATES_S,
     tolerance_rad: float = TOLERANCE_RAD,
@@ -62,7 +63,7 @@ def choose_step(
     ----------
     flights : for each flight, the schedules of all hinges and the (k,) output times, s.
     batch : the parameter set to fly, only one; None: the physical guess.
-    air_velocity_N : wind at given times; it must not depend on which times are requested together.
+    air : gust and turbulence of the flights.
     may_halve : as in ``flight_plan``; the parameter set must then be the same on both sides.
     candidates_s : in descending order, each half of the previous one.
 
@@ -74,9 +75,7 @@ def choose_step(
 
     def plan(schedules: Sequence[Schedule], grid: TimeGrid) -> FlightPlan:
         check_stop(stop)
-        return flight_plan(
-            model, schedules, grid, air_velocity_N=air_velocity_N, may_halve=may_halve, start=start
-        )
+        return flight_plan(model, schedules, grid, air=air, may_halve=may_halve, start=start)
 
     tried = [
         _Tried(model, batch, schedules, np.asarray(times, dtype=np.float64), candidates_s, start, plan, stop)

@@ -67,7 +67,7 @@ def chain_loads(
 
     Parameters
     ----------
-    plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `wind_N` have a row for each state.
+    plan : a plan whose `FlightPlan.table`, `hinges`, `accelerations` and `air` have a row for each state.
     every_body : whether the motion of the links and their air loads are reported, too.
     """
     rows, columns = model.lattice.operator_shape
@@ -98,8 +98,9 @@ def chain_loads(
         torques(
             lane_type(width),
             model.surfaces, constants.ranges[0], shared, strips, plan.hinges[part], accelerations[part],
-            first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
-            inputs, outputs, rates, out[part], twist_rates[part], roots[part], bodies[part], sections[part],
+            first_hinges, screws, operators, plan.air(part.start, part.stop), laid, states[part], zero, block,
+            scratch, inputs, outputs, rates, out[part], twist_rates[part], roots[part], bodies[part],
+            sections[part],
         )  # fmt: skip
     air, twist, acceleration = np.split(bodies, 3, axis=2)
     return ChainLoads(out, twist_rates, roots, air, twist, acceleration, sections)

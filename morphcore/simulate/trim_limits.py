@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STALL_RAD = 0.35  # angle of attack at which wings stall; the lattice does not
+BELOW_KNEE = 1.03  # the lift curve bends below its limit, so a little more speed than at the limit is needed
 BENT_RAD = 1.0  # turn of a tip against its root, beyond which a wing carries little upward
 
 
@@ -35,6 +36,16 @@ def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
     return Limit(
         "rigid wings could carry the weight, but the iteration for them does not arrive",
         "check whether surfaces overlap, or lie in each other's wake",
+    )
+
+
+def stalled(name: str, at: float, needed: float, limit: float, airspeed_m_s: float) -> Limit:
+    """A section at a share of a surface's span would need a lift coefficient beyond its limit."""
+    enough = BELOW_KNEE * airspeed_m_s * (needed / limit) ** 0.5
+    return Limit(
+        f"it needs a lift coefficient of {needed:.3g} at {100.0 * at:.0f} per cent of the span of {name!r}, "
+        f"whose sections stall at {limit:.3g}",
+        f"fly faster (from about {enough:.3g} m/s) or lighter, or check cl_max and cl_min of the surface",
     )
 
 

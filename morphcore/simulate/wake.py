@@ -20,6 +20,7 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, physical_guess
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.schedule import HingeMotion, Schedule
+from morphcore.simulate.section_lift import require_attached
 from morphcore.simulate.trim import StartMode, trim
 from morphdata.drives import Drive, without_side
 
@@ -193,7 +194,8 @@ def _found(model: ChainModel, angles: Array, columns: NDArray[np.int64], instant
         moved = angles.copy()
         moved[columns] = x[1:].sum()
         plan = instant(rigid, moved, float(x[0]))
-        found = trim(plan.flown(rigid), batch, plan).require()
+        flown = plan.flown(rigid)
+        found = require_attached(flown, batch, plan, trim(flown, batch, plan), "trim")
         return np.array([found.alpha[0] - x[0], found.moment_B[0, 1] / scale])[: x.size]
 
     # Broyden's first method: the slopes are nearly constant

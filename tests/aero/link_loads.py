@@ -39,7 +39,7 @@ def lane_loads(model: ChainModel, batch: ParameterBatch, plan: FlightPlan, state
     rates_of_blocks(
         lane_type(ALONE), 0, 1,
         model.surfaces, constants.ranges, shared_numbers(model), strips, plan.hinges[:1],
-        plan.surface_accelerations[0], operators, plan.wind_N[:1], constants.rows,
+        plan.surface_accelerations[0], operators, plan.air(0, 1), constants.rows,
         np.zeros((model.state_rows, ALONE)), lanes,
         scratch, np.zeros((columns, ALONE)), np.zeros((rows, ALONE)), np.zeros_like(lanes),
     )  # fmt: skip

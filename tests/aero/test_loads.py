@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from morphcore.aero.environment import MovingAir, Wave
+from morphcore.aero.gust_lag import KUESSNER_A, KUESSNER_B
 from morphcore.aero.kernels.loads import (
     JONES_A1,
     JONES_A2,
@@ -21,7 +23,9 @@ from morphcore.aero.kernels.loads import (
 )
 from morphcore.lanes import TOGETHER, lane_type
 from morphcore.models.equivalent import chain_model, lane_constants, physical_guess
+from morphcore.models.kinematics import link_poses
 from morphcore.models.parameters import lag_weights
+from morphcore.models.slopes import sloped_motion
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import initial_state, state_rates
 from morphcore.simulate.kernels.step import lag_from_stage, lag_to_stage
@@ -32,7 +36,7 @@ from morphdata.lattice import Lattice
 from tests.aero.link_loads import edge_loads, lane_loads
 from tests.geometry.rehinged import rehinged
 from tests.kernels import from_python
-from tests.models.chains import example_aircraft, example_flight, instant, odd_aircraft
+from tests.models.chains import example_aircraft, example_flight, instant, odd_aircraft, random_batch
 from tests.simulate.flights import example_model, fly_free, steps
 
 SWEEPS = [(0.0, 0.0), (0.4, 0.4), (0.3, 0.9)]
@@ -238,25 +242,63 @@ def test_mean_delay_is_the_lag():
     assert times[-1] - lag_response(times, lag_s, 0.005)[-1] == pytest.approx(lag_s, rel=1e-6)
 
 
-def test_a_sudden_gust_builds_lift_up_as_jones_says():
-    """A very heavy aircraft meets a sharp-edged updraught: its lift grows as Jones' function.
+def test_a_sudden_gust_builds_lift_up_as_kuessner_says():
+    """A very heavy aircraft meets a sharp-edged updraught: its lift grows as Küssner's function.
 
-    The jump counts as a ramp from half a step before to half a step after it; its shape is worth 1 per cent.
+    The edge is at the leading edges at the start, one semichord ahead of the reference point.
     """
     aircraft = example_aircraft()
     heavy = replace(aircraft.fuselage, mass_kg=1e8, inertia_B=1e13 * np.eye(3))
     flight = replace(example_flight(), gravity_m_s2=0.0)
     model = chain_model(replace(aircraft, fuselage=heavy), flight, 1, Lattice(chordwise=2, spanwise=4))
     batch, grid = dragless(model), steps(0.1, 0.0005)
-    plan = flight_plan(
-        model, [Hold(), Hold()], grid, air_velocity_N=lambda t: np.tile([0.0, 0.0, -2.0], (t.size, 1))
-    )
+    air = MovingAir((step_gust([0.0, 0.0, -2.0], start_m=0.15, spacing_m=0.002),), 150.0)
+    plan = flight_plan(model, [Hold(), Hold()], grid, air=air, wake_alpha=0.0)
     _, state = settled(model, batch, (0.0, 0.0), (0.0, 0.0, 0.0, 150.0, 0.0, 0.0))
     states = fly_free(model, plan, batch, state[None]).states[:, 0]
     lift = -np.diff(states[:, 9]) / grid.step_s  # of the stages, in the middle of the steps
     s = 2 * 150.0 * (grid.times_s[:-1] + 0.5 * grid.step_s) / 0.3
-    expected = 1.0 - JONES_A1 * np.exp(-JONES_B1 * s) - JONES_A2 * np.exp(-JONES_B2 * s)
-    np.testing.assert_allclose(lift / lift[-1] * expected[-1], expected, atol=0.01)
+    expected = 1.0 - sum(a * np.exp(-b * s) for a, b in zip(KUESSNER_A, KUESSNER_B, strict=True))
+    np.testing.assert_allclose(lift / lift[-1] * expected[-1], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("links", [1, 3])
+def test_a_gust_that_is_the_same_everywhere_is_wind(links):
+    """Settled in it, every link bears what it bears in wind of that velocity: lift, suction, drag, cm0."""
+    rng = np.random.default_rng(links)
+    wind = np.array([3.0, -5.0, -4.0])
+    aircraft = odd_aircraft(rng)
+    cambered = tuple(
+        replace(surface, zero_lift_rad=-0.05, cm0=-0.07, twist_rad=0.04) for surface in aircraft.surfaces
+    )
+    aircraft = replace(aircraft, surfaces=cambered)
+    wrenches = []
+    for own, gust in ((wind, np.zeros(3)), (np.zeros(3), wind)):
+        flight = replace(example_flight(), wind_N=own)
+        model = chain_model(aircraft, flight, links, Lattice(chordwise=2, spanwise=5))
+        batch = random_batch(np.random.default_rng(5), model, 1)
+        held = [Hold(0.3)] * len(aircraft.hinges)
+        air = MovingAir((step_gust(gust.tolist(), start_m=-2000.0),), 150.0)
+        plan = flight_plan(model, held, steps(0.01, 0.01), air=air, wake_alpha=0.0)
+        still = np.zeros((1, model.coordinates))
+        R_BL, _ = link_poses(model, batch, plan.hinges[0], still)
+        flown = np.array([[149.0, 4.0, 9.0]])
+        state = initial_state(
+            quaternion=np.array([[1.0, 0.0, 0.0, 0.0]]),
+            omega_B=np.zeros((1, 3)),
+            velocity_B=flown,
+            q_joint=still,
+            lag_motion=sloped_motion(model, batch, R_BL, flown - own),
+        )[0]
+        wrenches.append(lane_loads(model, batch, plan, state).wrench)
+    scale = np.abs(wrenches[0]).max()
+    np.testing.assert_allclose(wrenches[1] / scale, wrenches[0] / scale, rtol=0.0, atol=1e-10)
+
+
+def step_gust(velocity_N, *, start_m, spacing_m=0.05):
+    """Air of one velocity from a place on, the same everywhere across the path."""
+    everywhere = np.zeros(1), np.ones(1)
+    return Wave(start_m, spacing_m, np.tile(np.array(velocity_N, dtype=float), (60_000, 1)), *everywhere)
 
 
 def test_damping_in_roll_heave_and_pitch():

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from morphcore.aero.environment import MovingAir, Wave
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_TWIST
@@ -120,16 +121,14 @@ def test_mean_accelerations_add_up_to_the_rates():
     assert sample("train_rate_0.8").time_s.size == plan.grid.at.size
 
 
-def test_changing_wind_reaches_the_flight():
-    """A gust given as a function of time is in the plan and moves the aircraft; before it nothing happens."""
+def test_a_gust_reaches_the_flight():
+    """A gust along the path is in the plan and moves the aircraft; before it nothing happens."""
     model = example_model(1)
     grid = time_grid(np.linspace(0.0, 0.4, 41))
-
-    def gust(times):
-        return np.outer(times > 0.2, [0.0, 0.0, -3.0])
-
+    airspeed = model.flight.airspeed_m_s
+    gust = Wave(0.21 * airspeed, 1.0, np.tile([0.0, 0.0, -3.0], (100, 1)), np.zeros(1), np.ones(1))
     calm = flight_plan(model, [Hold(), Hold()], grid)
-    blown = flight_plan(model, [Hold(), Hold()], grid, air_velocity_N=gust)
+    blown = flight_plan(model, [Hold(), Hold()], grid, air=MovingAir((gust,), airspeed))
     still, moved = fly_trimmed(model, calm).states, fly_trimmed(model, blown).states
     before = grid.times_s < 0.2
     np.testing.assert_allclose(moved[before], still[before], atol=1e-12)

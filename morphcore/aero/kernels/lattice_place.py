@@ -38,6 +38,8 @@ class LatticeParts(NamedTuple):
     in `moving_lattice.Riders`. moment_area : (t,) cm0 times the integral of the chord squared, m^3. slope :
     (r,) of the mean line, nose up. stretch : 1 / beta of Goethert's rule. density :
     kg/m^3. control_slope : (c, r) slopes of the panels per unit deflection of each control surface.
+    ring_strip : (r,) strip of each ring. limits : (t, 2) smallest (negative) and largest circulation over the
+    speed, m: lift coefficient times half the chord; (0, 2) if no section stalls.
     """
 
     line_start: IntArray
@@ -64,6 +66,8 @@ class LatticeParts(NamedTuple):
     stretch: float
     density: float
     control_slope: Array
+    ring_strip: IntArray
+    limits: Array
 
 
 class LatticePlace(NamedTuple):
@@ -75,6 +79,7 @@ class LatticePlace(NamedTuple):
     (e + l,). induced : (3, e), of the circulations summed (r,). corner_velocity, control_velocity,
     drag_velocity : (c, 3), (r, 3), (3,). force : (c, 3). slope : (r,) at each control point, of the mean line
     and of deflected controls, nose up or trailing edge down.
+    share : (t,) of the circulation of each strip that is kept within its limits.
     """
 
     R_BS: Array
@@ -96,6 +101,7 @@ class LatticePlace(NamedTuple):
     drag_velocity: Array
     force: Array
     slope: Array
+    share: Array
 
 
 def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePlace:
@@ -121,6 +127,7 @@ def lattice_place(parts: LatticeParts, sections: int, corners: int) -> LatticePl
         drag_velocity=np.zeros(3),
         force=np.zeros((corners, 3)),
         slope=np.zeros(rings),
+        share=np.zeros(parts.drag.size),
     )
 
 

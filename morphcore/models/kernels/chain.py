@@ -6,6 +6,7 @@ accelerations from root to tips. Rows as in layout.py.
 
 from __future__ import annotations
 
+from morphcore.aero.kernels.gust_loads import UNIFORM, gust_inputs, gust_wrench
 from morphcore.aero.kernels.loads import (
     CONTROL_END,
     LINK0,
@@ -18,6 +19,7 @@ from morphcore.aero.kernels.loads import (
     link_wrench,
     strip_inputs,
 )
+from morphcore.aero.kernels.stall import limit_lift
 from morphcore.jit import kernel
 from morphcore.lanes import not_in_lanes
 from morphcore.models.kernels.layout import (
@@ -25,6 +27,7 @@ from morphcore.models.kernels.layout import (
     DENSITY,
     FUSELAGE,
     GRAVITY,
+    LIMITS,
     LINKS_C,
     S_BASE_ACCELERATION,
     S_BASE_FORCE,
@@ -35,6 +38,7 @@ from morphcore.models.kernels.layout import (
     S_SUMS,
     S_TWIST,
     S_WIND,
+    axis_rows_of_scratch,
     constant_rows,
     gravity_rows_of_scratch,
     joint_rows_of_scratch,
@@ -213,7 +217,26 @@ def accelerations(
                     scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                     inputs,
                 )  # fmt: skip
+    in_gust, axes0 = wind.shape[0] > UNIFORM, axis_rows_of_scratch(links, coordinates)[0] + 9
+    if in_gust:
+        axes_of_links(lanes, surfaces, hinges, state, scratch, links, coordinates)
+        for s in range(surfaces.shape[0]):
+            for k in range(surfaces[s, LINKS]):
+                link = surfaces[s, LINK0] + k
+                gust_inputs(
+                    lanes, surfaces[s], k, ranges, strips, overlap, wind,
+                    scratch[axes0 + 9 * link : axes0 + 9 * link + 9],
+                    constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                    inputs,
+                )  # fmt: skip
     lane_product(lanes, operator, inputs, outputs)
+    if shared.shape[0] > LIMITS:
+        for s in range(surfaces.shape[0]):
+            limit_lift(
+                lanes, surfaces[s], ranges, strips, overlap, wind,
+                scratch[axes0 : axes0 + 9 * links], scratch[w_twist : w_twist + 6 * links],
+                shared[LIMITS:], outputs, scratch[S_SUMS : S_SUMS + 6],
+            )  # fmt: skip
     for s in range(surfaces.shape[0]):
         for k in range(surfaces[s, LINKS]):
             link = surfaces[s, LINK0] + k
@@ -225,12 +248,53 @@ def accelerations(
                 scratch[S_SUMS : S_SUMS + 6],
                 scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
             )  # fmt: skip
+            if in_gust:
+                gust_wrench(
+                    lanes, surfaces[s], k, ranges, strips, overlap, outputs, wind,
+                    scratch[axes0 + 9 * link : axes0 + 9 * link + 9],
+                    constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                    scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
+                    density,
+                    scratch[S_SUMS : S_SUMS + 6],
+                    scratch[w_wrench + 6 * link : w_wrench + 6 * link + 6],
+                )  # fmt: skip
 
     if shared[APPARENT] != 0.0:
         gravity_of_links(lanes, surfaces, hinges, scratch, links, coordinates)
     articulate(
         lanes, surfaces, shared, hinges, constants, scratch, links, coordinates,
     )  # fmt: skip
+
+
+@kernel
+def axes_of_links(lanes, surfaces, hinges, state, scratch, links, coordinates):
+    """Fill in the axes of N in those of the fuselage and of all links, which a gust needs."""
+    base, _ = axis_rows_of_scratch(links, coordinates)
+    _, _, _, w_joint, _ = joint_rows_of_scratch(links, coordinates)
+    north, east, down = scratch[base : base + 3], scratch[base + 3 : base + 6], scratch[base + 6 : base + 9]
+    if not_in_lanes(state, lanes) or not_in_lanes(scratch, lanes):
+        return
+    for l in range(len(lanes)):
+        a, b, c, d = state[0, l], state[1, l], state[2, l], state[3, l]
+        north[0, l], north[1, l] = a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d)
+        north[2, l] = 2.0 * (b * d + a * c)
+        east[0, l], east[1, l] = 2.0 * (b * c + a * d), a * a - b * b + c * c - d * d
+        east[2, l] = 2.0 * (c * d - a * b)
+        down[0, l], down[1, l] = 2.0 * (b * d - a * c), 2.0 * (c * d + a * b)
+        down[2, l] = a * a - b * b - c * c + d * d
+    joint = w_joint
+    for s in range(surfaces.shape[0]):
+        for k in range(surfaces[s, LINKS]):
+            row = base + 9 * (surfaces[s, LINK0] + k + 1)
+            for axis in range(0, 9, 3):
+                own = scratch[row + axis : row + axis + 3]
+                if k == 0:
+                    vector_through_hinge(lanes, hinges[s], scratch[base + axis : base + axis + 3], own)
+                else:
+                    before = scratch[row - 9 + axis : row - 6 + axis]
+                    vector_through_gimbal(lanes, scratch[joint : joint + JOINT_ROWS], before, own)
+            if k > 0:
+                joint += JOINT_ROWS
 
 
 @kernel

@@ -18,6 +18,7 @@ S_INERTIA, S_CARRIED, S_SUMS, S_WIND, S_GRAVITY, S_FREE = 39, 60, 66, 72, 75, 78
 # indices of the shared numbers
 DENSITY, GRAVITY, FUSELAGE = 0, 1, 2  # then 21 of the fuselage's spatial inertia
 APPARENT = 23  # whether the links have apparent mass: not zero
+LIMITS = 24  # if sections stall: then two numbers for each strip, see aero/kernels/stall.py
 
 
 @inlined
@@ -49,7 +50,7 @@ def gravity_rows_of_scratch(links: int) -> int:
 
 @inlined
 def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int, int]:
-    """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the scratch's end."""
+    """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the row after them."""
     first = S_FREE + 30 * links
     gimbals = first + 3 * coordinates
     return (
@@ -59,3 +60,13 @@ def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, 
         gimbals,
         gimbals + JOINT_ROWS * (coordinates // 3),
     )
+
+
+@inlined
+def axis_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int]:
+    """First scratch row of the axes of N in those of B, then of all links, nine rows each; and the end.
+
+    They are used in gusts only.
+    """
+    _, _, _, _, first = joint_rows_of_scratch(links, coordinates)
+    return first, first + 9 * (links + 1)

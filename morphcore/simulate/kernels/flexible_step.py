@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.kernels.lattice_forces import blocked_flow, deflect, place_lattice, section_forces
+from morphcore.aero.kernels.lattice_gusts import add_gust_flow, add_gust_forces, limit_circulation
 from morphcore.aero.kernels.lattice_place import refine
 from morphcore.aero.kernels.loads import JONES_A1, JONES_A2
 from morphcore.jit import entry_kernel, inlined
@@ -100,7 +101,10 @@ class Structure(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Prescribed motion of hinges and controls, `simulate.flexible.HingePath`, and wind_N (k, 3)."""
+    """Prescribed motion of hinges and controls, `simulate.flexible.HingePath`, and wind_N (k, 3).
+
+    gusts : (k, 6 t), as in `lattice_gusts`; (k, 0) without.
+    """
 
     R_BW: Array
     origin_B: Array
@@ -109,6 +113,7 @@ class Path(NamedTuple):
     acceleration: Array
     wind_N: Array
     deflection: Array
+    gusts: Array
 
 
 class Rule(NamedTuple):
@@ -141,7 +146,10 @@ class State(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one step (n nodes, k sections, r rings): right (n, 6); twists, forces (k, 6); others (r,)."""
+    """Room for one step (n nodes, k sections, r rings): right (n, 6); twists, forces (k, 6); others (r,).
+
+    stall : (3,) of the last iteration, `lattice_gusts.limit_circulation`.
+    """
 
     R_NS: Array
     x_N: Array
@@ -156,6 +164,7 @@ class Scratch(NamedTuple):
     pace: Array
     turn: Array
     vector: Array
+    stall: Array
 
 
 @entry_kernel
@@ -167,7 +176,7 @@ def fly_steps(structure, parts, place, path, rule, state, trial, scratch, record
     """
     row = first
     while True:
-        _record(structure, state, records[row])
+        _record(structure, state, scratch, records[row])
         if row == last:
             return row, FLOWN
         status = _step(structure, parts, place, path, rule, state, trial, scratch, row + 1, fresh)
@@ -177,10 +186,11 @@ def fly_steps(structure, parts, place, path, rule, state, trial, scratch, record
 
 
 @inlined
-def _record(structure, state, out):
+def _record(structure, state, scratch, out):
     """Record the fuselage's attitude, twist, position and twist rate, and the tips' z in B and twist.
 
-    A tip's twist is recorded as its sine: element (x, z) of the rotation from its axes to the root's.
+    If sections stall, the record ends with ``scratch.stall``. A tip's twist is recorded as its sine: element
+    (x, z) of the rotation from its axes to the root's.
     """
     tips = structure.roots.size
     for i in range(3):
@@ -198,6 +208,9 @@ def _record(structure, state, out):
             sine += state.R[root, i, 0] * state.R[tip, i, 2]
         out[RECORD + s] = total
         out[RECORD + tips + s] = sine
+    if out.size > RECORD + 2 * tips:
+        for i in range(3):
+            out[RECORD + 2 * tips + i] = scratch.stall[i]
 
 
 @inlined
@@ -362,6 +375,9 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
             structure.ends, structure.section_element, structure.section_blocks, trial.V, scratch.twists
         )
         blocked_flow(parts, place, scratch.twists, wind_B, scratch.blocked)
+        gust = path.gusts[row]
+        if gust.size:
+            add_gust_flow(parts, place, trial.R[0], gust, scratch.blocked)
         if not refine(
             place.influence,
             scratch.inverse,
@@ -381,7 +397,13 @@ def _step(structure, parts, place, path, rule, state, trial, scratch, row, fresh
                 trial.lag[k, q] = lag
                 total += (JONES_A1 if k == 0 else JONES_A2) * lag
             scratch.acting[q] = total
+        if parts.limits.size:
+            limit_circulation(
+                parts, place, trial.R[0], gust, scratch.twists, wind_B, scratch.acting, scratch.stall
+            )
         section_forces(parts, place, scratch.acting, scratch.twists, wind_B, rule.still, scratch.forces)
+        if gust.size:
+            add_gust_forces(parts, place, trial.R[0], gust, scratch.twists, wind_B, scratch.forces)
         subtract_forces(
             structure.ends, structure.section_element, structure.section_blocks, scratch.forces, right
         )
