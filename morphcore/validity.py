@@ -33,6 +33,11 @@ STEEPEST_PITCH_RAD = np.radians(85.0)
 UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the incidence
 LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
+# component of the moment in B, its name, the field of the drive that balances it, and what it is usually
+LATERAL_TRIM = (
+    (0, "rolling", "roll_trim_drive", "ailerons"),
+    (2, "yawing", "yaw_trim_drive", "a fin with a rudder"),
+)
 # A plain flap loses its linear lift to separation at about this deflection (Abbott & von Doenhoff 1959).
 LARGEST_DEFLECTION_RAD = np.radians(20.0)
 # tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.6 mrad off, see
@@ -238,38 +243,64 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
     ]
 
 
-def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[ResultWarning]:
-    """A pitching moment (3,), N m, that only a constant moment balances although a drive could.
+def trim_warnings(
+    aircraft: Aircraft, flight: Flight, moment_B: Array, balanced: Sequence[int] = ()
+) -> list[ResultWarning]:
+    """Moments (3,), N m, that only a constant moment balances although a drive could.
 
-    Only drives of incidence count, those whose hinges turn about y of B, and controls that deflect alike on
-    both sides of surfaces that lift.
+    In pitch only drives of incidence count, those whose hinges turn about y of B, and controls that deflect
+    alike on both sides of surfaces that lift. In roll and yaw moments of asymmetric flights are told even if
+    the aircraft has no control for them: it could not fly so.
+
+    Parameters
+    ----------
+    balanced : components of the moment that a drive of the flight balances.
     """
-    if flight.trim_drive is not None:
-        return []
+    area = sum(surface.area_m2 for surface in aircraft.surfaces)
+    chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
+    coefficient = np.abs(moment_B) / (flight.dynamic_pressure_pa * area * chord)
+    found = []
+    able = _pitching_drives(aircraft)
+    if flight.trim_drive is None and able and not coefficient[1] < LARGEST_TRIM_MOMENT:
+        found.append(
+            ResultWarning(
+                "constant_trim_moment",
+                f"a constant moment of {moment_B[1]:.4g} N m, which no control supplies, holds the aircraft "
+                "in trim",
+                "let a drive balance it: set flight.trim_drive (the aircraft has "
+                f"{', '.join(able)}). A constant moment does not change with speed, and so spoils slow "
+                "motions such as the phugoid",
+                "/flight",
+            )
+        )
+    for axis, name, field, drive in LATERAL_TRIM if flight.is_asymmetric else ():
+        if axis not in balanced and not coefficient[axis] < LARGEST_TRIM_MOMENT:
+            found.append(
+                ResultWarning(
+                    "constant_trim_moment",
+                    f"a constant {name} moment of {moment_B[axis]:.4g} N m, which no control supplies, holds "
+                    "the aircraft in trim",
+                    f"give the aircraft {drive}, or name a drive as flight.{field}: without one it could not "
+                    "fly so",
+                    "/flight",
+                )
+            )
+    return found
+
+
+def _pitching_drives(aircraft: Aircraft) -> list[str]:
     able = {hinge.drive: None for hinge in aircraft.hinges if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
     opposed = {without_side(control.drive) for control in aircraft.controls if control.sign < 0.0}
     for surface in aircraft.surfaces:
         if abs(surface.dihedral_rad) < UPRIGHT_RAD:
             words = (without_side(control.drive) for control in surface.controls)
             able |= {word: None for word in words if word not in opposed}
-    area = sum(surface.area_m2 for surface in aircraft.surfaces)
-    chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
-    coefficient = moment_B[1] / (flight.dynamic_pressure_pa * area * chord)
-    if not able or abs(coefficient) < LARGEST_TRIM_MOMENT:
-        return []
-    return [
-        ResultWarning(
-            "constant_trim_moment",
-            f"a constant moment of {moment_B[1]:.4g} N m, which no control supplies, holds the aircraft in "
-            "trim",
-            f"let a drive balance it: set flight.trim_drive (the aircraft has {', '.join(able)}). A constant "
-            "moment does not change with speed, and so spoils slow motions such as the phugoid",
-            "/flight",
-        )
-    ]
+    return list(able)
 
 
-def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str) -> list[ResultWarning]:
+def wake_warnings(
+    aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str, sideslip_rad: float = 0.0
+) -> list[ResultWarning]:
     """A surface in the wake of another one, in a model whose wake keeps the direction that it has in trim.
 
     An all-rigid aircraft whose elevator was moved: pitch differs by up to 0.04 of the motion from the model
@@ -278,9 +309,10 @@ def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: 
 
     Parameters
     ----------
-    angles : (h,) of all hinges at the start, rad. alpha_rad : there.
+    angles : (h,) of all hinges at the start, rad. alpha_rad, sideslip_rad : there.
     """
-    worst = min(surfaces_in_wakes(aircraft, angles, alpha_rad), key=lambda pair: pair[2], default=None)
+    pairs = surfaces_in_wakes(aircraft, angles, alpha_rad, sideslip_rad)
+    worst = min(pairs, key=lambda pair: pair[2], default=None)
     if worst is None or worst[2] > NEAREST_WAKE_CHORDS:
         return []
     ahead, behind = (aircraft.surfaces[number].name for number in worst[:2])

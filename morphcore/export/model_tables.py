@@ -75,7 +75,7 @@ def reference_trim(chain: ChainModel, batch: ParameterBatch, start: StartMode) -
     """
     plan = _reference_plan(chain, start)
     with naming_obstacles(lambda: chain_obstacle(chain, batch)):
-        return trim(chain, batch, plan, start=start).require()
+        return trim(chain, batch, plan, start=start).require(chain.flight)
 
 
 def _reference_plan(chain: ChainModel, start: StartMode) -> FlightPlan:

@@ -36,6 +36,7 @@ from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import choose_step
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trajectory import Trajectory
+from morphcore.simulate.steady import pitch
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
@@ -234,7 +235,9 @@ def fly_readings(
     plan, setup = case.plan, case.setup
     flown, constants, state = trimmed_flight(model, batch, case, found)
     if any(setup.openness.start_value):
-        state = moved_start(state, found.alpha, float(case.sample.psi[0]), setup.openness.start_value)
+        theta = pitch(model.flight, found.alpha, found.bank)
+        first = np.stack([found.bank, theta, np.full_like(theta, case.sample.psi[0])], axis=1)
+        state = moved_start(state, first, setup.openness.start_value)
     count = rows_needed(setup.channels, flown.coordinates)
     chunks = fly_batch(flown, plan, constants, state, record_rows=count, stop=stop)
     rows = np.concatenate([chunk.rows for chunk in chunks])
@@ -258,12 +261,15 @@ def reading_derivatives(
     return np.where(np.isfinite(columns), columns, 0.0)
 
 
-def moved_start(state: Array, alpha: Array, psi: float, change: Sequence[float]) -> Array:
-    """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`."""
+def moved_start(state: Array, euler: Array, change: Sequence[float]) -> Array:
+    """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`.
+
+    euler : (p, 3) of the trim, rad.
+    """
     moved = state.copy()
     of = dict(zip(START, change, strict=True))
-    zero = np.zeros(alpha.size)
-    moved[:, :OMEGA] = quaternion_from_euler(zero + of["phi_rad"], alpha + of["theta_rad"], zero + psi)
+    phi, theta, psi = euler.T
+    moved[:, :OMEGA] = quaternion_from_euler(phi + of["phi_rad"], theta + of["theta_rad"], psi)
     moved[:, OMEGA:POSITION] += np.array(change[2:])
     return moved
 

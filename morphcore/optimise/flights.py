@@ -103,7 +103,7 @@ class MorphFlights:
         self.grid = time_grid(times_s, step_s)
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
         with naming_obstacles(partial(chain_obstacle, model, batch)):
-            found = trim(self.model, batch, waiting, start=start).require()
+            found = trim(self.model, batch, waiting, start=start).require(model.flight)
         self.alpha_rad = float(found.alpha[0])  # at the start
         self.bending = tip_bending(self.model, batch, found.q_joint)  # (1, s), at the start
         self.constants = lane_constants(self.model, batch, self.grid.step_s)

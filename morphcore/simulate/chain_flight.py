@@ -60,7 +60,7 @@ def chain_flight(
         wake_alpha=begin.alpha,
     )
     flown = plan.flown(model)
-    found = trim(flown, batch, plan, start=start).require()
+    found = trim(flown, batch, plan, start=start).require(model.flight)
     constants = lane_constants(flown, batch, grid.step_s)
     constants.set_thrust(*found.acting_B)
     state = trimmed_state(flown, batch, plan, found)

@@ -80,6 +80,7 @@ def flexible_flight(
             converged=np.array([True]),
             residual=np.array([trim.residual]),
             thrust_moment_B=trim.thrust_moment_B[None],
+            bank=np.array([trim.bank]),
         ),
     )
     yield 1.0, record
