@@ -32,15 +32,25 @@ def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
 
 
 def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
-    """Check that the aircraft has the drives that the flight is to be trimmed with."""
-    name, drives = flight.trim_drive, aircraft.drives
-    if name is not None and name not in drives and name not in map(without_side, drives):
-        yield Fault(
-            "no_such_drive",
-            f"The aircraft has no drive {name!r} to trim with.",
-            "/flight/trim_drive",
-            f"Its drives are {', '.join(drives)}." if drives else "It has no drives: omit trim_drive.",
-        )
+    """Check that the aircraft has the drives that the flight is to be trimmed with, one for each moment."""
+    drives, taken = aircraft.drives, dict[str, str]()
+    for field, name in flight.named_trim_drives.items():
+        meant = [name] if name in drives else [each for each in drives if without_side(each) == name]
+        if not meant:
+            yield Fault(
+                "no_such_drive",
+                f"The aircraft has no drive {name!r} to trim with.",
+                f"/flight/{field}",
+                f"Its drives are {', '.join(drives)}." if drives else f"It has no drives: omit {field}.",
+            )
+        for former in {taken[each]: None for each in meant if each in taken}:
+            yield Fault(
+                "drive_named_twice",
+                f"The drive {name!r} cannot balance two moments.",
+                f"/flight/{field}",
+                f"It is the flight's {former} already: name another drive, or null for a constant moment.",
+            )
+        taken |= dict.fromkeys(meant, field)
 
 
 def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -> Iterator[Fault]:
@@ -53,14 +63,15 @@ def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -
     moved : sequence of str
         Names of the drives that the morph moves.
     """
-    both = [name for name in moved if flight.trim_drive in (name, without_side(name))]
-    if both and start != "given":
-        yield Fault(
-            "morph_of_trim_drive",
-            f"The morph moves {both[0]!r}, with which the flight is trimmed.",
-            "/flight/trim_drive",
-            "Trim with another drive, or omit trim_drive.",
-        )
+    for field, drive in flight.named_trim_drives.items():
+        both = [name for name in moved if drive in (name, without_side(name))]
+        if both and start != "given":
+            yield Fault(
+                "morph_of_trim_drive",
+                f"The morph moves {both[0]!r}, with which the flight is trimmed.",
+                f"/flight/{field}",
+                f"Trim with another drive, or omit {field}.",
+            )
 
 
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:

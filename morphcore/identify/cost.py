@@ -33,10 +33,10 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules, part_name
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.steady import departure, pitch
 from morphcore.simulate.step_choice import choose_step
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trajectory import Trajectory
-from morphcore.simulate.steady import pitch
 from morphcore.simulate.trim import StartMode, Trim, trim, trimmed_state
 from morphcore.stopping import Stop, one_at_a_time
 from morphcore.threads import in_threads, thread_count
@@ -53,12 +53,14 @@ ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
 class SampleCase:
     """A sample, the plan that all flights against it share, and its readings as they are compared.
 
-    By default these are its three angles, and only the heading is free.
+    By default these are its three angles, and only the heading is free. ``turn_rate_rad_s`` is that of the
+    steady flight in which it begins.
     """
 
     sample: Trajectory
     plan: FlightPlan
     given: Measured | None = None
+    turn_rate_rad_s: float = 0.0
 
     @cached_property
     def setup(self) -> Measured:
@@ -77,6 +79,11 @@ class SampleCase:
             found = trim(flown, physical_guess(model), self.plan, start=start, follow=False)
             known[start] = not bool(found.converged.all())
         return known[start]
+
+    @cached_property
+    def motion(self) -> Array:
+        """(k, 3) departures of the sample's attitude from its steady start, rad."""
+        return departure(self.sample.euler, self.sample.time_s, self.turn_rate_rad_s)
 
     @property
     def weight(self) -> Array:
@@ -149,6 +156,7 @@ def sample_cases(
                 may_halve=not (separate_wings or any(whole[i : i + 1])),
                 start=start,
             ),
+            turn_rate_rad_s=model.flight.turn_rate_rad_s,
         )
         for i, sample in enumerate(samples)
     )

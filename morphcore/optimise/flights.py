@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.frames import euler_from_quaternion, wrap_angle
+from morphcore.frames import euler_from_quaternion
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.models.kinematics import tip_bending
@@ -22,6 +22,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.plan import CommonPath
 from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.steady import departure
 from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
@@ -128,10 +129,10 @@ class MorphFlights:
             count = min(thread_count(), len(schedules) - first)
             in_threads(lambda part, first=first: one(first + part), count)  # type: ignore[misc]
         euler = np.stack([attitude for attitude, _ in flown])
-        departure = wrap_angle(euler - euler[:, :1])
-        lost = ~np.isfinite(departure)
+        away = departure(euler, self.times_s, self.model.flight.turn_rate_rad_s)
+        lost = ~np.isfinite(away)
         return Flown(
-            np.where(lost, DIVERGED_ANGLE, departure),
+            np.where(lost, DIVERGED_ANGLE, away),
             np.stack([torques for _, torques in flown]),
             np.asarray(lost.any(axis=(1, 2))),
         )

@@ -112,7 +112,7 @@ def _by_broyden(
     for _ in range(MAX_ROUNDS):
         wanted = angles - np.linalg.solve(slopes, found.moment_B[axes])
         step = np.clip(wanted, low, high) - angles
-        for k in np.flatnonzero((step == 0.0) & (wanted != angles)):
+        for k in np.flatnonzero((step == 0.0) & (wanted != angles)).tolist():
             raise no_authority(controls[k], float(angles[k]), float(found.moment_B[axes[k]]))
         if np.abs(step).max() < TOLERANCE_RAD:
             return found, angles

@@ -47,7 +47,8 @@ class _Balance:
     """The equations of trim: imbalance of all elements' strains and, in free trim, of lift and weight.
 
     Unknowns are the changes of the elements' logarithms d (e, 6) from those at rest, the angle of attack and,
-    in asymmetric flight, the bank angle, which balances the forces along y of B. An element is in balance if they are its flexibility times the loads on d.
+    in asymmetric flight, the bank angle, which balances the forces along y of B. An element is in balance if
+    they are its flexibility times the loads on d.
     """
 
     def __init__(self, flight: FlexibleFlight, path: HingePath, wind_N: Array, start: StartMode) -> None:
@@ -204,10 +205,10 @@ def trim_flexible(
     """Equilibrium at the path's first hinge angles, as `simulate.trim.trim` defines it.
 
     Unknowns are the strains of all elements, the angle of attack and perhaps the bank angle; thrust along the
-    flight path, side force and moment follow. With ``start="given"`` they are the flight's, the unknowns are the strains, and the
-    wings share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with
-    Krylov steps (`simulate.continuation`) from unbent wings; if it does not arrive straight away, the
-    equilibrium is followed from rigid wings to the wings' own stiffness.
+    flight path, side force and moment follow. With ``start="given"`` they are the flight's, the unknowns are
+    the strains, and the wings share the fuselage's acceleration, which follows from the sum of all forces.
+    Newton's method with Krylov steps (`simulate.continuation`) from unbent wings; if it does not arrive
+    straight away, the equilibrium is followed from rigid wings to the wings' own stiffness.
 
     Raises
     ------

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Flight
 
 Array = NDArray[np.float64]
@@ -33,17 +34,17 @@ def pitch(flight: Flight, alpha: Array, bank: Array) -> Array:
     vector along x of B and downward across it.
     """
     if not (flight.banks or np.any(bank)):
-        return alpha + flight.climb_rad
+        return np.asarray(alpha + flight.climb_rad)
     x, y, z = np.moveaxis(air_velocity_B(flight, alpha) / flight.airspeed_m_s, -1, 0)
     down = y * np.sin(bank) + z * np.cos(bank)
     climb = math.sin(flight.climb_rad) / np.hypot(x, down)
-    return np.arctan2(down, x) + np.arcsin(np.clip(climb, -1.0, 1.0))
+    return np.asarray(np.arctan2(down, x) + np.arcsin(np.clip(climb, -1.0, 1.0)))
 
 
 def rates_B(flight: Flight, theta: Array, bank: Array) -> Array:
     """Rates p, q, r in B, (..., 3) rad/s: those of the turn about the vertical, or the flight's own."""
     down = np.stack([-np.sin(theta), np.cos(theta) * np.sin(bank), np.cos(theta) * np.cos(bank)], axis=-1)
-    return flight.turn_rate_rad_s * down + np.array(flight.rates_B)
+    return np.asarray(flight.turn_rate_rad_s * down + np.array(flight.rates_B))
 
 
 def first_bank(flight: Flight) -> float:
@@ -52,6 +53,14 @@ def first_bank(flight: Flight) -> float:
         return 0.0
     across = flight.airspeed_m_s * flight.turn_rate_rad_s * math.cos(flight.climb_rad)
     return math.atan(across / flight.gravity_m_s2)
+
+
+def departure(euler: Array, time_s: Array, turn_rate_rad_s: float) -> Array:
+    """Wrapped departure (..., k, 3) of Euler angles from those that a steady flight keeps from its start."""
+    away = euler - euler[..., :1, :]
+    if turn_rate_rad_s:
+        away[..., 2] -= turn_rate_rad_s * (time_s - time_s[0])
+    return np.asarray(wrap_angle(away))
 
 
 def described(flight: Flight) -> str:

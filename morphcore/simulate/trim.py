@@ -215,27 +215,84 @@ def _to_body(quaternion: Array, vector_N: Array) -> Array:
     return np.asarray(vector_N + w * cross + np.cross(xyz, cross))
 
 
+@dataclass(frozen=True)
+class _Unknowns:
+    """What the columns of the unknowns (..., coordinates + 6) of an iteration mean.
+
+    Joint angles, angle of attack, force along and across the flight path (across it the bank angle instead
+    where the flight banks), moment. From a given start only the joint angles are free.
+    """
+
+    model: ChainModel
+    given: Start | None
+
+    @property
+    def banked(self) -> bool:
+        """Whether the bank angle is one of them."""
+        return self.model.flight.banks and self.given is None
+
+    @property
+    def free(self) -> int:
+        """How many of them, the first ones, are unknown."""
+        return self.model.coordinates + (0 if self.given else 6)
+
+    @property
+    def angles(self) -> list[int]:
+        """Those whose steps are limited and end the iteration, among the free ones."""
+        n = self.model.coordinates
+        return [*range(min(n + 1, self.free)), *([n + 2] if self.banked else [])]
+
+    @property
+    def probes(self) -> Array:
+        """Steps (free,) of forward differences."""
+        n, probes = self.model.coordinates, np.full(self.free, ANGLE_PROBE)
+        probes[n + 1 :] = FORCE_PROBE
+        if self.banked:
+            probes[n + 2] = ANGLE_PROBE
+        return probes
+
+    def first(self, particles: int, begin: Array | None) -> Array:
+        """Where the iteration begins, (particles, coordinates + 6)."""
+        n, x = self.model.coordinates, np.zeros((particles, self.model.coordinates + 6))
+        if begin is not None:
+            x[:, : n + 1] = begin
+        if self.given is not None:
+            x[:, n], x[:, n + 2] = self.given.alpha_rad, self.given.bank_rad
+        elif self.banked:
+            x[:, n + 2] = first_bank(self.model.flight)
+        return x
+
+    def bank(self, points: Array) -> Array:
+        """Bank angle (k,) of each row, rad; zero where the flight does not bank."""
+        banks = self.banked or self.given is not None
+        return points[:, self.model.coordinates + 2] if banks else np.zeros(points.shape[0])
+
+    def thrust(self, points: Array) -> tuple[Array, Array]:
+        """Constant force in B, and moment beyond that of the thrust, (k, 3) each, of each row."""
+        n, given = self.model.coordinates, self.given
+        if given is not None:
+            count = points.shape[0]
+            return np.tile(given.force_B, (count, 1)), np.tile(given.moment_B, (count, 1))
+        alpha, along = points[:, n], points[:, n + 1]
+        across = np.zeros_like(along) if self.banked else points[:, n + 2]
+        return thrust_force_B(self.model.aircraft.propulsion, alpha, along, across), points[:, n + 3 : n + 6]
+
+    def acting(self, points: Array) -> Array:
+        """Constant force and all of the constant moment (k, 6) in B of each row."""
+        force_B, moment_B = self.thrust(points)
+        of_thrust_B = thrust_moment_B(self.model.aircraft.propulsion, force_B)
+        return np.concatenate([force_B, moment_B + of_thrust_B], axis=1)
+
+
 def _trim_slab(
     model: ChainModel, batch: ParameterBatch, plan: FlightPlan, start: StartMode, begin: Array | None = None
 ) -> Trim:
     """Newton's iteration from joint angles and angle of attack, ``begin`` (p, coordinates + 1), or zero."""
-    n, particles, propulsion = model.coordinates, batch.particles, model.aircraft.propulsion
-    given = model.flight.start if start == "given" else None
-    flight, banked = model.flight, model.flight.banks and not given
-    free = n + (0 if given else 6)
-    probes = np.full(free, ANGLE_PROBE)
-    probes[n + 1 :] = FORCE_PROBE
-    # unknowns of a particle: joint angles, angle of attack, force along and across the path (or, in asymmetric
-    # flight, bank angle), moment
-    x = np.zeros((particles, n + 6))
-    limited = [*range(n + 1)]
-    if banked:
-        limited.append(n + 2)
-        probes[n + 2 : n + 3], x[:, n + 2] = ANGLE_PROBE, first_bank(flight)
-    if begin is not None:
-        x[:, : n + 1] = begin
-    if given:
-        x[:, n], x[:, n + 2] = given.alpha_rad, given.bank_rad
+    n, particles, flight = model.coordinates, batch.particles, model.flight
+    given = flight.start if start == "given" else None
+    unknowns = _Unknowns(model, given)
+    free, probes = unknowns.free, unknowns.probes
+    x = unknowns.first(particles, begin)
     constants = lane_constants(model, batch, plan.grid.step_s)
     everywhere = np.stack([model.surfaces[:, 3] * 0, model.surfaces[:, 3]], axis=1).repeat(
         model.surfaces[:, 1], axis=0
@@ -249,12 +306,11 @@ def _trim_slab(
         repeated = np.repeat(np.arange(particles), points.shape[1])
         flat = points.reshape(-1, n + 6)
         lane_rows = rows[repeated]
-        lane_rows[:, FORCE_C : FORCE_C + 6] = _acting(flat, n, model, given)
+        lane_rows[:, FORCE_C : FORCE_C + 6] = unknowns.acting(flat)
         blocks = to_lanes(lane_rows)
         lanes = LaneConstants(blocks, np.tile(everywhere, (blocks.shape[0], 1, 1)), flat.shape[0])
-        state = _state(
-            model, batch.select(repeated), plan, (flat[:, n], _bank(flat, n, model, given)), flat[:, :n]
-        )
+        at = flat[:, n], unknowns.bank(flat)
+        state = _state(model, batch.select(repeated), plan, at, flat[:, :n])
         rates = state_rates(model, plan, 0, lanes, state)
         if flight.rotates:  # steady relative to the air: the wind's components turn in B
             wind_B = _to_body(state[:, :OMEGA], plan.wind_N[0])
@@ -275,7 +331,7 @@ def _trim_slab(
         else:
             off = unbalance(x[:, None, :])[:, 0]
         step = _solve(jacobian, -off)
-        angles = np.abs(step[:, limited]).max(axis=1)
+        angles = np.abs(step[:, unknowns.angles]).max(axis=1)
         step *= np.minimum(1.0, LARGEST_STEP / np.maximum(angles, 1e-300))[:, None]
         # each particle stops on its own: its trim must not depend on the others in its slab
         x[moving, :free] += np.where(np.isfinite(step), step, 0.0)[moving]
@@ -283,11 +339,11 @@ def _trim_slab(
         moving &= (residual >= ANGLE_TOLERANCE) & np.isfinite(residual)
         if not np.any(moving):
             break
-    force_B, moment_B = _thrust(x, n, model, given)
+    force_B, moment_B = unknowns.thrust(x)
     # forward differences limit the last digits: nearly converged is good enough
     converged = residual < 1e3 * ANGLE_TOLERANCE
-    of_thrust_B, share = thrust_moment_B(propulsion, force_B), converged.astype(np.float64)
-    bank = _bank(x, n, model, given)
+    of_thrust_B = thrust_moment_B(model.aircraft.propulsion, force_B)
+    share, bank = converged.astype(np.float64), unknowns.bank(x)
     return Trim(x[:, n], force_B, moment_B, x[:, :n], converged, residual, of_thrust_B, share, bank)
 
 
@@ -306,25 +362,3 @@ def _solve_one(matrix: Array, right: Array) -> Array:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.pinv(matrix) @ right)
-
-
-def _bank(points: Array, n: int, model: ChainModel, given: Start | None) -> Array:
-    """Bank angle (k,) of each row of unknowns, rad; zero if it is none."""
-    return points[:, n + 2] if given or model.flight.banks else np.zeros(points.shape[0])
-
-
-def _thrust(points: Array, n: int, model: ChainModel, given: Start | None) -> tuple[Array, Array]:
-    """Constant force in B, and moment beyond that of the thrust, of each row of unknowns."""
-    if given is not None:
-        count = points.shape[0]
-        return np.tile(given.force_B, (count, 1)), np.tile(given.moment_B, (count, 1))
-    alpha, along, across = points[:, n], points[:, n + 1], points[:, n + 2]
-    if model.flight.banks:
-        across = np.zeros_like(across)
-    return thrust_force_B(model.aircraft.propulsion, alpha, along, across), points[:, n + 3 : n + 6]
-
-
-def _acting(points: Array, n: int, model: ChainModel, given: Start | None) -> Array:
-    """Constant force and all of the constant moment (k, 6) in B of each row of unknowns."""
-    force_B, moment_B = _thrust(points, n, model, given)
-    return np.concatenate([force_B, moment_B + thrust_moment_B(model.aircraft.propulsion, force_B)], axis=1)

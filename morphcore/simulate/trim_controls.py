@@ -128,8 +128,8 @@ def no_authority(control: TrimControl, angle_rad: float, moment: float) -> Inval
     remedy = "move the centre of mass, " if control.axis == PITCH else ""
     otherwise = "omit trim_drive" if control.axis == PITCH else f"set {FIELDS[control.axis]} to null"
     return InvalidInput(
-        f"the drive {control.name!r} cannot balance the {MOMENTS[control.axis]} moment: at {angle_rad:.4g} rad "
-        f"{moment:.4g} N m are left",
+        f"the drive {control.name!r} cannot balance the {MOMENTS[control.axis]} moment: at "
+        f"{angle_rad:.4g} rad {moment:.4g} N m are left",
         pointer=control.pointer,
         hint=f"its authority is too small: widen the range of its hinges or controls, {remedy}enlarge the "
         f"surface or its arm, or {otherwise} to trim by a constant moment",

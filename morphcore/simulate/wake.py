@@ -96,7 +96,7 @@ def trimmed_schedules(
                     f"the trim drive {part.drive} is at {first:.4g} rad in trim, and its history leads it to "
                     f"{angle[outside[0]]:.4g} rad, beyond its range {part.min_rad:g}..{part.max_rad:g} rad",
                     pointer=control.pointer,
-                    hint="a history of a trim drive counts from its first value: reduce it, or widen the range",
+                    hint="a trim drive's history counts from its first value: reduce it, or widen the range",
                 )
     return out
 
@@ -119,7 +119,7 @@ def refuse_moved_trim(model: ChainModel, moves: Sequence[bool], start: StartMode
                 raise InvalidInput(
                     f"the morph moves the flight's trim drive, {model.aircraft.moved_parts[column].drive}",
                     pointer=control.pointer,
-                    hint=f"trim with another drive, or move others",
+                    hint="trim with another drive, or move others",
                 )
 
 
@@ -187,7 +187,7 @@ def _found(
         beyond = (x[1:] < low) | (x[1:] > high)
         x[1:] = np.clip(x[1:], low, high)
         step = x - before
-        for k in np.flatnonzero(beyond & (step[1:] == 0.0)):
+        for k in np.flatnonzero(beyond & (step[1:] == 0.0)).tolist():
             raise no_authority(controls[k], x[k + 1], f[k + 1] * scale)
         if np.abs(step).max() < TOLERANCE_RAD:
             return NominalStart(float(x[0]), tuple(x[1:].tolist()))
