@@ -85,7 +85,7 @@ class Flight(Document):
         ge=-2.0,
         le=2.0,
         description="Rate of the heading in a steady turn, positive to the right. The bank angle follows; "
-        "that of a coordinated turn has the tangent V * rate * cos(climb) / g.",
+        "that of a coordinated turn, about the flight path, has the tangent V * rate / g.",
     )
     sideslip_rad: float = Field(
         default=0.0,
@@ -177,7 +177,7 @@ class Flight(Document):
             )
         if self.load_factor > LARGEST_LOAD_FACTOR:
             across = math.cos(self.climb_rad)
-            steepest = math.sqrt((LARGEST_LOAD_FACTOR / across) ** 2 - 1.0) / across
+            steepest = math.sqrt((LARGEST_LOAD_FACTOR / across) ** 2 - 1.0)
             yield Fault(
                 "unsteady_flight",
                 f"A turn of {self.turn_rate_rad_s:g} rad/s at {self.airspeed_m_s:g} m/s needs a lift of "
@@ -191,13 +191,12 @@ class Flight(Document):
 def load_factor(airspeed_m_s: float, gravity_m_s2: float, climb_rad: float, turn_rate_rad_s: float) -> float:
     """Lift over weight of a steady climb and coordinated turn, cos(climb) / cos(bank); 1 without gravity.
 
-    The bank angle about the flight path has the tangent V * rate * cos(climb) / g (Stevens, Lewis & Johnson
-    2016, section 3.6).
+    The bank angle about the flight path has the tangent V * rate / g: the lift carries g cos(climb) and turns
+    the path, of which V cos(climb) is horizontal.
     """
     if not gravity_m_s2:
         return 1.0
-    across = math.cos(climb_rad)
-    return across * math.hypot(1.0, airspeed_m_s * turn_rate_rad_s * across / gravity_m_s2)
+    return math.cos(climb_rad) * math.hypot(1.0, airspeed_m_s * turn_rate_rad_s / gravity_m_s2)
 
 
 def load_flight(path: str | Path) -> Flight:

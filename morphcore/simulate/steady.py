@@ -51,8 +51,7 @@ def first_bank(flight: Flight) -> float:
     """Bank angle of the coordinated turn, rad, from which a trim begins."""
     if not flight.gravity_m_s2:
         return 0.0
-    across = flight.airspeed_m_s * flight.turn_rate_rad_s * math.cos(flight.climb_rad)
-    return math.atan(across / flight.gravity_m_s2)
+    return math.atan(flight.airspeed_m_s * flight.turn_rate_rad_s / flight.gravity_m_s2)
 
 
 def departure(euler: Array, time_s: Array, turn_rate_rad_s: float) -> Array:
