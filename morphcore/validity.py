@@ -21,6 +21,7 @@ from morphcore.geometry.overlap import overlapping_surfaces
 from morphcore.geometry.wake_contact import surfaces_in_wakes
 from morphdata.atmosphere import standard_atmosphere
 from morphdata.drives import without_side
+from morphdata.trim_drives import UPRIGHT_RAD
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,6 @@ LARGEST_APPARENT_SHARE = 0.1  # of a wing's mass: it then lowers the frequency o
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
-UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the incidence
 LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
 # component of the moment in B, its name, the field of the drive that balances it, and what it is usually

@@ -137,12 +137,6 @@ class Flight(Document):
         return load_factor(self.airspeed_m_s, self.gravity_m_s2, self.climb_rad, self.turn_rate_rad_s)
 
     @property
-    def named_trim_drives(self) -> dict[str, str]:
-        """Names of the drives that balance moments in trim, by their fields; "auto" and null are none."""
-        fields = ("trim_drive", "roll_trim_drive", "yaw_trim_drive")
-        return {field: name for field in fields if (name := getattr(self, field)) not in (None, "auto")}
-
-    @property
     def is_lateral(self) -> bool:
         """Whether the flight has a sideslip, a turn, or a rate of roll or yaw."""
         p, _, r = self.rates_rad_s or [0.0, 0.0, 0.0]

@@ -261,7 +261,8 @@ def _limit(balance: _Balance, found: Continued) -> Limit:
     """What limits a trim that ended on the way from rigid wings."""
     model = balance.flight.model
     if not found.root.arrived:
-        return no_lift(*balance.lift_coefficients(STALL_RAD), model.flight.airspeed_m_s)
+        steady, coefficients = model.flight, balance.lift_coefficients(STALL_RAD)
+        return no_lift(*coefficients, steady.airspeed_m_s, steady.load_factor)
     alpha, turns = _shape(balance, found.root.x)
     most = int(np.argmax(turns))
     sound = [share for share, x in found.path if _is_sound(balance, x)]

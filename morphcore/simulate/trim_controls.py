@@ -7,7 +7,6 @@ need none.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +14,11 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
-from morphcore.geometry.control import Control
-from morphcore.geometry.surface import Surface
-from morphdata.drives import without_side
+from morphdata.trim_drives import PITCH, ROLL, YAW, ControlPart, balancing, meant
 
-UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 MIN_AUTHORITY = 1e-6  # 1/rad, slope of the moment's coefficient: below it the drive moves no lifting surface
-ROLL, PITCH, YAW = 0, 1, 2  # components of the moment in B
+FIELDS = (ROLL, PITCH, YAW)  # by component of the moment in B
 MOMENTS = ("rolling", "pitching", "yawing")
-FIELDS = ("roll_trim_drive", "trim_drive", "yaw_trim_drive")
 
 
 @dataclass(frozen=True)
@@ -46,87 +41,51 @@ class TrimControl:
 
 
 def trim_controls(aircraft: Aircraft, flight: Flight) -> tuple[TrimControl, ...]:
-    """The drives that balance moments in a flight: that of pitch first, then those of roll and yaw.
+    """The drives that balance moments in a flight: those named, then the aircraft's own.
 
     Raises
     ------
     InvalidInput
         The aircraft has no such drive, or one drive would balance two moments.
     """
-    found: list[TrimControl] = []
-    taken: dict[int, str] = {}
-    for axis, given in (
-        (PITCH, flight.trim_drive),
-        (ROLL, flight.roll_trim_drive),
-        (YAW, flight.yaw_trim_drive),
-    ):
-        name = given
-        if given == "auto":
-            name = own_control(aircraft, axis, taken) if flight.is_asymmetric else None
-        if name is None:
-            continue
-        control = _named(aircraft, axis, name)
-        former = [taken[k] for k in control.columns.tolist() if k in taken]
-        if former:
-            raise InvalidInput(
-                f"the drive {name!r} cannot balance the {MOMENTS[axis]} moment too",
-                pointer=control.pointer,
-                hint=f"it is the flight's {former[0]}: name another, or null for a constant moment",
-            )
-        taken |= dict.fromkeys(control.columns.tolist(), FIELDS[axis])
-        found.append(control)
-    return tuple(found)
+    parts = [
+        ControlPart(control.drive, surface.side, surface.dihedral_rad, control.sign)
+        for surface in aircraft.surfaces
+        for control in surface.controls
+    ]
+    given = {field: getattr(flight, field) for field in FIELDS}
+    chosen = balancing(given, aircraft.drives, parts, asymmetric=flight.is_asymmetric)
+    taken: dict[str, str] = {}
+    return tuple(_control(aircraft, field, name, taken) for field, name in chosen.items())
 
 
-def _named(aircraft: Aircraft, axis: int, name: str) -> TrimControl:
-    drives = aircraft.drives
-    meant = {
-        each.name: each
-        for each in drives.values()
-        if name == each.name or (name not in drives and name == without_side(each.name))
-    }
-    if not meant:
+def _control(aircraft: Aircraft, field: str, name: str, taken: dict[str, str]) -> TrimControl:
+    """A control from its field and name; ``taken`` : fields by the drives of those before, in place."""
+    axis, drives = FIELDS.index(field), aircraft.drives
+    names = meant(name, drives)
+    if not names:
         raise InvalidInput(
             f"the aircraft has no drive {name!r} to trim with",
-            pointer=f"/flight/{FIELDS[axis]}",
-            hint=f"its drives are {', '.join(drives)}"
-            if drives
-            else f"it has no drives: omit {FIELDS[axis]}",
+            pointer=f"/flight/{field}",
+            hint=f"its drives are {', '.join(drives)}" if drives else f"it has no drives: omit {field}",
         )
-    columns = [k for k, part in enumerate(aircraft.moved_parts) if part.drive in meant]
-    low, high = max(each.low for each in meant.values()), min(each.high for each in meant.values())
+    for former in (taken[each] for each in names if each in taken):
+        raise InvalidInput(
+            f"the drive {name!r} cannot balance the {MOMENTS[axis]} moment too",
+            pointer=f"/flight/{field}",
+            hint=f"it is the flight's {former}: name another, or null for a constant moment",
+        )
+    taken |= dict.fromkeys(names, field)
+    columns = [k for k, part in enumerate(aircraft.moved_parts) if part.drive in names]
+    low, high = max(drives[each].low for each in names), min(drives[each].high for each in names)
     return TrimControl(axis, name, np.array(columns, dtype=np.int64), low, high)
-
-
-def own_control(aircraft: Aircraft, axis: int, taken: Collection[int] = ()) -> str | None:
-    """The word of the aircraft's first control for roll or yaw; None if it has none that is not taken.
-
-    Ailerons move the trailing edges of both sides against each other. A rudder is on a fin; on a pair of
-    fins, too, it moves the trailing edges against each other.
-    """
-    words: dict[str, list[tuple[int, Surface, Control]]] = {}
-    column = len(aircraft.hinges)
-    for surface in aircraft.surfaces:
-        for control in surface.controls:
-            words.setdefault(without_side(control.drive), []).append((column, surface, control))
-            column += 1
-    for word, parts in words.items():
-        fins = all(abs(surface.dihedral_rad) >= UPRIGHT_RAD for _, surface, _ in parts)
-        opposed = any(control.sign < 0.0 for _, _, control in parts)
-        alone = len({surface.side for _, surface, _ in parts}) == 1
-        if (
-            fins == (axis == YAW)
-            and (opposed or (fins and alone))
-            and not {k for k, _, _ in parts} & {*taken}
-        ):
-            return word
-    return None
 
 
 def no_authority(control: TrimControl, angle_rad: float, moment: float) -> InvalidInput:
     """The error of a trim drive that cannot balance its moment: at an angle some is left, N m."""
-    remedy = "move the centre of mass, " if control.axis == PITCH else ""
-    otherwise = "omit trim_drive" if control.axis == PITCH else f"set {FIELDS[control.axis]} to null"
+    field = FIELDS[control.axis]
+    remedy = "move the centre of mass, " if field == PITCH else ""
+    otherwise = f"omit {field}" if field == PITCH else f"set {field} to null"
     return InvalidInput(
         f"the drive {control.name!r} cannot balance the {MOMENTS[control.axis]} moment: at "
         f"{angle_rad:.4g} rad {moment:.4g} N m are left",

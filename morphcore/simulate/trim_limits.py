@@ -21,17 +21,19 @@ class Limit:
     hint: str
 
 
-def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
-    """Rigid wings find no level flight; lift coefficients needed, and given at the angle of stall."""
+def no_lift(needed: float, given: float, airspeed_m_s: float, load_factor: float = 1.0) -> Limit:
+    """Rigid wings find no such flight; lift coefficients needed, and given at the angle of stall."""
     if given < needed:
+        carried = "the weight" if load_factor == 1.0 else f"{load_factor:.3g} times the weight"
         found = (
-            f"the weight needs a mean lift coefficient of {needed:.3g}, and unbent wings give {given:.3g} at "
+            f"{carried} needs a mean lift coefficient of {needed:.3g}, and unbent wings give {given:.3g} at "
             f"an angle of attack of {STALL_RAD:g} rad, where wings stall"
         )
         if given <= 0.0:
             return Limit(found, "the surfaces do not lift upward: check their positions and hinge angles")
         least = airspeed_m_s * (needed / given) ** 0.5
-        return Limit(found, f"at that angle they carry the weight from about {least:.3g} m/s, or less mass")
+        less = "less mass" if load_factor <= 1.0 else "less mass, or turn less"
+        return Limit(found, f"at that angle they carry {carried} from about {least:.3g} m/s, or {less}")
     return Limit(
         "rigid wings could carry the weight, but the iteration for them does not arrive",
         "check whether surfaces overlap, or lie in each other's wake",
