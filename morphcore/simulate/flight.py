@@ -99,6 +99,7 @@ class Simulation(Shown):
         return Summary(
             f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
             {"angle of attack at the start, rad": self.trim.alpha}
+            | ({"bank angle at the start, rad": self.trim.bank} if self.trim.bank.any() else {})
             | {f"{name} in trim, rad": np.array([angle]) for name, angle in self.trim_drives.items()},
             ("", "from", "to"),
             [
