@@ -93,7 +93,7 @@ class _Balance:
 
     def loads(self, poses: NodePoses, V: Array, A: Array) -> Array:
         """Forces (n, 6) that inertia and weight require at the nodes."""
-        return self.flight.structure(poses, V, A, beams=self.loose)
+        return self.flight.structure(poses, V, A, self.wind_N, beams=self.loose)
 
     def longest(self, step: Array) -> float:
         """Share of a step of the unknowns that may be taken at once."""

@@ -74,7 +74,7 @@ STEADY = {
     "turn": {"turn_rate_rad_s": 0.3},
     "sideslip": {"sideslip_rad": 0.05},
     "all in wind": {"turn_rate_rad_s": -0.5, "climb_rad": -0.1, "sideslip_rad": 0.03}
-    | {"wind_n_m_s": [3.0, 2.0, -1.0]},
+    | {"wind_n_m_s": [3.0, 2.0, -1.0], "apparent_mass": True},
 }
 
 
