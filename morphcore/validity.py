@@ -254,7 +254,7 @@ def trim_warnings(
 
     Parameters
     ----------
-    balanced : components of the moment that a drive of the flight balances.
+    balanced : components of the moment that a drive of the flight balances, in the rigid model entirely.
     """
     area = sum(surface.area_m2 for surface in aircraft.surfaces)
     chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
@@ -274,17 +274,23 @@ def trim_warnings(
             )
         )
     for axis, name, field, drive in LATERAL_TRIM if flight.is_asymmetric else ():
-        if axis not in balanced and not coefficient[axis] < LARGEST_TRIM_MOMENT:
-            found.append(
-                ResultWarning(
-                    "constant_trim_moment",
-                    f"a constant {name} moment of {moment_B[axis]:.4g} N m, which no control supplies, holds "
-                    "the aircraft in trim",
-                    f"give the aircraft {drive}, or name a drive as flight.{field}: without one it could not "
-                    "fly so",
-                    "/flight",
-                )
+        if coefficient[axis] < LARGEST_TRIM_MOMENT:
+            continue
+        hint = (
+            f"give the aircraft {drive}, or name a drive as flight.{field}: without one it could not fly so"
+        )
+        if axis in balanced:
+            hint = "its drive is at the rigid model's angle, and bending takes from its effect: the flexible "
+            hint += "model finds its own angle"
+        found.append(
+            ResultWarning(
+                "constant_trim_moment",
+                f"a constant {name} moment of {moment_B[axis]:.4g} N m, which no control supplies, holds the "
+                "aircraft in trim",
+                hint,
+                "/flight",
             )
+        )
     return found
 
 

@@ -43,6 +43,8 @@ def pitch(flight: Flight, alpha: Array, bank: Array) -> Array:
 
 def rates_B(flight: Flight, theta: Array, bank: Array) -> Array:
     """Rates p, q, r in B, (..., 3) rad/s: those of the turn about the vertical, or the flight's own."""
+    if not flight.rotates:
+        return np.zeros((*np.shape(theta), 3))
     down = np.stack([-np.sin(theta), np.cos(theta) * np.sin(bank), np.cos(theta) * np.cos(bank)], axis=-1)
     return np.asarray(flight.turn_rate_rad_s * down + np.array(flight.rates_B))
 

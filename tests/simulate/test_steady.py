@@ -342,3 +342,18 @@ def test_a_given_start_repeats_a_turn(kind: str) -> None:
     for name, values in again.trajectory.extra.items():
         assert np.ptp(values) < (2e-5 if kind == "equivalent" else 1e-6), name
     np.testing.assert_allclose(again.trim.bank, found.bank)
+
+
+def test_what_bending_takes_from_ailerons_is_told() -> None:
+    """An equivalent model has the rigid model's aileron: on soft wings a constant moment does the rest."""
+    soft = finned()
+    for wing in soft["surfaces"][:2]:
+        wing["material"] = {**wing["material"], "youngs_modulus_pa": 3e7}
+    found = flown("equivalent", {"sideslip_rad": 0.1}, aircraft=aircraft_of(soft))
+    told = [w for w in found.warnings if w.code == "constant_trim_moment" and "rolling" in w.message]
+    assert len(told) == 1
+    assert "flexible model" in told[0].hint
+    assert abs(found.trim.moment_B[0, 0]) > 1.0
+    exact = flown("flexible", {"sideslip_rad": 0.1}, aircraft=aircraft_of(soft))
+    assert abs(exact.trim.moment_B[0, 0]) < 1e-6
+    assert abs(exact.trim_drives["aileron_left"]) > 1.5 * abs(found.trim_drives["aileron_left"])
