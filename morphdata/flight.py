@@ -17,6 +17,7 @@ MACH_LIMIT = 0.7  # linear compressibility (Prandtl-Glauert) is valid up to here
 # an enumeration with one value: generated clients treat a constant in a union as the only choice
 Auto = Annotated[Literal["auto"], WithJsonSchema({"type": "string", "enum": ["auto"]})]
 DriveName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,49}$")]
+OwnDrive = Literal["auto", "none"]
 Rate = Annotated[float, Field(ge=-5.0, le=5.0)]
 LARGEST_LOAD_FACTOR = 10.0  # of a steady turn; it banks by 1.47 rad there
 
@@ -106,13 +107,13 @@ class Flight(Document):
         "balances the pitching moment in trim. It holds that angle; a history given for it counts from its "
         "first value as an increment. Default: a constant moment balances. Not used from a given start.",
     )
-    roll_trim_drive: Auto | DriveName | None = Field(
+    roll_trim_drive: OwnDrive | DriveName = Field(
         default="auto",
         description="The same for the rolling moment. `auto`: in flights with a sideslip, a turn, or rates "
         "of roll or yaw, the first control that moves the trailing edges of both sides against each other; "
-        "null: a constant moment.",
+        "`none`: a constant moment.",
     )
-    yaw_trim_drive: Auto | DriveName | None = Field(
+    yaw_trim_drive: OwnDrive | DriveName = Field(
         default="auto",
         description="The same for the yawing moment. `auto`: in those flights the first control of a fin.",
     )

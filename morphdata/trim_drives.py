@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from morphdata.drives import without_side
 
+NO_NAMES = ("auto", "none")  # not names of drives
 UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 PITCH, ROLL, YAW = (
     "trim_drive",
@@ -54,7 +55,8 @@ def balancing(
     Parameters
     ----------
     given : mapping of str to str or None
-        By field, what the flight says; "auto" is the aircraft's own control in asymmetric flight, else none.
+        By field, what the flight says: None and "none" are no drive, "auto" is the aircraft's own control in
+        asymmetric flight, else none.
     drives : collection of str
         Names of the aircraft's drives.
     parts : iterable of ControlPart
@@ -62,7 +64,7 @@ def balancing(
     asymmetric : bool
         Whether the steady flight differs from its mirror image.
     """
-    chosen = {field: name for field in (PITCH, ROLL, YAW) if (name := given[field]) not in (None, "auto")}
+    chosen = {field: name for field in (PITCH, ROLL, YAW) if (name := given[field]) not in (None, *NO_NAMES)}
     taken = {drive for name in chosen.values() for drive in meant(name, drives)}
     every = list(parts)
     for field in (ROLL, YAW) if asymmetric else ():

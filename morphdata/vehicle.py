@@ -50,7 +50,7 @@ def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
                 "drive_named_twice",
                 f"The drive {name!r} cannot balance two moments.",
                 f"/flight/{field}",
-                f"It is the flight's {former} already: name another drive, or null for a constant moment.",
+                f"It is the flight's {former} already: name another drive, or omit {field}.",
             )
         taken |= dict.fromkeys(names, field)
 
@@ -88,7 +88,7 @@ def moved_trim_faults(
     for field, drive in trim_drives(aircraft, flight).items():
         both = [name for name in moved if drive in (name, without_side(name))]
         if both and start != "given":
-            instead = f"omit {field}" if field == PITCH else f"set {field} to null"
+            instead = f"omit {field}" if field == PITCH else f'set {field} to "none"'
             yield Fault(
                 "morph_of_trim_drive",
                 f"The morph moves {both[0]!r}, with which the flight is trimmed.",

@@ -24,6 +24,7 @@ from morphdata.flight import Flight as FlightDocument
 from morphdata.flight import load_factor
 from morphdata.inertia import inertia_matrix
 from morphdata.masses import PointMass
+from morphdata.trim_drives import NO_NAMES
 
 Array = NDArray[np.float64]
 
@@ -167,8 +168,8 @@ class Flight(Shown):
     turn_rate_rad_s: float = 0.0
     sideslip_rad: float = 0.0
     rates_B: tuple[float, ...] = (0.0, 0.0, 0.0)
-    roll_trim_drive: str | None = "auto"
-    yaw_trim_drive: str | None = "auto"
+    roll_trim_drive: str = "auto"
+    yaw_trim_drive: str = "auto"
 
     @classmethod
     def of(cls, document: FlightDocument | Mapping[str, Any]) -> Flight:
@@ -228,7 +229,7 @@ class Flight(Shown):
 
         It does in asymmetric flight, and where a drive is named that trims roll or yaw.
         """
-        named = {self.roll_trim_drive, self.yaw_trim_drive} - {None, "auto"}
+        named = {self.roll_trim_drive, self.yaw_trim_drive} - {*NO_NAMES}
         return self.is_asymmetric or bool(named)
 
 

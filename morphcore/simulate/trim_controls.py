@@ -73,7 +73,7 @@ def _control(aircraft: Aircraft, field: str, name: str, taken: dict[str, str]) -
         raise InvalidInput(
             f"the drive {name!r} cannot balance the {MOMENTS[axis]} moment too",
             pointer=f"/flight/{field}",
-            hint=f"it is the flight's {former}: name another, or null for a constant moment",
+            hint=f"it is the flight's {former}: name another drive",
         )
     taken |= dict.fromkeys(names, field)
     columns = [k for k, part in enumerate(aircraft.moved_parts) if part.drive in names]
@@ -85,7 +85,7 @@ def no_authority(control: TrimControl, angle_rad: float, moment: float) -> Inval
     """The error of a trim drive that cannot balance its moment: at an angle some is left, N m."""
     field = FIELDS[control.axis]
     remedy = "move the centre of mass, " if field == PITCH else ""
-    otherwise = f"omit {field}" if field == PITCH else f"set {field} to null"
+    otherwise = f"omit {field}" if field == PITCH else f'set {field} to "none"'
     return InvalidInput(
         f"the drive {control.name!r} cannot balance the {MOMENTS[control.axis]} moment: at "
         f"{angle_rad:.4g} rad {moment:.4g} N m are left",

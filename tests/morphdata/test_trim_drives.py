@@ -49,6 +49,6 @@ def test_what_is_named_comes_first() -> None:
     auto = {PITCH: None, ROLL: "auto", YAW: "auto"}
     assert balancing(auto, drives, parts, asymmetric=False) == {}
     assert balancing(auto, drives, parts, asymmetric=True) == {ROLL: "aileron", YAW: "rudder"}
-    odd = auto | {PITCH: "aileron_left", YAW: None}
+    odd = auto | {PITCH: "aileron_left", YAW: "none"}
     assert balancing(odd, drives, parts, asymmetric=True) == {PITCH: "aileron_left", ROLL: "spoiler"}
     assert balancing(auto | {YAW: "rudder"}, drives, parts, asymmetric=False) == {YAW: "rudder"}

@@ -179,7 +179,7 @@ def _required(fresh: FreshModel, flight: Flight, found: Any) -> tuple[np.ndarray
 def test_a_sideslip_agrees_with_the_lateral_derivatives() -> None:
     """Moments, controls' angles and bank of a sideslip are those of the lattice's slopes about none."""
     probe, sideslip = 2e-3, 0.05
-    constant = {"roll_trim_drive": None, "yaw_trim_drive": None}
+    constant = {"roll_trim_drive": "none", "yaw_trim_drive": "none"}
     near, far = (flown("rigid", {"sideslip_rad": x} | constant).trim for x in (probe, sideslip))
     for axis in (0, 2):
         assert far.moment_B[0, axis] == pytest.approx(near.moment_B[0, axis] * sideslip / probe, rel=0.02)
@@ -223,7 +223,7 @@ def test_rigid_and_flexible_models_agree() -> None:
     """
     aircraft = rigid(aircraft_of(finned()))
     for more, drag in (({"sideslip_rad": 0.05}, 0.002), ({"turn_rate_rad_s": 0.3}, 0.015)):
-        constant = more | {"roll_trim_drive": None, "yaw_trim_drive": None}
+        constant = more | {"roll_trim_drive": "none", "yaw_trim_drive": "none"}
         one, other = (
             flown(kind, constant, aircraft=aircraft, elements=1).trim for kind in ("rigid", "flexible")
         )
@@ -233,14 +233,14 @@ def test_rigid_and_flexible_models_agree() -> None:
 
 
 def test_the_aircrafts_own_controls_balance_an_asymmetric_flight() -> None:
-    """Ailerons and rudder are found; in level flight they stay; null and other names are obeyed."""
+    """Ailerons and rudder are found; in level flight they stay; "none" and other names are obeyed."""
     found = flown("rigid", {"sideslip_rad": 0.05})
     assert set(found.trim_drives) == {"aileron_right", "aileron_left", "rudder"}
     assert found.trim_drives["aileron_right"] == found.trim_drives["aileron_left"]
     assert not flown("rigid", {}).trim_drives
     told = [w.message for w in found.warnings if w.code == "constant_trim_moment"]
     assert len(told) == 1, "of the pitching moment alone: no trim_drive is named"
-    only = flown("rigid", {"sideslip_rad": 0.05, "roll_trim_drive": None})
+    only = flown("rigid", {"sideslip_rad": 0.05, "roll_trim_drive": "none"})
     assert set(only.trim_drives) == {"rudder"}
     told = [w for w in only.warnings if w.code == "constant_trim_moment" and "rolling" in w.message]
     assert len(told) == 1
@@ -269,7 +269,7 @@ def test_a_control_without_authority_is_refused(kind: str) -> None:
         flown(kind, {"sideslip_rad": 0.1}, aircraft=aircraft_of(short))
     assert caught.value.pointer == "/flight/yaw_trim_drive"
     assert "yawing moment: at -0.01 rad" in str(caught.value)
-    assert "null" in caught.value.hint
+    assert '"none"' in caught.value.hint
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -329,7 +329,7 @@ def test_a_given_start_repeats_a_turn(kind: str) -> None:
 
     Its wake leaves at the given angle of attack; that of a chain's trim at the rigid model's.
     """
-    constant = {"roll_trim_drive": None, "yaw_trim_drive": None, "turn_rate_rad_s": 0.3, "climb_rad": 0.1}
+    constant = {"roll_trim_drive": "none", "yaw_trim_drive": "none", "turn_rate_rad_s": 0.3, "climb_rad": 0.1}
     found = flown(kind, constant).trim
     start = {
         "alpha_rad": found.alpha[0],
