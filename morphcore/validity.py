@@ -80,12 +80,14 @@ def air_motion(
     """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
     A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream, twist its
-    tip once more; of a surface's own incidence counts what its dihedral leaves in the vertical.
+    tip once more; of a surface's own incidence counts what its dihedral leaves in the vertical. A fin meets
+    the sideslip.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
     air_B = np.einsum("kij,ki->kj", R_NB, air_N)
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
+    airspeed = np.asarray(np.linalg.norm(air_N, axis=1))
     across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
     inclined = []
     for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
@@ -94,9 +96,11 @@ def air_motion(
             inclined.append(root)
         if surface.twist_rad:
             inclined.append(root + surface.twist_rad)
-    incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
+    fins = any(abs(surface.dihedral_rad) >= UPRIGHT_RAD for surface in aircraft.surfaces)
+    met = [np.arctan2(air_B[:, 1], np.hypot(air_B[:, 0], air_B[:, 2]))] if fins else []
+    incidences = np.stack([alpha, *(alpha + angle for angle in inclined), *met])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
-    return AirMotion(time_s, furthest, np.asarray(np.linalg.norm(air_N, axis=1)))
+    return AirMotion(time_s, furthest, airspeed)
 
 
 def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:

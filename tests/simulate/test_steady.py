@@ -250,6 +250,16 @@ def test_the_aircrafts_own_controls_balance_an_asymmetric_flight() -> None:
     assert max(map(abs, named.trim_drives.values())) < 1e-9
 
 
+def test_a_fin_beyond_its_stall_is_told() -> None:
+    """The sideslip is the angle of attack of a fin."""
+    codes = [
+        {warning.code for warning in flown("rigid", {"sideslip_rad": sideslip}).warnings}
+        for sideslip in (0.25, -0.3)
+    ]
+    assert "large_alpha" not in codes[0]
+    assert "large_alpha" in codes[1]
+
+
 def test_a_history_of_a_control_counts_from_its_trim() -> None:
     """As that of the elevator does, in all models alike."""
     for kind in ("rigid", "flexible"):
