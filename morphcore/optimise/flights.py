@@ -83,7 +83,7 @@ class MorphFlights:
 
     Raises
     ------
-    TrimNotFound : there is no steady level flight.
+    TrimNotFound : there is no such steady flight.
     """
 
     def __init__(
