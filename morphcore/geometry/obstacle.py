@@ -1,6 +1,6 @@
 """Likely reasons, from the document alone, why an aircraft does not fly: a soft wing, too little air.
 
-Estimates from beam theory and from the lift needed in steady flight. They name the field to check after a trim
+Estimates from beam theory and from the lift that the flight needs. They name the field to check after a trim
 or a flight has failed; they do not reject anything themselves.
 """
 
