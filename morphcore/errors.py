@@ -14,22 +14,32 @@ class NotFlyable(MorphError):
 
 
 class TrimNotFound(NotFlyable):
-    """Newton's iteration found no steady level flight.
+    """Newton's iteration found no equilibrium in the steady flight that was asked for.
 
     Parameters
     ----------
     residual : what is left: of a chain the last Newton step, rad; of beams the largest imbalance of the angle
     of attack and the elements' strains, rad and m. iterations : Newton steps taken.
     limit : what was found on the way, a clause: where the equilibrium was lost, and at what shape.
-    hint : what would trim. A residual of 0 is not mentioned: there is a root, but not one to be flown.
+    hint : what would trim. flight : the steady flight that was asked for, in words.
+    A residual of 0 is not mentioned: there is a root, but not one to be flown.
     """
 
     code = "trim_not_found"
 
-    def __init__(self, *, residual: float, iterations: int, limit: str = "", hint: str = "") -> None:
+    def __init__(
+        self,
+        *,
+        residual: float,
+        iterations: int,
+        limit: str = "",
+        hint: str = "",
+        flight: str = "level flight",
+    ) -> None:
+        asked = "level flight" if flight == "level flight" else f"flight with {flight}"
         left = [f"residual {residual:.3g} after {iterations} Newton steps"] if residual else []
         super().__init__(
-            f"no trimmed level flight found: {'; '.join([limit][: len(limit)] + left)}",
+            f"no trimmed {asked} found: {'; '.join([limit][: len(limit)] + left)}",
             pointer="/flight",
             hint=hint,
         )

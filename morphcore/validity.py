@@ -24,6 +24,7 @@ from morphcore.geometry.wake_contact import surfaces_in_wakes
 from morphdata.atmosphere import standard_atmosphere
 from morphdata.drives import without_side
 from morphdata.environment import Environment
+from morphdata.trim_drives import UPRIGHT_RAD
 
 Array = NDArray[np.float64]
 
@@ -33,9 +34,13 @@ LARGEST_APPARENT_SHARE = 0.1  # of a wing's mass: it then lowers the frequency o
 LARGEST_MACH = 0.3  # below this, incompressible air is accurate to 5 per cent of the lift
 # Five degrees from the vertical, roll and yaw act about nearly the same axis and their errors grow tenfold.
 STEEPEST_PITCH_RAD = np.radians(85.0)
-UPRIGHT_RAD = 1.0  # dihedral from which a surface is a fin
 INCIDENCE_AXIS = 0.99  # cosine to y of B from which a hinge changes the incidence
 LARGEST_TRIM_MOMENT = 0.01  # coefficient; a wing's own moment about its quarter chord is larger
+# component of the moment in B, its name, the field of the drive that balances it, and what it is usually
+LATERAL_TRIM = (
+    (0, "rolling", "roll_trim_drive", "ailerons"),
+    (2, "yawing", "yaw_trim_drive", "a fin with a rudder"),
+)
 # A plain flap loses its linear lift to separation at about this deflection (Abbott & von Doenhoff 1959).
 LARGEST_DEFLECTION_RAD = np.radians(20.0)
 # tip deflection over span; beyond it a lattice on the unbent wings trims more than 0.6 mrad off, see
@@ -82,12 +87,14 @@ def air_motion(
     """Compute the motion through the air from attitudes, velocities and wind (k, 3) and hinge angles (k, h).
 
     A hinge inclines its surface by the part of its angle whose axis is perpendicular to the stream, twist its
-    tip once more; of a surface's own incidence counts what its dihedral leaves in the vertical.
+    tip once more; of a surface's own incidence counts what its dihedral leaves in the vertical. A fin meets
+    the sideslip.
     """
     air_N = velocity_N - wind_N
     R_NB = rotation_from_quaternion(quaternion_from_euler(*euler.T))
     air_B = np.einsum("kij,ki->kj", R_NB, air_N)
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
+    airspeed = np.asarray(np.linalg.norm(air_N, axis=1))
     across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
     inclined = []
     for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
@@ -96,9 +103,11 @@ def air_motion(
             inclined.append(root)
         if surface.twist_rad:
             inclined.append(root + surface.twist_rad)
-    incidences = np.stack([alpha, *(alpha + angle for angle in inclined)])
+    fins = any(abs(surface.dihedral_rad) >= UPRIGHT_RAD for surface in aircraft.surfaces)
+    met = [np.arctan2(air_B[:, 1], np.hypot(air_B[:, 0], air_B[:, 2]))] if fins else []
+    incidences = np.stack([alpha, *(alpha + angle for angle in inclined), *met])
     furthest = np.take_along_axis(incidences, np.abs(incidences).argmax(axis=0)[None], axis=0)[0]
-    return AirMotion(time_s, furthest, np.asarray(np.linalg.norm(air_N, axis=1)))
+    return AirMotion(time_s, furthest, airspeed)
 
 
 def air_warnings(flight: Flight, motions: Sequence[tuple[str, str, AirMotion]]) -> list[ResultWarning]:
@@ -290,38 +299,70 @@ def steep_warning(name: str, pointer: str, theta: Array) -> list[ResultWarning]:
     ]
 
 
-def trim_warnings(aircraft: Aircraft, flight: Flight, moment_B: Array) -> list[ResultWarning]:
-    """A pitching moment (3,), N m, that only a constant moment balances although a drive could.
+def trim_warnings(
+    aircraft: Aircraft, flight: Flight, moment_B: Array, balanced: Sequence[int] = ()
+) -> list[ResultWarning]:
+    """Moments (3,), N m, that only a constant moment balances although a drive could.
 
-    Only drives of incidence count, those whose hinges turn about y of B, and controls that deflect alike on
-    both sides of surfaces that lift.
+    In pitch only drives of incidence count, those whose hinges turn about y of B, and controls that deflect
+    alike on both sides of surfaces that lift. In roll and yaw moments of asymmetric flights are told even if
+    the aircraft has no control for them: it could not fly so.
+
+    Parameters
+    ----------
+    balanced : components of the moment that a drive of the flight balances, in the rigid model entirely.
     """
-    if flight.trim_drive is not None:
-        return []
+    area = sum(surface.area_m2 for surface in aircraft.surfaces)
+    chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
+    coefficient = np.abs(moment_B) / (flight.dynamic_pressure_pa * area * chord)
+    found = []
+    able = _pitching_drives(aircraft)
+    if flight.trim_drive is None and able and not coefficient[1] < LARGEST_TRIM_MOMENT:
+        found.append(
+            ResultWarning(
+                "constant_trim_moment",
+                f"a constant moment of {moment_B[1]:.4g} N m, which no control supplies, holds the aircraft "
+                "in trim",
+                "let a drive balance it: set flight.trim_drive (the aircraft has "
+                f"{', '.join(able)}). A constant moment does not change with speed, and so spoils slow "
+                "motions such as the phugoid",
+                "/flight",
+            )
+        )
+    for axis, name, field, drive in LATERAL_TRIM if flight.is_asymmetric else ():
+        if coefficient[axis] < LARGEST_TRIM_MOMENT:
+            continue
+        hint = (
+            f"give the aircraft {drive}, or name a drive as flight.{field}: without one it could not fly so"
+        )
+        if axis in balanced:
+            hint = "its drive is at the rigid model's angle, and bending takes from its effect: the flexible "
+            hint += "model finds its own angle"
+        found.append(
+            ResultWarning(
+                "constant_trim_moment",
+                f"a constant {name} moment of {moment_B[axis]:.4g} N m, which no control supplies, holds the "
+                "aircraft in trim",
+                hint,
+                "/flight",
+            )
+        )
+    return found
+
+
+def _pitching_drives(aircraft: Aircraft) -> list[str]:
     able = {hinge.drive: None for hinge in aircraft.hinges if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
     opposed = {without_side(control.drive) for control in aircraft.controls if control.sign < 0.0}
     for surface in aircraft.surfaces:
         if abs(surface.dihedral_rad) < UPRIGHT_RAD:
             words = (without_side(control.drive) for control in surface.controls)
             able |= {word: None for word in words if word not in opposed}
-    area = sum(surface.area_m2 for surface in aircraft.surfaces)
-    chord = max(surface.mean_chord_m for surface in aircraft.surfaces)
-    coefficient = moment_B[1] / (flight.dynamic_pressure_pa * area * chord)
-    if not able or abs(coefficient) < LARGEST_TRIM_MOMENT:
-        return []
-    return [
-        ResultWarning(
-            "constant_trim_moment",
-            f"a constant moment of {moment_B[1]:.4g} N m, which no control supplies, holds the aircraft in "
-            "trim",
-            f"let a drive balance it: set flight.trim_drive (the aircraft has {', '.join(able)}). A constant "
-            "moment does not change with speed, and so spoils slow motions such as the phugoid",
-            "/flight",
-        )
-    ]
+    return list(able)
 
 
-def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str) -> list[ResultWarning]:
+def wake_warnings(
+    aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: str, sideslip_rad: float = 0.0
+) -> list[ResultWarning]:
     """A surface in the wake of another one, in a model whose wake keeps the direction that it has in trim.
 
     An all-rigid aircraft whose elevator was moved: pitch differs by up to 0.04 of the motion from the model
@@ -330,9 +371,10 @@ def wake_warnings(aircraft: Aircraft, angles: Array, alpha_rad: float, pointer: 
 
     Parameters
     ----------
-    angles : (h,) of all hinges at the start, rad. alpha_rad : there.
+    angles : (h,) of all hinges at the start, rad. alpha_rad, sideslip_rad : there.
     """
-    worst = min(surfaces_in_wakes(aircraft, angles, alpha_rad), key=lambda pair: pair[2], default=None)
+    pairs = surfaces_in_wakes(aircraft, angles, alpha_rad, sideslip_rad)
+    worst = min(pairs, key=lambda pair: pair[2], default=None)
     if worst is None or worst[2] > NEAREST_WAKE_CHORDS:
         return []
     ahead, behind = (aircraft.surfaces[number].name for number in worst[:2])

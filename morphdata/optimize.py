@@ -324,7 +324,7 @@ class OptimizeRequest(Request):
         except InvalidInput as error:
             yield from error.faults
             return
-        yield from moved_trim_faults(self.flight, flown_with(self.model).start, moved)
+        yield from moved_trim_faults(self.aircraft, self.flight, flown_with(self.model).start, moved)
         for name in ("initial_rad", "final_rad"):
             angle, at = getattr(self.morph, name), f"/morph/{name}"
             yield from islice(filter(None, (drives[each].fault(angle, at) for each in moved)), 1)

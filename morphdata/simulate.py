@@ -159,12 +159,13 @@ class TrimState(Result):
     """Start of the flight, in body axes, at the reference point."""
 
     alpha_rad: float
+    bank_rad: float | None = Field(default=None, description="Roll angle; absent where it is zero.")
     force_b_n: list[float]
     moment_b_n_m: list[float] = Field(
         description="Beyond the moment of the thrust if the aircraft has a line of thrust."
     )
     drives_rad: dict[str, float] | None = Field(
-        default=None, description="Angles found for the flight's `trim_drive`; absent without one."
+        default=None, description="Angles found for the flight's trim drives; absent without one."
     )
     thrust_moment_b_n_m: list[float] | None = Field(
         default=None, description="Moment of the thrust by the aircraft's line of thrust, if it has one."
@@ -190,7 +191,9 @@ class SimulatedTrajectory(Result):
 class FlightSummary(Result):
     """The flight in a few numbers."""
 
-    max_abs_rad: dict[str, float] = Field(description="Largest departure of each angle from its start.")
+    max_abs_rad: dict[str, float] = Field(
+        description="Largest departure of each angle from its start, the heading's from a steady turn."
+    )
     variation_rad2: float = Field(
         description="Sum over samples 10 ms apart of the squared departures of the three angles."
     )

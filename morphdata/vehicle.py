@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
+from morphdata.controls import control_names
 from morphdata.drives import without_side
 from morphdata.faults import Fault
 from morphdata.flight import Flight
 from morphdata.parameters import Parameters
+from morphdata.trim_drives import PITCH, ROLL, YAW, ControlPart, balancing, meant
 
 T = TypeVar("T")
 
@@ -32,18 +34,48 @@ def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
 
 
 def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
-    """Check that the aircraft has the drives that the flight is to be trimmed with."""
-    name, drives = flight.trim_drive, aircraft.drives
-    if name is not None and name not in drives and name not in map(without_side, drives):
-        yield Fault(
-            "no_such_drive",
-            f"The aircraft has no drive {name!r} to trim with.",
-            "/flight/trim_drive",
-            f"Its drives are {', '.join(drives)}." if drives else "It has no drives: omit trim_drive.",
-        )
+    """Check that the aircraft has the drives that the flight is to be trimmed with, one for each moment."""
+    drives, taken = aircraft.drives, dict[str, str]()
+    for field, name in trim_drives(aircraft, flight).items():
+        names = meant(name, drives)
+        if not names:
+            yield Fault(
+                "no_such_drive",
+                f"The aircraft has no drive {name!r} to trim with.",
+                f"/flight/{field}",
+                f"Its drives are {', '.join(drives)}." if drives else f"It has no drives: omit {field}.",
+            )
+        for former in {taken[each]: None for each in names if each in taken}:
+            yield Fault(
+                "drive_named_twice",
+                f"The drive {name!r} cannot balance two moments.",
+                f"/flight/{field}",
+                f"It is the flight's {former} already: name another drive, or omit {field}.",
+            )
+        taken |= dict.fromkeys(names, field)
 
 
-def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -> Iterator[Fault]:
+def trim_drives(aircraft: Aircraft, flight: Flight) -> dict[str, str]:
+    """Return the names of the drives that balance moments in trim, by the fields of the flight.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    flight : Flight
+    """
+    names = control_names(aircraft.surfaces)
+    parts = [
+        ControlPart(names[number, place], surface.side, surface.dihedral_rad, control.sign(surface.side))
+        for number, surface in enumerate(aircraft.surfaces)
+        for place, control in enumerate(surface.all_controls)
+    ]
+    given = {field: getattr(flight, field) for field in (PITCH, ROLL, YAW)}
+    return balancing(given, aircraft.drives, parts, asymmetric=flight.is_lateral)
+
+
+def moved_trim_faults(
+    aircraft: Aircraft, flight: Flight, start: str | None, moved: Sequence[str]
+) -> Iterator[Fault]:
     """Check that no morph moves the drive with which its flights are trimmed.
 
     Parameters
@@ -53,14 +85,16 @@ def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -
     moved : sequence of str
         Names of the drives that the morph moves.
     """
-    both = [name for name in moved if flight.trim_drive in (name, without_side(name))]
-    if both and start != "given":
-        yield Fault(
-            "morph_of_trim_drive",
-            f"The morph moves {both[0]!r}, with which the flight is trimmed.",
-            "/flight/trim_drive",
-            "Trim with another drive, or omit trim_drive.",
-        )
+    for field, drive in trim_drives(aircraft, flight).items():
+        both = [name for name in moved if drive in (name, without_side(name))]
+        if both and start != "given":
+            instead = f"omit {field}" if field == PITCH else f'set {field} to "none"'
+            yield Fault(
+                "morph_of_trim_drive",
+                f"The morph moves {both[0]!r}, with which the flight is trimmed.",
+                f"/flight/{field}",
+                f"Trim with another drive, or {instead}.",
+            )
 
 
 def flexible_wing_faults(aircraft: Aircraft, code: str) -> Iterator[Fault]:

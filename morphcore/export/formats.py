@@ -87,7 +87,7 @@ class ExportedModel(Shown):
 
     @cached_property
     def trim(self) -> Trim:
-        """Straight level flight with the hinges at their held angles, or the flight's given start.
+        """The steady flight with the hinges at their held angles, or the flight's given start.
 
         Raises
         ------

@@ -34,7 +34,9 @@ from 0 here (in MATLAB files from 1).
     ``mass_kg`` (), ``centre_of_mass_m`` (3,), ``inertia_kg_m2`` (3, 3) about it, in B.
 ``trim``
     ``airspeed_m_s``, ``air_density_kg_m3``, ``gravity_m_s2``, ``alpha_rad`` (); ``force_n``, ``moment_nm``
-    (3,) constant, in B at the reference point, thrust included; ``joint_rad`` (j, 3); ``hinge_rad`` (h,).
+    (3,) constant, in B at the reference point, thrust included; ``joint_rad`` (j, 3); ``hinge_rad`` (h,). Of
+    a flight that is not level also ``phi_rad``, ``theta_rad`` (); ``omega_b_rad_s`` and
+    ``air_velocity_b_m_s`` (3,), rates and velocity through the air in B.
 """
 
 from __future__ import annotations
@@ -47,7 +49,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.apparent_mass import apparent_inertia
-from morphcore.geometry.aircraft import Aircraft
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
@@ -56,6 +58,7 @@ from morphcore.models.lumps import FLAT_ROWS, link_lumps
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Hold
+from morphcore.simulate.steady import air_velocity_B, pitch, rates_B
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trim import StartMode, Trim, trim
 from morphdata.export import ModelFile
@@ -75,7 +78,7 @@ def reference_trim(chain: ChainModel, batch: ParameterBatch, start: StartMode) -
     """
     plan = _reference_plan(chain, start)
     with naming_obstacles(lambda: chain_obstacle(chain, batch)):
-        return trim(chain, batch, plan, start=start).require()
+        return trim(chain, batch, plan, start=start).require(chain.flight)
 
 
 def _reference_plan(chain: ChainModel, start: StartMode) -> FlightPlan:
@@ -223,6 +226,19 @@ def _controls(aircraft: Aircraft) -> Table:
     }
 
 
+def _steady(flight: Flight, found: Trim) -> Table:
+    """Attitude, rates and motion through the air of a flight that is not level; nothing of one that is."""
+    theta, steady = pitch(flight, found.alpha, found.bank), air_velocity_B(flight, found.alpha)
+    if not (flight.climb_rad or flight.rotates or found.bank[0] or flight.sideslip_rad):
+        return {}
+    return {
+        "phi_rad": np.array(found.bank[0]),
+        "theta_rad": np.array(theta[0]),
+        "omega_b_rad_s": rates_B(flight, theta, found.bank)[0],
+        "air_velocity_b_m_s": steady[0],
+    }
+
+
 def _trim(chain: ChainModel, found: Trim, angles: Array) -> Table:
     flight = chain.flight
     force_B, moment_B = found.acting_B
@@ -231,6 +247,7 @@ def _trim(chain: ChainModel, found: Trim, angles: Array) -> Table:
         "air_density_kg_m3": np.array(flight.air_density_kg_m3),
         "gravity_m_s2": np.array(flight.gravity_m_s2),
         "alpha_rad": np.array(found.alpha[0]),
+        **_steady(flight, found),
         "force_n": force_B[0],
         "moment_nm": moment_B[0],
         "joint_rad": found.q_joint[0].reshape(-1, 3),

@@ -21,8 +21,10 @@ from morphdata import aircraft as documents
 from morphdata.controls import control_drives, control_names
 from morphdata.drives import Drive, drives_of
 from morphdata.flight import Flight as FlightDocument
+from morphdata.flight import load_factor
 from morphdata.inertia import inertia_matrix
 from morphdata.masses import PointMass
+from morphdata.trim_drives import NO_NAMES
 
 Array = NDArray[np.float64]
 
@@ -132,18 +134,25 @@ class Aircraft(Shown):
 
 @dataclass(frozen=True)
 class Start:
-    """A measured start: angle of attack (rad), constant force (N) and moment (N m) in B at its origin."""
+    """A measured start: angle of attack (rad), constant force (N) and moment (N m) in B at its origin.
+
+    ``bank_rad`` is the roll angle phi.
+    """
 
     alpha_rad: float
     force_B: Array
     moment_B: Array
+    bank_rad: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
 class Flight(Shown):
     """The flight condition: ``mach`` is None for incompressible flow, ``wind_N`` the air's velocity, m/s.
 
-    ``trim_drive`` names the drives that balance the pitching moment in trim.
+    ``trim_drive`` names the drives that balance the pitching moment in trim, ``roll_trim_drive`` and
+    ``yaw_trim_drive`` those for the others; "auto" are the aircraft's own (`simulate.trim_controls`). The
+    start is a steady flight: ``climb_rad`` of the path through the air, ``turn_rate_rad_s`` of the heading,
+    ``sideslip_rad``, or ``rates_B`` (p, q, r), rad/s.
     """
 
     airspeed_m_s: float
@@ -155,6 +164,12 @@ class Flight(Shown):
     start: Start | None
     apparent_mass: bool = False
     trim_drive: str | None = None
+    climb_rad: float = 0.0
+    turn_rate_rad_s: float = 0.0
+    sideslip_rad: float = 0.0
+    rates_B: tuple[float, ...] = (0.0, 0.0, 0.0)
+    roll_trim_drive: str = "auto"
+    yaw_trim_drive: str = "auto"
 
     @classmethod
     def of(cls, document: FlightDocument | Mapping[str, Any]) -> Flight:
@@ -175,15 +190,47 @@ class Flight(Shown):
             mach=document.mach_number,
             start=None
             if start is None
-            else Start(start.alpha_rad, _vector(start.force_b_n), _vector(start.moment_b_n_m)),
+            else Start(
+                start.alpha_rad, _vector(start.force_b_n), _vector(start.moment_b_n_m), start.bank_rad
+            ),
             apparent_mass=document.apparent_mass,
             trim_drive=document.trim_drive,
+            climb_rad=document.climb_rad,
+            turn_rate_rad_s=document.turn_rate_rad_s,
+            sideslip_rad=document.sideslip_rad,
+            rates_B=tuple(document.rates_rad_s or (0.0, 0.0, 0.0)),
+            roll_trim_drive=document.roll_trim_drive,
+            yaw_trim_drive=document.yaw_trim_drive,
         )
 
     @property
     def dynamic_pressure_pa(self) -> float:
         """q_dyn = rho V^2 / 2."""
         return 0.5 * self.air_density_kg_m3 * self.airspeed_m_s**2
+
+    @property
+    def load_factor(self) -> float:
+        """Lift over weight in the steady flight."""
+        return load_factor(self.airspeed_m_s, self.gravity_m_s2, self.climb_rad, self.turn_rate_rad_s)
+
+    @property
+    def rotates(self) -> bool:
+        """Whether the aircraft rotates in its steady flight."""
+        return bool(self.turn_rate_rad_s) or any(self.rates_B)
+
+    @property
+    def is_asymmetric(self) -> bool:
+        """Whether the steady flight differs from its mirror image."""
+        return any((self.sideslip_rad, self.turn_rate_rad_s, self.rates_B[0], self.rates_B[2]))
+
+    @property
+    def banks(self) -> bool:
+        """Whether a bank angle, not a side force, balances the forces across the flight path.
+
+        It does in asymmetric flight, and where a drive is named that trims roll or yaw.
+        """
+        named = {self.roll_trim_drive, self.yaw_trim_drive} - {*NO_NAMES}
+        return self.is_asymmetric or bool(named)
 
 
 def _named(surface: Surface, number: int, names: Mapping[tuple[int, int], str]) -> Surface:

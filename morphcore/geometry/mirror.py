@@ -112,5 +112,9 @@ def _is_symmetric(fuselage: Fuselage) -> bool:
 
 
 def _starts_straight(flight: Flight) -> bool:
+    if flight.banks:
+        return False
     start = flight.start
-    return start is None or bool(start.force_B[1] == start.moment_B[0] == start.moment_B[2] == 0.0)
+    return start is None or bool(
+        start.force_B[1] == start.moment_B[0] == start.moment_B[2] == start.bank_rad == 0.0
+    )

@@ -1,6 +1,6 @@
 """Likely reasons, from the document alone, why an aircraft does not fly: a soft wing, too little air.
 
-Estimates from beam theory and from the lift needed in level flight. They name the field to check after a trim
+Estimates from beam theory and from the lift that the flight needs. They name the field to check after a trim
 or a flight has failed; they do not reject anything themselves.
 """
 
@@ -55,14 +55,16 @@ def obstacle(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
 
 def too_little_air(aircraft: Aircraft, flight: Flight) -> Obstacle | None:
     """The flight condition as an obstacle, if no wing of that area could carry the weight in it."""
-    weight_n = _mass(aircraft) * flight.gravity_m_s2
+    factor = flight.load_factor
+    weight_n = _mass(aircraft) * flight.gravity_m_s2 * factor
     area = sum(surface.area_m2 * _share_of_lift(surface) for surface in aircraft.surfaces)
     carried = flight.dynamic_pressure_pa * area * LARGEST_LIFT_COEFFICIENT
     if weight_n <= carried:
         return None
+    needs = "weighs" if factor == 1.0 else f"needs a lift of {factor:.3g} times its weight,"
     return Obstacle(
         "/flight/airspeed_m_s",
-        f"the aircraft weighs {weight_n:.4g} N, and {area:.3g} m^2 at a dynamic pressure of "
+        f"the aircraft {needs} {weight_n:.4g} N, and {area:.3g} m^2 at a dynamic pressure of "
         f"{flight.dynamic_pressure_pa:.3g} Pa carry {carried:.3g} N at most: check airspeed_m_s, "
         "air_density_kg_m3 and the densities of the materials",
     )
@@ -86,15 +88,16 @@ def naming_obstacles(find: Callable[[], Obstacle | None]) -> Iterator[None]:
 
 
 def lift_coefficient(aircraft: Aircraft, flight: Flight) -> float:
-    """The lift coefficient of level flight, of all surfaces that carry weight; 0 without air."""
+    """The lift coefficient of the steady flight, of all surfaces that carry weight; 0 without air."""
     area = sum(surface.area_m2 * _share_of_lift(surface) for surface in aircraft.surfaces)
     carried = flight.dynamic_pressure_pa * area
-    return _mass(aircraft) * flight.gravity_m_s2 / carried if carried > 0.0 else 0.0
+    weight_n = _mass(aircraft) * flight.gravity_m_s2 * flight.load_factor
+    return weight_n / carried if carried > 0.0 else 0.0
 
 
 def load_per_length(aircraft: Aircraft, flight: Flight) -> float:
-    """The weight distributed evenly over all spans, N/m: an estimate of the lift per length."""
-    weight_n = _mass(aircraft) * flight.gravity_m_s2
+    """The steady flight's lift distributed evenly over all spans, N/m: an estimate per length."""
+    weight_n = _mass(aircraft) * flight.gravity_m_s2 * flight.load_factor
     length_m = sum(surface.length_m * _share_of_lift(surface) for surface in aircraft.surfaces)
     return weight_n / length_m if length_m > 0.0 else 0.0
 

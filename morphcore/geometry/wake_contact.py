@@ -13,15 +13,17 @@ Array = NDArray[np.float64]
 LEGS, POINTS = 33, 9  # along the span: of a trailing edge, and of the surface behind it
 
 
-def surfaces_in_wakes(aircraft: Aircraft, angles: Array, alpha_rad: float) -> list[tuple[int, int, float]]:
+def surfaces_in_wakes(
+    aircraft: Aircraft, angles: Array, alpha_rad: float, sideslip_rad: float = 0.0
+) -> list[tuple[int, int, float]]:
     """Pairs of surfaces of which the second lies behind the first, and how near to its wake it comes.
 
     Parameters
     ----------
     angles : ndarray, shape (h,)
         Of all hinges, rad.
-    alpha_rad : float
-        Angle of attack, without sideslip: the wake leaves along the stream.
+    alpha_rad, sideslip_rad : float
+        Angles of the stream, along which the wake leaves.
 
     Returns
     -------
@@ -29,7 +31,8 @@ def surfaces_in_wakes(aircraft: Aircraft, angles: Array, alpha_rad: float) -> li
         Number of the surface ahead, of the one at least a chord behind it, and the least distance from the
         wake over the mean chord of the surface ahead.
     """
-    stream = -np.array([np.cos(alpha_rad), 0.0, np.sin(alpha_rad)])
+    ahead, aside = np.cos(sideslip_rad), np.sin(sideslip_rad)
+    stream = -np.array([ahead * np.cos(alpha_rad), aside, ahead * np.sin(alpha_rad)])
     edges, points = [], []
     for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
         R_BW, r_B = surface_pose(surface, angles[own])

@@ -65,13 +65,14 @@ def wrong_aircraft(
 
 
 def start_warnings(fit: SampleFit, pointer: str) -> Iterator[ResultWarning]:
-    """Samples that do not begin in the trimmed flight that models begin in."""
+    """Samples that do not begin in the steady flight that models begin in."""
     sample = fit.case.sample
     if not np.all(np.isfinite(fit.identified[0])):
         return
     off = abs(float(sample.theta[0] - fit.identified[0, 1]))
     hint = (
-        "begin the sample in steady, level flight before the drives move, or give the start in flight.start"
+        "begin the sample in the flight's steady motion (level, unless it says otherwise) before the drives "
+        "move, or give the start in flight.start"
     )
     if off > OFF_TRIM_RAD and off > 0.1 * float(np.ptp(sample.theta)):
         yield ResultWarning(
@@ -89,7 +90,9 @@ def start_warnings(fit: SampleFit, pointer: str) -> Iterator[ResultWarning]:
     if not still or sample.time_s.size <= START_ROWS:
         return
     for name in ANGLES:
-        rate, error = _slope(sample.time_s[rows], getattr(sample, name)[rows])
+        rate, error = _slope(sample.time_s[rows], np.unwrap(getattr(sample, name)[rows]))
+        if name == "psi":
+            rate -= fit.case.turn_rate_rad_s
         if abs(rate) > max(MOVING_START_RAD_S, SIGNIFICANT * error):
             yield ResultWarning(
                 "start_off_trim",

@@ -33,6 +33,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.hinge_schedules import followed_flight, hinge_schedules, part_name
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Schedule
+from morphcore.simulate.steady import departure, pitch
 from morphcore.simulate.step_choice import choose_step
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.trajectory import Trajectory
@@ -52,12 +53,14 @@ ATTITUDE_ROWS = 7  # of the state: quaternion and body rates
 class SampleCase:
     """A sample, the plan that all flights against it share, and its readings as they are compared.
 
-    By default these are its three angles, and only the heading is free.
+    By default these are its three angles, and only the heading is free. ``turn_rate_rad_s`` is that of the
+    steady flight in which it begins.
     """
 
     sample: Trajectory
     plan: FlightPlan
     given: Measured | None = None
+    turn_rate_rad_s: float = 0.0
 
     @cached_property
     def setup(self) -> Measured:
@@ -76,6 +79,11 @@ class SampleCase:
             found = trim(flown, physical_guess(model), self.plan, start=start, follow=False)
             known[start] = not bool(found.converged.all())
         return known[start]
+
+    @cached_property
+    def motion(self) -> Array:
+        """(k, 3) departures of the sample's attitude from its steady start, rad."""
+        return departure(self.sample.euler, self.sample.time_s, self.turn_rate_rad_s)
 
     @property
     def weight(self) -> Array:
@@ -148,6 +156,7 @@ def sample_cases(
                 may_halve=not (separate_wings or any(whole[i : i + 1])),
                 start=start,
             ),
+            turn_rate_rad_s=model.flight.turn_rate_rad_s,
         )
         for i, sample in enumerate(samples)
     )
@@ -234,7 +243,9 @@ def fly_readings(
     plan, setup = case.plan, case.setup
     flown, constants, state = trimmed_flight(model, batch, case, found)
     if any(setup.openness.start_value):
-        state = moved_start(state, found.alpha, float(case.sample.psi[0]), setup.openness.start_value)
+        theta = pitch(model.flight, found.alpha, found.bank)
+        first = np.stack([found.bank, theta, np.full_like(theta, case.sample.psi[0])], axis=1)
+        state = moved_start(state, first, setup.openness.start_value)
     count = rows_needed(setup.channels, flown.coordinates)
     chunks = fly_batch(flown, plan, constants, state, record_rows=count, stop=stop)
     rows = np.concatenate([chunk.rows for chunk in chunks])
@@ -258,12 +269,15 @@ def reading_derivatives(
     return np.where(np.isfinite(columns), columns, 0.0)
 
 
-def moved_start(state: Array, alpha: Array, psi: float, change: Sequence[float]) -> Array:
-    """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`."""
+def moved_start(state: Array, euler: Array, change: Sequence[float]) -> Array:
+    """Trimmed states (p, rows) with attitude, rates and velocity off the trim, in the order of `START`.
+
+    euler : (p, 3) of the trim, rad.
+    """
     moved = state.copy()
     of = dict(zip(START, change, strict=True))
-    zero = np.zeros(alpha.size)
-    moved[:, :OMEGA] = quaternion_from_euler(zero + of["phi_rad"], alpha + of["theta_rad"], zero + psi)
+    phi, theta, psi = euler.T
+    moved[:, :OMEGA] = quaternion_from_euler(phi + of["phi_rad"], theta + of["theta_rad"], psi)
     moved[:, OMEGA:POSITION] += np.array(change[2:])
     return moved
 

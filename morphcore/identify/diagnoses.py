@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.frames import wrap_angle
 from morphcore.identify.aircraft_checks import start_warnings, wrong_aircraft
 from morphcore.identify.column_checks import MIN_MOTION_RAD, column_warnings
 from morphcore.identify.other_readings import (
@@ -115,7 +114,7 @@ def _misses_an_angle(fit: SampleFit) -> bool:
     if not np.all(np.isfinite(fit.identified)):
         return True
     errors = np.sqrt(np.mean(fit.errors("identified") ** 2, axis=0))
-    motion = np.sqrt(np.mean(wrap_angle(fit.case.sample.euler - fit.case.sample.euler[0]) ** 2, axis=0))
+    motion = np.sqrt(np.mean(fit.case.motion**2, axis=0))
     return bool(np.any(errors > np.maximum(MISSED_SHARE * motion, MIN_MOTION_RAD)))
 
 
@@ -187,7 +186,7 @@ def _drive_warnings(run: Identification, fit: SampleFit, pointer: str) -> Iterat
     if not fit.error_share() > (POOR_SHARE if run.model.links_per_wing > 1 else HALF):
         return
     given = min(attitude_cost(sample, flown) for flown in (fit.initial, fit.identified))
-    motion = float(np.sum(wrap_angle(sample.euler - sample.euler[0]) ** 2))
+    motion = float(np.sum(fit.case.motion**2))
     costs = {
         reading: attitude_cost(sample, flown_guess(run, reading.change(sample)))
         for reading in drive_readings(sample)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from morphcore.errors import NotFlyable
-from morphcore.frames import wrap_angle
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.obstacle import obstacle
 from morphcore.identify.cost import shared_trims, trimmed_flight
@@ -127,9 +126,7 @@ def _of_samples(fits: Sequence[SampleFit], *, explained: bool) -> Iterable[Resul
                     pointer,
                 )
         if not explained:
-            yield from error_warning(
-                name, pointer, fit.errors("identified"), wrap_angle(sample.euler - sample.euler[0])
-            )
+            yield from error_warning(name, pointer, fit.errors("identified"), fit.case.motion)
 
 
 def _of_bounds(
@@ -176,7 +173,10 @@ def _of_wakes(run: Identification, best: ParameterBatch, fits: Sequence[SampleFi
     trims = shared_trims(run.model, best, [fit.case for fit in fits], run.settings.start)
     for fit, (_, found) in zip(fits, trims, strict=True):
         angles, alpha = _angles(fit, aircraft)[0], float(found.alpha[0])
-        if found.converged[0] and (warnings := wake_warnings(aircraft, angles, alpha, "/aircraft/surfaces")):
+        warnings = wake_warnings(
+            aircraft, angles, alpha, "/aircraft/surfaces", sideslip_rad=run.model.flight.sideslip_rad
+        )
+        if found.converged[0] and warnings:
             return warnings
     return []
 

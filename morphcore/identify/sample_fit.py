@@ -39,7 +39,7 @@ class SampleFit(Shown):
 
         White noise is what neighbouring rows do not share: the mean product of neighbours is free of it.
         """
-        errors, motion = self.errors(model), wrap_angle(self.case.sample.euler - self.case.sample.euler[0])
+        errors, motion = self.errors(model), self.case.motion
         if not np.all(np.isfinite(errors)):
             return float("inf")
         structured = float(np.sum(errors[1:] * errors[:-1])) / (errors.shape[0] - 1)

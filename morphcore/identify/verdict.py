@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from morphcore.frames import wrap_angle
 from morphcore.identify.diagnoses import LATE_SHARE, WRONG_DATA
 from morphcore.identify.sample_fit import SampleFit
 from morphcore.validity import ResultWarning
@@ -215,7 +214,7 @@ def _judge_measurement(measurement: Mapping[str, Any]) -> Iterator[Judgement]:
 
 
 def _measure(fit: SampleFit, share: float) -> str:
-    motion = wrap_angle(fit.case.sample.euler - fit.case.sample.euler[0])
+    motion = fit.case.motion
     size = 1e3 * float(np.sqrt(np.mean(np.sum(motion**2, axis=1))))
     error = 1e3 * float(np.sqrt(np.mean(np.sum(fit.errors("identified") ** 2, axis=1))))
     percent = f"{100.0 * share:.2g} %" if share >= 1e-4 else "less than 0.01 %"

@@ -148,8 +148,8 @@ class ChainModel(Shown):
         return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images, lattice.steep)
 
     @cached_property
-    def starts(self) -> dict[bytes, tuple[float, float | None]]:
-        """Angle of attack and trim drive, rad, that were found by first angles: see simulate/wake.py."""
+    def starts(self) -> dict[bytes, tuple[float, tuple[float, ...]]]:
+        """Angle of attack and trim drives, rad, that were found by first angles: see simulate/wake.py."""
         return {}
 
     @property

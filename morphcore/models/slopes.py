@@ -36,10 +36,7 @@ def sloped_motion(model: ChainModel, batch: ParameterBatch, R_BL: Array, air_B: 
         if not (surface.twist_rad or zero_lift.any()):
             continue
         first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
-        division = np.ones((batch.particles, 1))
-        if count > 1:
-            division = batch["division"][:, model.set_of(batch)[s]]
-        slopes = twist_slopes(surface, link_edges(division, surface.length_m))
+        slopes = twist_slopes(surface, link_edges(_division(model, batch, s), surface.length_m))
         mine = slice(first, first + count)
         chord = surface.chord_W
         forward = np.einsum("pkac,c,pa->pk", R_BL[:, mine], chord, air_B)
@@ -47,6 +44,40 @@ def sloped_motion(model: ChainModel, batch: ParameterBatch, R_BL: Array, air_B: 
         motion[:, mine, 1] += slopes[..., 1] * forward
         motion[:, mine, 2] += chord[1] / chord[0] * slopes[..., 1] * forward
     return motion
+
+
+def sloped_turn(
+    model: ChainModel, batch: ParameterBatch, poses: tuple[Array, Array], air_B: Array, omega_B: Array
+) -> Array:
+    """The same of an aircraft that rotates as one with its wings.
+
+    Parameters
+    ----------
+    poses : R_BL (p, links, 3, 3) link to body components, and r_B (p, links, 3) link origins in B, m.
+    omega_B : ndarray, shape (p, 3)
+        In B, rad/s. Others as in `sloped_motion`.
+    """
+    R_BL, r_B = poses
+    velocity = np.einsum("pkac,pka->pkc", R_BL, air_B[:, None] + np.cross(omega_B[:, None], r_B))
+    turn = np.einsum("pkac,pa->pkc", R_BL, omega_B)
+    motion = np.concatenate([velocity[..., 2:], turn[..., :2]], axis=-1)
+    for s, surface in enumerate(model.aircraft.surfaces):
+        mine = slice(int(model.surfaces[s, 0]), int(model.surfaces[s, :2].sum()))
+        slopes = twist_slopes(surface, link_edges(_division(model, batch, s), surface.length_m))
+        zero_lift, chord = _zero_lift(model, batch, s)[:, None], surface.chord_W
+        forward = velocity[:, mine, :2] @ chord[:2]
+        raised = slopes[..., 1] * forward + (slopes[..., 3] + chord[0] * zero_lift) * turn[:, mine, 2]
+        motion[:, mine, 0] += (slopes[..., 0] - zero_lift) * forward + slopes[..., 2] * turn[:, mine, 2]
+        motion[:, mine, 1] += raised
+        motion[:, mine, 2] += chord[1] / chord[0] * raised
+    return motion
+
+
+def _division(model: ChainModel, batch: ParameterBatch, number: int) -> Array:
+    """Shares (p, n) of one surface's span that its links have."""
+    if model.surfaces[number, 1] == 1:
+        return np.ones((batch.particles, 1))
+    return np.asarray(batch["division"][:, model.set_of(batch)[number]])
 
 
 def _zero_lift(model: ChainModel, batch: ParameterBatch, number: int) -> Array:

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.frames import euler_from_quaternion, wrap_angle
+from morphcore.frames import euler_from_quaternion
 from morphcore.geometry.obstacle import naming_obstacles
 from morphcore.models.equivalent import ChainModel, ParameterBatch, lane_constants
 from morphcore.models.kinematics import tip_bending
@@ -22,6 +22,7 @@ from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
 from morphcore.simulate.plan import CommonPath
 from morphcore.simulate.schedule import Hold, Schedule
+from morphcore.simulate.steady import departure
 from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphcore.simulate.trim import StartMode, trim, trimmed_state
@@ -82,7 +83,7 @@ class MorphFlights:
 
     Raises
     ------
-    TrimNotFound : there is no steady level flight.
+    TrimNotFound : there is no such steady flight.
     """
 
     def __init__(
@@ -103,7 +104,7 @@ class MorphFlights:
         self.grid = time_grid(times_s, step_s)
         waiting = path.plan(model, Hold(initial_rad), replace(self.grid, steps=1))
         with naming_obstacles(partial(chain_obstacle, model, batch)):
-            found = trim(self.model, batch, waiting, start=start).require()
+            found = trim(self.model, batch, waiting, start=start).require(model.flight)
         self.alpha_rad = float(found.alpha[0])  # at the start
         self.bending = tip_bending(self.model, batch, found.q_joint)  # (1, s), at the start
         self.constants = lane_constants(self.model, batch, self.grid.step_s)
@@ -128,10 +129,10 @@ class MorphFlights:
             count = min(thread_count(), len(schedules) - first)
             in_threads(lambda part, first=first: one(first + part), count)  # type: ignore[misc]
         euler = np.stack([attitude for attitude, _ in flown])
-        departure = wrap_angle(euler - euler[:, :1])
-        lost = ~np.isfinite(departure)
+        away = departure(euler, self.times_s, self.model.flight.turn_rate_rad_s)
+        lost = ~np.isfinite(away)
         return Flown(
-            np.where(lost, DIVERGED_ANGLE, departure),
+            np.where(lost, DIVERGED_ANGLE, away),
             np.stack([torques for _, torques in flown]),
             np.asarray(lost.any(axis=(1, 2))),
         )

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.frames import wrap_angle
 from morphcore.optimise.case import MorphCase
 from morphcore.optimise.compared import ComparedFlight, best_found, compared_schedules
 from morphcore.optimise.feasible import reached
@@ -19,6 +18,7 @@ from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
+from morphcore.simulate.steady import departure
 from morphdata.measurement import ANGLE_COLUMNS
 from morphdata.optimize import Limits, Morph, Weights
 
@@ -207,7 +207,7 @@ def schedule_result(
         torque = judged and bool(bench.moved.any())  # controls have no motors
         flown = bench.fly(list(named.values()), torque=torque)
         flights[model] = {name: _compared(flown, i, judged=torque) for i, name in enumerate(named)}
-    flights["flexible"] = {item.schedule: _verified(item.euler) for item in state.verified}
+    flights["flexible"] = {item.schedule: _verified(case, item.euler) for item in state.verified}
     searched = tuple(
         sorted((f for f in state.found if f.model == "equivalent"), key=lambda item: item.duration_s)
     )
@@ -272,11 +272,11 @@ def _compared(flown: Flown, i: int, *, judged: bool) -> ComparedFlight:
     )
 
 
-def _verified(euler: Array) -> ComparedFlight | None:
+def _verified(case: MorphCase, euler: Array) -> ComparedFlight | None:
     if euler.size == 0:
         return None
-    departure = wrap_angle(euler - euler[:1])
-    return ComparedFlight(departure, float(np.sum(departure**2)), None)
+    away = departure(euler, case.times_s, case.flight.turn_rate_rad_s)
+    return ComparedFlight(away, float(np.sum(away**2)), None)
 
 
 def _attitude(flight: ComparedFlight) -> Document:

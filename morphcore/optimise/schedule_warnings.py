@@ -42,7 +42,9 @@ def schedule_warnings(
         motion = bench.motion(optimum)
         found += bending_warnings(bench.model.aircraft, bench.bending, "the trim", "/model")
         first = path_angles(case.aircraft, case.drives, np.array([case.morph.initial_rad]))[0]
-        found += wake_warnings(case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces")
+        found += wake_warnings(
+            case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces", case.flight.sideslip_rad
+        )
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
     found += light_wing_warnings(case.aircraft, case.flight)
     path = np.linspace(case.path.low_rad, case.path.high_rad, SHAPES)

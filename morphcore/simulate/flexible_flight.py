@@ -102,6 +102,7 @@ def flexible_flight(
             converged=np.array([True]),
             residual=np.array([trim.residual]),
             thrust_moment_B=trim.thrust_moment_B[None],
+            bank=np.array([trim.bank]),
         ),
         shape=shape,
         point_force={} if further is None else further.point_force(),

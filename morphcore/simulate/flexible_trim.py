@@ -1,4 +1,4 @@
-"""Static aeroelastic trim of the flexible model: level flight with bent wings in equilibrium."""
+"""Static aeroelastic trim of the flexible model: steady flight with bent wings in equilibrium."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from morphcore.multibody.beam import BeamTurnedTooFar, NodePoses, carried
 from morphcore.multibody.strain_poses import StrainPoses
 from morphcore.simulate.continuation import Continued, Root, Rules, continue_root, find_root
 from morphcore.simulate.flexible import FlexibleFlight, FlexibleState, HingePath
+from morphcore.simulate.steady import air_velocity_B, described, first_bank, pitch, rates_B
 from morphcore.simulate.trim import StartMode
 from morphcore.simulate.trim_limits import STALL_RAD, Limit, is_sound, lost, no_lift, stalled
 
@@ -30,7 +31,7 @@ LIFT_SLOPE = 2.0 * np.pi  # 1/rad: scales the balance of lift and weight to an a
 class FlexibleTrim:
     """A start: angle of attack (rad), constant force (N) and moment (N m) in B, and the state.
 
-    residual : the remaining imbalance as a displacement, rad and m. thrust_moment_B : as in
+    residual : the remaining imbalance as a displacement, rad and m. thrust_moment_B, bank : as in
     `simulate.trim.Trim`.
     """
 
@@ -40,19 +41,22 @@ class FlexibleTrim:
     state: FlexibleState
     residual: float
     thrust_moment_B: Array
+    bank: float = 0.0
 
 
 class _Balance:
     """The equations of trim: imbalance of all elements' strains and, in free trim, of lift and weight.
 
-    Unknowns are the changes of the elements' logarithms d (e, 6) from those at rest and the angle of attack.
-    An element is in balance if they are its flexibility times the loads on d.
+    Unknowns are the changes of the elements' logarithms d (e, 6) from those at rest, the angle of attack and,
+    in asymmetric flight, the bank angle, which balances the forces along y of B. An element is in balance if
+    they are its flexibility times the loads on d.
     """
 
     def __init__(self, flight: FlexibleFlight, path: HingePath, wind_N: Array, start: StartMode) -> None:
         self.flight, self.path, self.wind_N = flight, path, wind_N
         model = flight.model
         self.given = model.flight.start if start == "given" else None
+        self.banked = model.flight.banks and self.given is None
         self.area = sum(surface.area_m2 for surface in model.aircraft.surfaces)
         first = np.zeros((model.beams.nodes, 6))
         self.unbent = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
@@ -65,15 +69,32 @@ class _Balance:
         loose.setflags(write=False)
         self.loose = replace(model.beams, stiffness=loose)
         self.flexibility = np.linalg.inv(model.beams.stiffness)
+        still = self.loads(self.unbent, first, first)
+        self.weight_n = float(np.linalg.norm(self.total(self.unbent, still)[3:]))
 
     @property
     def unknowns(self) -> int:
         """Number of unknowns."""
-        return self.flight.model.beams.rest.size + (1 if self.given is None else 0)
+        return self.flight.model.beams.rest.size + (0 if self.given else 1 + self.banked)
+
+    @property
+    def begin(self) -> Array:
+        """Unknowns (n,) of unbent wings."""
+        x = np.zeros(self.unknowns)
+        if self.banked:
+            x[-1] = first_bank(self.flight.model.flight)
+        return x
+
+    def angles(self, x: Array) -> tuple[float, float]:
+        """Angle of attack and bank angle of unknowns (n,), rad."""
+        if self.given is not None:
+            return self.given.alpha_rad, self.given.bank_rad
+        count = self.flight.model.beams.rest.size
+        return float(x[count]), float(x[count + 1]) if self.banked else 0.0
 
     def loads(self, poses: NodePoses, V: Array, A: Array) -> Array:
         """Forces (n, 6) that inertia and weight require at the nodes."""
-        return self.flight.structure(poses, V, A, beams=self.loose)
+        return self.flight.structure(poses, V, A, self.wind_N, beams=self.loose)
 
     def longest(self, step: Array) -> float:
         """Share of a step of the unknowns that may be taken at once."""
@@ -108,38 +129,41 @@ class _Balance:
     def state(self, x: Array) -> tuple[FlexibleState, Array]:
         """The state for given unknowns, and the nodal forces that it requires besides the strains'."""
         flight, count = self.flight, self.flight.model.beams.rest.size
-        alpha = self.given.alpha_rad if self.given is not None else float(x[count])
-        airspeed = flight.model.flight.airspeed_m_s
-        R_NB = rotation_from_quaternion(quaternion_from_euler(0.0, alpha, 0.0))
-        V_B = np.zeros(6)
-        V_B[3:] = airspeed * np.array([np.cos(alpha), 0.0, np.sin(alpha)]) + self.wind_N @ R_NB
+        steady, (alpha, bank) = flight.model.flight, (np.array(angle) for angle in self.angles(x))
+        theta = pitch(steady, alpha, bank)
+        R_NB = rotation_from_quaternion(quaternion_from_euler(bank, theta, 0.0))
+        wind_B = self.wind_N @ R_NB
+        V_B, A_B = np.zeros((2, 6))
+        V_B[:3], V_B[3:] = rates_B(steady, theta, bank), air_velocity_B(steady, alpha) + wind_B
+        # steady relative to the air: the wind's components turn in B
+        A_B[3:] = -np.cross(V_B[:3], wind_B)
         poses = self.unbent.copy()
         self.chains.place(flight.model.beams.rest + x[:count].reshape(-1, 6), poses)
         poses.R, poses.x = np.ascontiguousarray(R_NB @ poses.R), poses.x @ R_NB.T
         V = self._rigid(poses, V_B)
-        A = np.zeros_like(V)
+        A = self._rigid(poses, A_B)
         demands = self.loads(poses, V, A)
         flight.place_lattice(poses, self.wind_N, V)
         twists = flight.sections.twists(V)
-        wind_B = self.wind_N @ R_NB
         circulation = flight.lattice.circulation(twists, wind_B)
         flight.subtract_air(circulation, twists, wind_B, demands)
         if self.given is not None:
             # the wings move with the fuselage as one: its acceleration follows from the sum of all forces
-            at_rest = self.loads(poses, np.zeros_like(V), A)
+            at_rest = self.loads(poses, np.zeros_like(V), np.zeros_like(V))
             propulsion = flight.model.aircraft.propulsion
             acting_B = self.given.moment_B + thrust_moment_B(propulsion, self.given.force_B)
             thrust = np.concatenate([acting_B, self.given.force_B])
-            defect = thrust - self.total(poses, demands)
-            A = self._rigid(poses, np.asarray(np.linalg.solve(self._inertia(poses, at_rest), defect)))
-            demands += self.loads(poses, V, A) - self.loads(poses, V, np.zeros_like(V))
+            defect, steady_A = thrust - self.total(poses, demands), A
+            change_B = np.asarray(np.linalg.solve(self._inertia(poses, at_rest), defect))
+            A = self._rigid(poses, A_B + change_B)
+            demands += self.loads(poses, V, A) - self.loads(poses, V, steady_A)
         lag = np.stack([circulation, circulation])
         return FlexibleState(poses, V, A, A.copy(), lag, circulation), demands
 
     def lift_coefficients(self, alpha: float) -> tuple[float, float]:
         """Mean lift coefficient that the weight needs, and the unbent wings' at an angle of attack, rad."""
-        x = np.zeros(self.unknowns)
-        x[-1] = alpha
+        x = self.begin
+        x[self.flight.model.beams.rest.size] = alpha
         state, demands = self.state(x)
         weight = self.loads(state.poses, state.V, state.A)
         scale = self.flight.model.flight.dynamic_pressure_pa * self.area
@@ -167,9 +191,13 @@ class _Balance:
         if self.given is not None:
             return strained.ravel()
         line_B = thrust_direction_B(model.aircraft.propulsion, x[count])
+        scale = model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE
         total = self.total(state.poses, demands)
         normal = -line_B[2] * total[3] + line_B[0] * total[5]
-        return np.append(strained, normal / (model.flight.dynamic_pressure_pa * self.area * LIFT_SLOPE))
+        if not self.banked:
+            return np.append(strained, normal / scale)
+        # banked further, the aircraft needs less force to the right
+        return np.append(strained, [normal / scale, -total[4] / self.weight_n])
 
 
 def trim_flexible(
@@ -177,11 +205,11 @@ def trim_flexible(
 ) -> FlexibleTrim:
     """Equilibrium at the path's first hinge angles, as `simulate.trim.trim` defines it.
 
-    Unknowns are the strains of all elements and the angle of attack; thrust along the flight path, side force
-    and moment follow. With ``start="given"`` they are the flight's, the unknowns are the strains, and the
-    wings share the fuselage's acceleration, which follows from the sum of all forces. Newton's method with
-    Krylov steps (`simulate.continuation`) from unbent wings; if it does not arrive straight away, the
-    equilibrium is followed from rigid wings to the wings' own stiffness.
+    Unknowns are the strains of all elements, the angle of attack and perhaps the bank angle; thrust along the
+    flight path, side force and moment follow. With ``start="given"`` they are the flight's, the unknowns are
+    the strains, and the wings share the fuselage's acceleration, which follows from the sum of all forces.
+    Newton's method with Krylov steps (`simulate.continuation`) from unbent wings; if it does not arrive
+    straight away, the equilibrium is followed from rigid wings to the wings' own stiffness.
 
     Raises
     ------
@@ -199,11 +227,12 @@ def trim_flexible(
     given, propulsion = balance.given, flight.model.aircraft.propulsion
     if given is not None:
         of_thrust_B = thrust_moment_B(propulsion, given.force_B)
-        return FlexibleTrim(given.alpha_rad, given.force_B, given.moment_B, state, root.size, of_thrust_B)
-    total = balance.total(state.poses, demands)
+        at = given.alpha_rad, given.force_B, given.moment_B
+        return FlexibleTrim(*at, state, root.size, of_thrust_B, given.bank_rad)
+    (alpha, bank), total = balance.angles(root.x), balance.total(state.poses, demands)
     of_thrust_B = thrust_moment_B(propulsion, total[3:])
     moment_B = total[:3] - of_thrust_B
-    return FlexibleTrim(float(root.x[-1]), total[3:].copy(), moment_B, state, root.size, of_thrust_B)
+    return FlexibleTrim(alpha, total[3:].copy(), moment_B, state, root.size, of_thrust_B, bank)
 
 
 def _attached(balance: _Balance) -> Root:
@@ -236,7 +265,9 @@ def _attached(balance: _Balance) -> Root:
         at, lattices = np.array([int(strip)]), model.lattice.lattices
         record = record_of(np.array([ratio]), at, np.array([upper > 0.0]), surfaces, lattices)
         limit = stalled(*record.worst(0), model.flight.airspeed_m_s)
-        raise TrimNotFound(residual=0.0, iterations=0, limit=limit.found, hint=limit.hint)
+        raise TrimNotFound(
+            residual=0.0, iterations=0, limit=limit.found, hint=limit.hint, flight=described(model.flight)
+        )
     if failure is not None:
         raise failure
     return root
@@ -244,7 +275,7 @@ def _attached(balance: _Balance) -> Root:
 
 def _equilibrium(balance: _Balance) -> Root:
     """The equilibrium on the branch that begins with rigid wings."""
-    begin = np.zeros(balance.unknowns)
+    begin = balance.begin
     rules = Rules(TOLERANCE, ACCEPTED, balance.longest)
     root = find_root(balance.imbalance, begin, rules)
     if root.straight:
@@ -259,6 +290,7 @@ def _equilibrium(balance: _Balance) -> Root:
             iterations=found.solves,
             limit=limit.found,
             hint=limit.hint,
+            flight=described(balance.flight.model.flight),
         )
     return found.root
 
@@ -267,12 +299,14 @@ def _limit(balance: _Balance, found: Continued) -> Limit:
     """What limits a trim that ended on the way from rigid wings."""
     model = balance.flight.model
     if not found.root.arrived:
-        return no_lift(*balance.lift_coefficients(STALL_RAD), model.flight.airspeed_m_s)
+        steady, coefficients = model.flight, balance.lift_coefficients(STALL_RAD)
+        return no_lift(*coefficients, steady.airspeed_m_s, steady.load_factor)
     alpha, turns = _shape(balance, found.root.x)
     most = int(np.argmax(turns))
     sound = [share for share, x in found.path if _is_sound(balance, x)]
     bent = f"the tip of {model.aircraft.surfaces[most].name!r}"
-    return lost(found.share, alpha, (bent, turns[most]), max(sound, default=0.0))
+    bank = balance.angles(found.root.x)[1]
+    return lost(found.share, alpha, (bent, turns[most]), max(sound, default=0.0), bank)
 
 
 def _is_sound(balance: _Balance, x: Array) -> bool:
@@ -284,5 +318,6 @@ def _shape(balance: _Balance, x: Array) -> tuple[float, list[float]]:
     """Angle of attack and the turn of each surface's tip against its root, rad."""
     state, model = balance.state(x)[0], balance.flight.model
     turned = [state.poses.R[a].T @ state.poses.R[b] for a, b in zip(model.roots, model.tips, strict=True)]
-    alpha = float(x[-1]) if balance.given is None else balance.given.alpha_rad
-    return alpha, [float(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))) for R in turned]
+    return balance.angles(x)[0], [
+        float(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))) for R in turned
+    ]

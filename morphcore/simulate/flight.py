@@ -38,7 +38,7 @@ from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.time_grid import STEP_S, TimeGrid, time_grid
 from morphcore.simulate.trajectory import Trajectory
 from morphcore.simulate.trim import StartMode, Trim
-from morphcore.simulate.wake import trim_columns
+from morphcore.simulate.trim_controls import trim_controls
 from morphcore.stopping import Stop
 from morphcore.validity import (
     ResultWarning,
@@ -87,7 +87,7 @@ class Simulation(Shown):
     start_tips_z : mapping of str to float
         By side, the tip of its first hinged surface at the start, m below its root.
     trim_drives : mapping of str to float
-        Angles, rad, of the flight's trim drive at the start; empty without one.
+        Angles, rad, of the flight's trim drives at the start; empty without one.
     shape : Shape or None
         Poses and edges of all surfaces at the requested times.
     strips : tuple of SurfaceStrips
@@ -109,6 +109,7 @@ class Simulation(Shown):
         return Summary(
             f"Simulation: {flown.duration_s:g} s in steps of {1e3 * self.step_s:g} ms",
             {"angle of attack at the start, rad": self.trim.alpha}
+            | ({"bank angle at the start, rad": self.trim.bank} if self.trim.bank.any() else {})
             | {f"{name} in trim, rad": np.array([angle]) for name, angle in self.trim_drives.items()},
             ("", "from", "to"),
             [
@@ -173,7 +174,7 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
         `step_choice.CANDIDATES_S` that keeps the attitude error within `step_choice.TOLERANCE_RAD` in this
         flight's smooth air.
     start : {"trim", "given"}
-        Straight level flight of this model, or the flight's measured start.
+        The flight's steady motion in equilibrium of this model, or the flight's measured start.
     environment : Environment, optional
         Gust and turbulence on top of the flight's wind.
     rng : numpy.random.Generator, optional
@@ -203,7 +204,7 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
         A schedule leaves its hinge's range or moves no drive, a channel or the surface of a point is unknown,
         or an argument is invalid.
     TrimNotFound
-        There is no steady level flight.
+        There is no such steady flight.
     FlightDiverged
         The flight left the model's domain.
 
@@ -280,7 +281,8 @@ def flight_steps(  # noqa: PLR0913 - as above
                 warnings += tuple(gust_warnings(environment, flight, grid.step_s))
                 drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
                 if start == "trim":
-                    warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0]))
+                    balanced = [control.axis for control in trim_controls(aircraft, flight)]
+                    warnings += tuple(trim_warnings(aircraft, flight, record.trim.moment_B[0], balanced))
                 tips = _start_tips(aircraft, record)
                 yield FlightStep(
                     1.0,
@@ -306,7 +308,7 @@ def _warnings(
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
         *bending_warnings(aircraft, bending, "the flight", "/model"),
-        *([] if record.bending is None else wake_warnings(aircraft, *_start(record), "/aircraft/surfaces")),
+        *([] if record.bending is None else _wake_warnings(aircraft, flight, record)),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *light_wing_warnings(aircraft, flight),
         *overlap_warnings(aircraft, record.angles),
@@ -314,9 +316,12 @@ def _warnings(
     )
 
 
-def _start(record: FlightRecord) -> tuple[Array, float]:
-    """Angles of hinges and controls at the start, and the angle of attack there, rad."""
-    return record.angles[0], float(record.trim.alpha[0])
+def _wake_warnings(aircraft: Aircraft, flight: Flight, record: FlightRecord) -> list[ResultWarning]:
+    """Surfaces in the wakes of others at the start."""
+    alpha = float(record.trim.alpha[0])
+    return wake_warnings(
+        aircraft, record.angles[0], alpha, "/aircraft/surfaces", sideslip_rad=flight.sideslip_rad
+    )
 
 
 def _is_one_of(channels: Mapping[str, Array], title: str) -> bool:
@@ -331,8 +336,8 @@ def _cell(value: float) -> str:
 
 
 def _trim_angles(aircraft: Aircraft, flight: Flight, record: FlightRecord) -> dict[str, float]:
-    """Angles of the trim drive at the start, rad, by name."""
-    columns = trim_columns(aircraft, flight.trim_drive)
+    """Angles of the trim drives at the start, rad, by name."""
+    columns = [k for control in trim_controls(aircraft, flight) for k in control.columns]
     return {aircraft.moved_parts[k].drive: float(record.angles[0, k]) for k in columns}
 
 

@@ -31,11 +31,11 @@ from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
 from morphcore.simulate.time_grid import STEP_S, TimeGrid
 from morphcore.simulate.trim import StartMode
+from morphcore.simulate.trim_controls import trim_controls
 from morphcore.simulate.wake import (
     NominalStart,
     nominal_start,
     refuse_moved_trim,
-    trim_columns,
     trimmed_schedules,
     wake_direction,
 )
@@ -186,7 +186,7 @@ def flight_plan(
     """Prepare a flight: one schedule for each of the aircraft's hinges, then one for each control, or none.
 
     The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad; None: that of the start
-    at the first hinge angles (`wake.nominal_start`), where also the trim drive is. With ``wake_alpha`` or
+    at the first hinge angles (`wake.nominal_start`), where also the trim drives are. With ``wake_alpha`` or
     ``start="given"`` all drives follow their schedules.
 
     air : gust and turbulence. They begin with the flight, whose start is trimmed in the uniform wind.
@@ -324,7 +324,7 @@ def common_path(
 
     Raises
     ------
-    InvalidInput : the trim drive is among the path's drives.
+    InvalidInput : a trim drive is among the path's drives.
     """
     chosen = None if drives is None else tuple(drives)
     path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
@@ -340,12 +340,13 @@ def common_path(
             [path_angles(model.aircraft, chosen, at)[0], path_controls(model.aircraft, chosen, at)[0]]
         )
         begin = start_at(model, first, start)
-        if begin.drive_rad is not None:
-            columns = trim_columns(model.aircraft, model.flight.trim_drive)
-            angles[:, columns[columns < angles.shape[1]]] = begin.drive_rad
+        if begin.drives_rad:
+            held = trim_controls(model.aircraft, model.flight)
+            for control, angle in zip(held, begin.drives_rad, strict=True):
+                angles[:, control.columns[control.columns < angles.shape[1]]] = angle
     if may_halve:
         model, motion = _halved(model, motion)
-    mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha)
+    mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha, model.flight.sideslip_rad)
     # a path of controls alone has one lattice
     rows = motion.angles if np.ptp(motion.angles, axis=0).any() else motion.angles[:1]
     operators = [
@@ -464,7 +465,8 @@ def _control_table(
 def _operator_table(
     model: ChainModel, motion: _Motion, spacing: float, wake_alpha: float, spacing_s: float
 ) -> OperatorTable:
-    mach, angles, wake = model.flight.mach or 0.0, motion.angles, wake_direction(wake_alpha)
+    mach, angles = model.flight.mach or 0.0, motion.angles
+    wake = wake_direction(wake_alpha, model.flight.sideslip_rad)
     moved = np.abs(np.diff(angles, axis=0))
     # a surface turns by no more than all its hinges together
     turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])

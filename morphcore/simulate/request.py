@@ -46,11 +46,15 @@ class SimulationStep:
 
 @dataclass(frozen=True, repr=False)
 class SimulationResult(Shown):
-    """A flown flight and its cost: total wall time of trim, preparation and flight, s."""
+    """A flown flight and its cost: total wall time of trim, preparation and flight, s.
+
+    ``turn_rate_rad_s`` is that of the steady flight in which it begins.
+    """
 
     model: FlightModel
     simulation: Simulation
     wall_s: float
+    turn_rate_rad_s: float = 0.0
 
     @property
     def trajectory(self) -> Trajectory:
@@ -58,13 +62,14 @@ class SimulationResult(Shown):
         return self.simulation.trajectory
 
     def to_document(self) -> Document:
-        """JSON form with the names of the API; the summary's angles are departures from the start."""
+        """JSON form with the names of the API; the summary's angles are departures from the steady start."""
         flown, trim = self.trajectory, self.simulation.trim
-        driven = bool(trim.thrust_moment_B.any())
+        driven, away = bool(trim.thrust_moment_B.any()), _departure(flown, self.turn_rate_rad_s)
         return {
             "model": model_document(self.model, self.simulation.step_s),
             "trim": {
                 "alpha_rad": float(trim.alpha[0]),
+                **({"bank_rad": float(trim.bank[0])} if trim.bank[0] else {}),
                 "force_b_n": trim.force_B[0].tolist(),
                 "moment_b_n_m": trim.moment_B[0].tolist(),
                 **({"drives_rad": dict(self.simulation.trim_drives)} if self.simulation.trim_drives else {}),
@@ -75,8 +80,8 @@ class SimulationResult(Shown):
             "drives": list(flown.drive_order),
             **self._requested(),
             "summary": {
-                "max_abs_rad": dict(zip(ANGLES, np.abs(_departure(flown)).max(axis=0).tolist(), strict=True)),
-                "variation_rad2": attitude_variation(flown),
+                "max_abs_rad": dict(zip(ANGLES, np.abs(away).max(axis=0).tolist(), strict=True)),
+                "variation_rad2": attitude_variation(flown, self.turn_rate_rad_s),
             },
             "cost": {
                 "wall_s": self.wall_s,
@@ -151,7 +156,8 @@ class SimulationRun:
         ):  # fmt: skip
             wall_s += self.clock() - begin  # excludes the caller's work between two steps
             if step.simulation is not None:
-                self._flown = SimulationResult(model, step.simulation, wall_s)
+                turn = request.flight.turn_rate_rad_s
+                self._flown = SimulationResult(model, step.simulation, wall_s, turn)
             flown_s = step.fraction * request.duration_s
             yield SimulationStep(
                 step.fraction, f"{model.kind} model: {flown_s:.2f} of {request.duration_s:g} s flown"
@@ -199,18 +205,20 @@ def model_document(model: FlightModel, step_s: float) -> Document:
     }
 
 
-def attitude_variation(trajectory: Trajectory) -> float:
-    """Sum over samples 10 ms apart of the squared departures of the Euler angles from the start, rad^2.
+def attitude_variation(trajectory: Trajectory, turn_rate_rad_s: float = 0.0) -> float:
+    """Sum over samples 10 ms apart of the squared departures of Euler angles from the steady start, rad^2.
 
     Rows at another (even) spacing are weighted by their duration.
     """
     step_s = trajectory.duration_s / (trajectory.time_s.size - 1)
-    return float(np.sum(_departure(trajectory) ** 2) * step_s / VARIATION_STEP_S)
+    return float(np.sum(_departure(trajectory, turn_rate_rad_s) ** 2) * step_s / VARIATION_STEP_S)
 
 
-def _departure(trajectory: Trajectory) -> Array:
-    """Departure of the Euler angles from the start, (k, 3) rad, unwrapped."""
-    return np.asarray(np.unwrap(trajectory.euler, axis=0) - trajectory.euler[0])
+def _departure(trajectory: Trajectory, turn_rate_rad_s: float) -> Array:
+    """Departure of the Euler angles from those of the steady flight, (k, 3) rad, unwrapped."""
+    away = np.asarray(np.unwrap(trajectory.euler, axis=0) - trajectory.euler[0])
+    away[:, 2] -= turn_rate_rad_s * (trajectory.time_s - trajectory.time_s[0])
+    return away
 
 
 def trajectory_document(trajectory: Trajectory) -> Document:

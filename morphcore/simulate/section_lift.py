@@ -17,6 +17,7 @@ from morphcore.models.equivalent import ChainModel, LaneConstants, ParameterBatc
 from morphcore.models.kernels.layout import axis_rows_of_scratch, constant_rows, link_rows_of_scratch
 from morphcore.simulate.batch import shared_numbers
 from morphcore.simulate.kernels.batch import rates_of_blocks
+from morphcore.simulate.steady import described
 from morphcore.simulate.trim import MAX_ITERATIONS, StartMode, Trim, trim, trimmed_state
 from morphcore.simulate.trim_limits import stalled
 
@@ -112,20 +113,26 @@ def require_attached(
     TrimNotFound : there is no trim, or it needs sections that stall.
     """
     if start == "given" or not stalls(model.aircraft.surfaces):
-        return found.require()
+        return found.require(model.flight)
     reached, flown = found, model
     if not found.converged.all():
         free = tuple(replace(surface, cl_max=None, cl_min=None) for surface in model.aircraft.surfaces)
         flown = replace(model, aircraft=replace(model.aircraft, surfaces=free))
         reached = trim(flown, batch, plan, start=start)
         if not reached.converged.all():
-            return found.require()
+            return found.require(model.flight)
     held = replace(plan.at_rest(), gusts=None)
     constants = lane_constants(flown, batch, plan.grid.step_s)
     states = trimmed_state(flown, batch, held, reached)
     lift = section_lifts(flown, held, constants, constants.rows[0], states)
     record = stall_record(lift, model.aircraft.surfaces, model.lattice.lattices)
     if record.ratio[0] <= 1.0:
-        return found.require()
+        return found.require(model.flight)
     limit = stalled(*record.worst(0), model.flight.airspeed_m_s)
-    raise TrimNotFound(residual=0.0, iterations=MAX_ITERATIONS, limit=limit.found, hint=limit.hint)
+    raise TrimNotFound(
+        residual=0.0,
+        iterations=MAX_ITERATIONS,
+        limit=limit.found,
+        hint=limit.hint,
+        flight=described(model.flight),
+    )

@@ -137,7 +137,9 @@ class _Tried:
 
     @cached_property
     def trimmed(self) -> Trim:
-        return trim(self.finest.flown(self.model), self.batch, self.finest, start=self.start).require()
+        return trim(self.finest.flown(self.model), self.batch, self.finest, start=self.start).require(
+            self.model.flight
+        )
 
     def _attitudes(self, grid: TimeGrid) -> Array:
         """Euler angles (steps + 1, 3) at the grid times."""

@@ -22,17 +22,19 @@ class Limit:
     hint: str
 
 
-def no_lift(needed: float, given: float, airspeed_m_s: float) -> Limit:
-    """Rigid wings find no level flight; lift coefficients needed, and given at the angle of stall."""
+def no_lift(needed: float, given: float, airspeed_m_s: float, load_factor: float = 1.0) -> Limit:
+    """Rigid wings find no such flight; lift coefficients needed, and given at the angle of stall."""
     if given < needed:
+        carried = "the weight" if load_factor == 1.0 else f"{load_factor:.3g} times the weight"
         found = (
-            f"the weight needs a mean lift coefficient of {needed:.3g}, and unbent wings give {given:.3g} at "
+            f"{carried} needs a mean lift coefficient of {needed:.3g}, and unbent wings give {given:.3g} at "
             f"an angle of attack of {STALL_RAD:g} rad, where wings stall"
         )
         if given <= 0.0:
             return Limit(found, "the surfaces do not lift upward: check their positions and hinge angles")
         least = airspeed_m_s * (needed / given) ** 0.5
-        return Limit(found, f"at that angle they carry the weight from about {least:.3g} m/s, or less mass")
+        less = "less mass" if load_factor <= 1.0 else "less mass, or turn less"
+        return Limit(found, f"at that angle they carry {carried} from about {least:.3g} m/s, or {less}")
     return Limit(
         "rigid wings could carry the weight, but the iteration for them does not arrive",
         "check whether surfaces overlap, or lie in each other's wake",
@@ -49,19 +51,19 @@ def stalled(name: str, at: float, needed: float, limit: float, airspeed_m_s: flo
     )
 
 
-def lost(share: float, alpha: float, bent: tuple[str, float], sound: float = 0.0) -> Limit:
+def lost(share: float, alpha: float, bent: tuple[str, float], sound: float = 0.0, bank: float = 0.0) -> Limit:
     """The equilibrium was followed from rigid wings to a ``share`` of their flexibility.
 
     Parameters
     ----------
     alpha : angle of attack there, rad. bent : the surface or joint that is bent most, and by how much, rad.
-    sound : the largest share on the way where no wing stalls or folds, if it is known.
+    sound : the largest share on the way where no wing stalls or folds, if it is known. bank : angle, rad.
     """
     if share <= 0.0:
         return Limit("even wings a thousand times as stiff bend away", "check the unit of the stiffness")
     found = (
         f"followed from rigid wings, the equilibrium ends at {100.0 * share:.3g} per cent of their "
-        f"flexibility, {shape(alpha, bent)}"
+        f"flexibility, {shape(alpha, bent, bank)}"
     )
     if sound > 0.0:
         return Limit(found, f"wings {_rounded_up(1.0 / sound)} times as stiff trim below both limits")
@@ -73,21 +75,23 @@ def is_sound(alpha: float, turn: float) -> bool:
     return abs(alpha) <= STALL_RAD and turn <= BENT_RAD
 
 
-def chain_limit(share: float, alpha: float, q_joint: Array) -> Limit:
+def chain_limit(share: float, alpha: float, q_joint: Array, bank: float = 0.0) -> Limit:
     """The same of a chain, from its angles (rad) at the last equilibrium found, or at the iteration's end."""
     bent = float(np.abs(q_joint).max(initial=0.0))
     if share > 0.0:
-        return lost(share, alpha, ("a joint", bent))
+        return lost(share, alpha, ("a joint", bent), bank=bank)
     if not np.isfinite(alpha) or not np.isfinite(bent):
         return Limit("the iteration left the range of numbers", "")
-    where = shape(alpha, ("a joint", bent)) if q_joint.size else shape(alpha, None)
+    where = shape(alpha, ("a joint", bent) if q_joint.size else None, bank)
     return Limit(f"the iteration ended {where}", "")
 
 
-def shape(alpha: float, bent: tuple[str, float] | None) -> str:
-    """Angle of attack and bending, rad, with what limits them."""
+def shape(alpha: float, bent: tuple[str, float] | None, bank: float = 0.0) -> str:
+    """Angle of attack, bank angle and bending, rad, with what limits them."""
     stalled = f" (wings stall at about {STALL_RAD:g})" if abs(alpha) > STALL_RAD else ""
     angle = f"with an angle of attack of {alpha:.3g} rad{stalled}"
+    if bank:
+        angle += f", banked by {bank:.3g} rad"
     if bent is None:
         return angle
     name, turn = bent

@@ -1,9 +1,9 @@
-"""The start of a flight that its lattice is built for: the wake's direction and the angle of the trim drive.
+"""The start of a flight that its lattice is built for: the wake's direction and the angles of trim drives.
 
 The tables of a plan hold the wake along one direction, that of the free stream at the trim of the rigid model
-at the plan's first hinge angles. Angle of attack and wake depend on each other, and so does the angle of a
-drive that balances the pitching moment (``flight.trim_drive``): all are found together, once for each model,
-and shared by all parameter sets of a batch.
+at the plan's first hinge angles. Angle of attack and wake depend on each other, and so do the angles of the
+drives that balance moments (`trim_controls`): all are found together, once for each model, and shared by all
+parameter sets of a batch.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput, TrimNotFound
-from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, physical_guess
 from morphcore.models.flexible import FlexibleModel
 from morphcore.simulate.schedule import HingeMotion, Schedule
 from morphcore.simulate.section_lift import require_attached
+from morphcore.simulate.steady import described
 from morphcore.simulate.trim import StartMode, trim
-from morphdata.drives import Drive, without_side
+from morphcore.simulate.trim_controls import MIN_AUTHORITY, TrimControl, no_authority, trim_controls
 
 if TYPE_CHECKING:
     from morphcore.simulate.plan import FlightPlan
@@ -36,56 +36,24 @@ TOLERANCE_RAD = (
 )
 MAX_ROUNDS = 12  # three are enough up to 20 degrees
 PROBE_RAD = 1e-3  # of the drive, for the first slope of its moment
-MIN_AUTHORITY = 1e-6  # 1/rad, slope of the moment's coefficient: below it the drive moves no lifting surface
 
 
 @dataclass(frozen=True)
 class NominalStart:
     """Where a plan starts.
 
-    alpha : angle of attack of the wake, rad. drive_rad : angle of the trim drive; None if there is none.
+    alpha : angle of attack of the wake, rad. drives_rad : angles of the trim drives, in the order of
+    `trim_controls`; none where they follow their schedules.
     """
 
     alpha: float
-    drive_rad: float | None = None
+    drives_rad: tuple[float, ...] = ()
 
 
-def wake_direction(alpha: float) -> tuple[float, float, float]:
-    """Direction (3,) of the free stream in B at an angle of attack, rad."""
-    return (-float(np.cos(alpha)), 0.0, -float(np.sin(alpha)))
-
-
-def trim_drives(aircraft: Aircraft, name: str | None) -> tuple[Drive, ...]:
-    """The drives that a name or a bare word of ``flight.trim_drive`` means; none without a name.
-
-    Raises
-    ------
-    InvalidInput
-        The aircraft has no such drive.
-    """
-    if name is None:
-        return ()
-    drives = aircraft.drives
-    found = (
-        (drives[name],)
-        if name in drives
-        else tuple(drive for drive in drives.values() if without_side(drive.name) == name)
-    )
-    if not found:
-        raise InvalidInput(
-            f"the aircraft has no drive {name!r} to trim with",
-            pointer="/flight/trim_drive",
-            hint=f"its drives are {', '.join(drives)}" if drives else "it has no drives: omit trim_drive",
-        )
-    return found
-
-
-def trim_columns(aircraft: Aircraft, name: str | None) -> NDArray[np.int64]:
-    """Numbers of the schedules of the trim drive among those of the aircraft."""
-    found = [
-        k for k, part in enumerate(aircraft.moved_parts) if name in (part.drive, without_side(part.drive))
-    ]
-    return np.array(found, dtype=np.int64)
+def wake_direction(alpha: float, sideslip: float = 0.0) -> tuple[float, float, float]:
+    """Direction (3,) of the free stream in B at an angle of attack and a sideslip, rad."""
+    ahead, aside = float(np.cos(sideslip)), float(np.sin(sideslip))
+    return (-float(np.cos(alpha)) * ahead, 0.0 - aside, -float(np.sin(alpha)) * ahead)
 
 
 @dataclass(frozen=True)
@@ -104,7 +72,7 @@ class Shifted:
 def trimmed_schedules(
     model: ChainModel | FlexibleModel, schedules: Sequence[Schedule], times_s: Array, begin: NominalStart
 ) -> list[Schedule]:
-    """Schedules of which those of the trim drive are shifted to begin at the angle found.
+    """Schedules of which those of the trim drives are shifted to begin at the angles found.
 
     Parameters
     ----------
@@ -113,49 +81,51 @@ def trimmed_schedules(
     Raises
     ------
     InvalidInput
-        A history leads the trim drive out of its range from there.
+        A history leads a trim drive out of its range from there.
     """
     out = list(schedules)
-    if begin.drive_rad is None:
+    if not begin.drives_rad:
         return out
-    for column in trim_columns(model.aircraft, model.flight.trim_drive):
-        part, own = model.aircraft.moved_parts[column], schedules[column]
-        out[column] = Shifted(own, begin.drive_rad - float(own.motion(times_s[:1]).angle[0]))
-        angle = out[column].motion(times_s).angle
-        outside = part.beyond_range(angle)
-        if outside.size:
-            raise InvalidInput(
-                f"the trim drive {part.drive} is at {begin.drive_rad:.4g} rad in trim, and its history leads "
-                f"it to {angle[outside[0]]:.4g} rad, beyond its range {part.min_rad:g}..{part.max_rad:g} rad",
-                pointer="/flight/trim_drive",
-                hint="a history of the trim drive counts from its first value: reduce it, or widen the range",
-            )
+    for control, first in zip(trim_controls(model.aircraft, model.flight), begin.drives_rad, strict=True):
+        for column in control.columns:
+            part, own = model.aircraft.moved_parts[column], schedules[column]
+            out[column] = Shifted(own, first - float(own.motion(times_s[:1]).angle[0]))
+            angle = out[column].motion(times_s).angle
+            outside = part.beyond_range(angle)
+            if outside.size:
+                raise InvalidInput(
+                    f"the trim drive {part.drive} is at {first:.4g} rad in trim, and its history leads it to "
+                    f"{angle[outside[0]]:.4g} rad, beyond its range {part.min_rad:g}..{part.max_rad:g} rad",
+                    pointer=control.pointer,
+                    hint="a trim drive's history counts from its first value: reduce it, or widen the range",
+                )
     return out
 
 
 def refuse_moved_trim(model: ChainModel, moves: Sequence[bool], start: StartMode) -> None:
-    """Refuse a lattice along a path on which the trim drive moves: its angles depend on the trim.
+    """Refuse a lattice along a path on which a trim drive moves: its angles depend on the trim.
 
     moves : whether the path moves what each schedule is for.
 
     Raises
     ------
     InvalidInput
-        The trim drive is among them.
+        A trim drive is among them.
     """
     if start == "given":
         return
-    for column in trim_columns(model.aircraft, model.flight.trim_drive):
-        if moves[column]:
-            raise InvalidInput(
-                f"the morph moves the flight's trim drive, {model.aircraft.moved_parts[column].drive}",
-                pointer="/flight/trim_drive",
-                hint="trim with another drive, or move others",
-            )
+    for control in trim_controls(model.aircraft, model.flight):
+        for column in control.columns:
+            if moves[column]:
+                raise InvalidInput(
+                    f"the morph moves the flight's trim drive, {model.aircraft.moved_parts[column].drive}",
+                    pointer=control.pointer,
+                    hint="trim with another drive, or move others",
+                )
 
 
 def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: Instant) -> NominalStart:
-    """Find the start at the first angles (h + c,), rad, of all schedules, those of the trim drive being free.
+    """Find the start at the first angles (h + c,), rad, of all schedules, those of trim drives being free.
 
     With ``start="given"`` the angle of attack is the flight's, and no drive is moved. The result is kept with
     the model.
@@ -163,80 +133,68 @@ def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: I
     Raises
     ------
     TrimNotFound
-        The rigid model has no level flight.
+        The rigid model has no such steady flight.
     InvalidInput
-        The trim drive does not exist, or would have to leave its range.
+        A trim drive does not exist, or would have to leave its range.
     """
     flight = model.flight
     if start == "given" and flight.start is not None:
         return NominalStart(flight.start.alpha_rad)
-    trim_drives(model.aircraft, flight.trim_drive)
-    columns = trim_columns(model.aircraft, flight.trim_drive)
+    controls = trim_controls(model.aircraft, flight)
     first = np.array(angles, dtype=np.float64)
-    first[columns] = 0.0  # the start does not depend on where the trim drive was before
+    for control in controls:
+        first[control.columns] = 0.0  # the start does not depend on where the trim drives were before
     key = first.tobytes()
     if key not in model.starts:
-        found = _found(model, first, columns, instant)
-        model.starts[key] = found.alpha, found.drive_rad
+        found = _found(model, first, controls, instant)
+        model.starts[key] = found.alpha, found.drives_rad
     return NominalStart(*model.starts[key])
 
 
-def _found(model: ChainModel, angles: Array, columns: NDArray[np.int64], instant: Instant) -> NominalStart:
+def _found(
+    model: ChainModel, angles: Array, controls: Sequence[TrimControl], instant: Instant
+) -> NominalStart:
     rigid, flight = model.rigid, model.flight
     area = sum(surface.area_m2 for surface in rigid.aircraft.surfaces)
     scale = flight.dynamic_pressure_pa * area * rigid.reference_surface.mean_chord_m
     if scale == 0.0:
         return NominalStart(0.0)  # without air there is no wake
-    drives, batch = trim_drives(rigid.aircraft, flight.trim_drive), physical_guess(rigid)
+    batch, axes = physical_guess(rigid), [control.axis for control in controls]
 
     def defect(x: Array) -> Array:
-        """Trimmed less assumed angle of attack, and the coefficient of the moment, at (alpha, drive)."""
+        """Trimmed less assumed angle of attack, and coefficients of moments, at (alpha, drives)."""
         moved = angles.copy()
-        moved[columns] = x[1:].sum()
+        for control, angle in zip(controls, x[1:], strict=True):
+            moved[control.columns] = angle
         plan = instant(rigid, moved, float(x[0]))
         flown = plan.flown(rigid)
         found = require_attached(flown, batch, plan, trim(flown, batch, plan), "trim")
-        return np.array([found.alpha[0] - x[0], found.moment_B[0, 1] / scale])[: x.size]
+        return np.array([found.alpha[0] - x[0], *(found.moment_B[0, axes] / scale)])
 
     # Broyden's first method: the slopes are nearly constant
-    low, high = trim_range(drives)
-    x = np.array([0.0, np.clip(0.0, low, high)])[: 2 if drives else 1]
+    low, high = (np.array([getattr(each, end) for each in controls]) for end in ("low", "high"))
+    x = np.concatenate([[0.0], np.clip(np.zeros(len(controls)), low, high)])
     f = defect(x)
-    inverse = -np.eye(x.size)
-    if drives:
-        probe = np.array([0.0, PROBE_RAD if x[1] + PROBE_RAD <= high else -PROBE_RAD])
-        slope = (defect(x + probe) - f) / probe[1]
-        if abs(slope[1]) < MIN_AUTHORITY:
-            raise no_authority(flight.trim_drive, x[1], f[1] * scale)
-        inverse = np.linalg.inv(np.array([[-1.0, slope[0]], [0.0, slope[1]]]))
+    slopes = -np.eye(x.size)
+    for k, control in enumerate(controls, start=1):
+        probe = np.zeros(x.size)
+        probe[k] = PROBE_RAD if x[k] + PROBE_RAD <= control.high else -PROBE_RAD
+        slopes[:, k] = (defect(x + probe) - f) / probe[k]
+        if abs(slopes[k, k]) < MIN_AUTHORITY:
+            raise no_authority(control, x[k], f[k] * scale)
+    inverse = np.linalg.inv(slopes)
     step = np.full(x.size, np.inf)
     for _ in range(MAX_ROUNDS):
         before, x = x, x - inverse @ f
-        beyond = bool(drives) and not low <= x[1] <= high
+        beyond = (x[1:] < low) | (x[1:] > high)
         x[1:] = np.clip(x[1:], low, high)
         step = x - before
-        if beyond and step[1] == 0.0:
-            raise no_authority(flight.trim_drive, x[1], f[1] * scale)
+        for k in np.flatnonzero(beyond & (step[1:] == 0.0)).tolist():
+            raise no_authority(controls[k], x[k + 1], f[k + 1] * scale)
         if np.abs(step).max() < TOLERANCE_RAD:
-            return NominalStart(float(x[0]), float(x[1]) if drives else None)
+            return NominalStart(float(x[0]), tuple(x[1:].tolist()))
         new = defect(x)
         moved = inverse @ (new - f)
         inverse = inverse + np.outer(step - moved, step @ inverse) / (step @ moved)
         f = new
-    raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MAX_ROUNDS)
-
-
-def trim_range(drives: Sequence[Drive]) -> tuple[float, float]:
-    """Smallest and largest angle of some drives that move together, rad."""
-    return max((d.low for d in drives), default=-np.inf), min((d.high for d in drives), default=np.inf)
-
-
-def no_authority(name: str | None, angle_rad: float, moment: float) -> InvalidInput:
-    """The error of a trim drive that cannot balance the pitching moment: at an angle some is left, N m."""
-    return InvalidInput(
-        f"the drive {name!r} cannot balance the pitching moment: at {angle_rad:.4g} rad {moment:.4g} N m are "
-        "left",
-        pointer="/flight/trim_drive",
-        hint="its authority is too small: widen the range of its hinges, move the centre of mass, enlarge "
-        "the surface or its arm, or omit trim_drive to trim by a constant moment",
-    )
+    raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MAX_ROUNDS, flight=described(flight))

@@ -138,6 +138,8 @@ def flight_table(result: Mapping[str, Any]) -> Table:
     table = new_table("what", "value", title=f"Flight of the {result['model']['kind']} model")
     table.show_header = False
     table.add_row("angle of attack at the start, rad", short(trim.get("alpha_rad")))
+    if trim.get("bank_rad"):
+        table.add_row("bank angle at the start, rad", short(trim["bank_rad"]))
     for name, angle in (trim.get("drives_rad") or {}).items():
         table.add_row(f"{name} in trim, rad", short(angle))
     for side in ("left", "right"):

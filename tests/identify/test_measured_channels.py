@@ -114,7 +114,9 @@ def started(name: str, change: tuple[float, ...]) -> Trajectory:
     ((_, found),) = shared_trims(model, truth(), [case], "trim")
     constants = lane_constants(model, truth(), case.plan.grid.step_s)
     constants.set_thrust(found.force_B, found.moment_B)
-    state = moved_start(trimmed_state(model, truth(), case.plan, found), found.alpha, 0.0, change)
+    state = moved_start(
+        trimmed_state(model, truth(), case.plan, found), np.array([[0.0, found.alpha[0], 0.0]]), change
+    )
     flight = [chunk.rows for chunk in fly_batch(model, case.plan, constants, state, record_rows=4)]
     w, x, y, z = np.concatenate(flight)[case.plan.grid.at, :, 0].T
     phi = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))

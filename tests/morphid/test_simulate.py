@@ -107,6 +107,20 @@ def test_points_and_shape_are_options(tmp_path: Path) -> None:
     assert "write --shape-times 1" in ended.output
 
 
+def test_a_climbing_turn_is_flown_from_its_document(tmp_path: Path) -> None:
+    """The example with controls turns at its rate, and shows the bank angle and its drives."""
+    out, folder = tmp_path / "turn.csv", EXAMPLES / "controls"
+    files = {"--aircraft": "aircraft.json", "--flight": "turn.json", "--schedule": "schedule.csv"}
+    words = [word for option, name in files.items() for word in (option, str(folder / name))]
+    ended = RUNNER.invoke(app, ["simulate", *words, *map(str, COARSE), "--out", str(out)])
+    assert ended.exit_code == Exit.OK, ended.output
+    assert "bank angle at the start, rad" in ended.output
+    assert "aileron_right in trim, rad" in ended.output
+    flown = load_trajectory(out)
+    assert flown.psi[5] - flown.psi[0] == pytest.approx(0.2 * (flown.time_s[5] - flown.time_s[0]), rel=1e-3)
+    assert np.tan(flown.phi[0]) == pytest.approx(20.0 * 0.2 / 9.80665, rel=0.02)
+
+
 def test_the_flexible_model_flies_too() -> None:
     """`--model flexible` bends: its tips are up before the morph, those of the rigid one are not."""
     tips = {}

@@ -121,6 +121,7 @@ function simulateCards(result) {
     facts([
       ["Model", result.model.kind],
       ["Angle of attack at the start, rad", show.number(result.trim.alpha_rad)],
+      ...(result.trim.bank_rad ? [["Bank angle at the start, rad", show.number(result.trim.bank_rad)]] : []),
       ["Left tip at the start, m up", up("left")],
       ["Right tip at the start, m up", up("right")],
       ...ANGLES.map(([angle, letter]) => [`Largest departure of ${letter}, mrad`, show.milliradians(result.summary.max_abs_rad[angle])]),

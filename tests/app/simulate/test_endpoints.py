@@ -81,6 +81,14 @@ def test_every_option_reaches_the_worker(service: RunningService) -> None:
     }
 
 
+def test_a_steady_flight_reaches_the_worker(service: RunningService) -> None:
+    """A climbing turn with a sideslip, and the drives that trim it."""
+    steady = {"climb_rad": 0.1, "turn_rate_rad_s": 0.05, "sideslip_rad": -0.02, "roll_trim_drive": "none"}
+    document = simulate_document()
+    document["flight"] = {**document["flight"], **steady}
+    assert steady.items() <= stored(service, document)["flight"].items()
+
+
 def test_parameters_reach_the_worker(service: RunningService) -> None:
     """Parameters are taken from an identification's result, or from the model in it."""
     for given in (RESULT["model"], RESULT):
@@ -195,6 +203,8 @@ BAD_FIELDS = [
     ("/model/step_s", 0.5, "/model/step_s", "less_than_equal", "at most 0.02"),
     ("/model/lattice/core/law", "none", "/model/lattice/core/law", "literal_error", "smoothed"),
     ("/duration_s", 1e4, "/duration_s", "less_than_equal", "at most 600"),
+    ("/flight/turn_rate_rad_s", 1.0, "/flight/turn_rate_rad_s", "unsteady_flight", "turn less"),
+    ("/flight/yaw_trim_drive", "rudder", "/flight/yaw_trim_drive", "no_such_drive", "sweep_right"),
     ("/output_step_s", 2.0, "/output_step_s", "too_few_rows", "3 to"),
     ("/environment/gust", {"amplitude_m_s": 3.0}, "/environment/gust/gradient_m", "missing", "Add"),
     (
