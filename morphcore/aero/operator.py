@@ -18,7 +18,9 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
   of second order elsewhere.
 - The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces and their
   wakes lie in one plane. Otherwise, or with sweep or taper, three more numbers for each strip hold it, its
-  moment, and the moment of the forces in the plane about the strip's point on the axis.
+  moment about y, and the moment of the forces in the plane about the strip's point on the axis; its moment
+  about x takes the place of X. So the force of every edge, spanwise or chordwise, acts at its middle: where
+  surfaces touch at different angles their last edges attract each other, and arms matter more than forces.
 """
 
 from __future__ import annotations
@@ -42,6 +44,7 @@ from morphcore.aero.kernels.loads import (
     MORE_OUTPUTS,
     OUTPUTS,
     STRIP_COLUMNS,
+    VORTEX_X,
 )
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
@@ -319,8 +322,12 @@ def _reduced(
             )
         if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
-            for place, (front, side) in ((0, (1.0, 1.0)), (2, edges.middles_x)):
-                loads[more + place] = edges.summed(
+            for place, (front, side) in (
+                (more, (1.0, 1.0)),
+                (more + 2, edges.middles(0)),
+                (row + 2, edges.middles(1)),
+            ):
+                loads[place] = edges.summed(
                     on_edges[1], front * edges.front[..., 1], side * edges.side[..., 1]
                 ) - edges.summed(on_edges[2], front * edges.front[..., 0], side * edges.side[..., 0])
             loads[more + 1] = edges.moment(on_edges[0])
@@ -363,11 +370,10 @@ class _Edges:
         total -= np.einsum("ijn,ij->jn", on_sides[:, :-1], self.share * side[..., 0])
         return np.asarray(total / self.width[:, None])
 
-    @property
-    def middles_x(self) -> tuple[Array, Array]:
-        """Along x of the link, the middles of the fronts and of the sides."""
-        front = 0.5 * (self.corners[:-1, :, 0, 0] + self.corners[:-1, :, 1, 0])
-        return front, 0.5 * (self.corners[:-1, :, :, 0] + self.corners[1:, :, :, 0])
+    def middles(self, axis: int) -> tuple[Array, Array]:
+        """Along an axis of the link, the middles of the fronts and of the sides."""
+        front = 0.5 * (self.corners[:-1, :, 0, axis] + self.corners[:-1, :, 1, axis])
+        return front, 0.5 * (self.corners[:-1, :, :, axis] + self.corners[1:, :, :, axis])
 
     def moment(self, flow: tuple[Array, Array]) -> Array:
         """Moment about z (spanwise, inputs) of the forces that a normal velocity makes in the plane."""
@@ -386,6 +392,8 @@ class _Edges:
         out[:, EDGE_DX], out[:, EDGE_DY] = trailing[:, 0], trailing[:, 1]
         out[:, CHORD_X], out[:, CHORD_Y] = chord_W[0], chord_W[1]
         out[:, CHORD_SLOPE] = chord_W[1] / chord_W[0]
+        vortex = self.share * self.area
+        out[:, VORTEX_X] = np.sum(vortex * self.centre_x, axis=0) / np.sum(vortex, axis=0)
         return out
 
 
