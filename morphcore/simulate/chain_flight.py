@@ -58,6 +58,7 @@ def chain_flight(
         air_velocity_N=air_velocity_N,
         may_halve=model.is_even(batch),
         wake_alpha=begin.alpha,
+        shape=begin.shape,
     )
     flown = plan.flown(model)
     found = trim(flown, batch, plan, start=start).require()
@@ -85,7 +86,7 @@ def chain_flight(
     quaternion = history[:, :OMEGA]
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, tips_z = plan.angles[at], _tips_z(flown, batch, plan, history[:, JOINTS:], at)
-    bending = tip_bending(flown, _repeated(batch, at.size), history[:, JOINTS:])
+    bending = tip_bending(flown, _repeated(batch, at.size), history[:, JOINTS:], plan.shape)
     tips_twist = _tips_twist(flown, batch, history[:, JOINTS:]) if "twist" in parts else None
     loads = _loads(flown, plan, constants, np.concatenate(states), at) if states else None
     if plan.halved and model.mirror is not None:  # the other half moved alike

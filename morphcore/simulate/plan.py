@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.operator import LatticeOperator, lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
@@ -68,7 +69,8 @@ class FlightPlan(Shown):
     aircraft : the model, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
     hinges, rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the kernels. wind_N : (steps + 1, 3)
     m/s. middle : hinges, wind and lattices between the grid times. halved : the aircraft is one half of a
-    symmetric one whose other half moves alike.
+    symmetric one whose other half moves alike. shape : of the surfaces on which the lattice was tabulated;
+    None: unbent.
     """
 
     grid: TimeGrid
@@ -81,6 +83,7 @@ class FlightPlan(Shown):
     table: OperatorTable
     middle: Middles
     halved: bool = False
+    shape: BentShape | None = None
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies this plan: the given one, or one half of it."""
@@ -166,12 +169,13 @@ def flight_plan(
     may_halve: bool = False,
     start: StartMode = "trim",
     wake_alpha: float | None = None,
+    shape: BentShape | None = None,
 ) -> FlightPlan:
     """Prepare a flight: one schedule for each of the aircraft's hinges, then one for each control, or none.
 
-    The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad; None: that of the start
-    at the first hinge angles (`wake.nominal_start`), where also the trim drive is. With ``wake_alpha`` or
-    ``start="given"`` all drives follow their schedules.
+    The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad, and the lattice is that
+    of the ``shape``; None: those of the start at the first hinge angles (`wake.nominal_start`), where also
+    the trim drive is. With ``wake_alpha`` or ``start="given"`` all drives follow their schedules.
 
     With ``may_halve``, and if the aircraft is symmetric, its hinges move alike and the air is uniform, the
     plan is for half of it: ``plan.flown(model)`` is the model to fly, provided that both wings have the same
@@ -181,13 +185,14 @@ def flight_plan(
     schedules = of_every_part(model.aircraft, schedules)
     if wake_alpha is None:
         begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
-        schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
+        schedules = trimmed_schedules(model, schedules, times, begin)
+        wake_alpha, shape = begin.alpha, begin.shape
     motion = _motion(model.aircraft, schedules, times)
     if may_halve and air_velocity_N is None:
-        model, motion = _halved(model, motion)
+        model, motion, shape = _halved(model, motion, shape)
     wind_N = None if air_velocity_N is None else air_velocity_N(times)
-    table = _operator_table(model, motion, node_spacing_rad, wake_alpha, 0.5 * grid.step_s)
-    return _plan(model, grid, motion, table, wind_N)
+    table = _operator_table(model, motion, node_spacing_rad, wake_alpha, shape, 0.5 * grid.step_s)
+    return _plan(model, grid, motion, table, shape, wind_N)
 
 
 @dataclass(frozen=True)
@@ -224,10 +229,11 @@ def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart
     return nominal_start(model, angles, start, _instant)
 
 
-def _instant(model: ChainModel, angles: Array, wake_alpha: float) -> FlightPlan:
+def _instant(model: ChainModel, angles: Array, wake_alpha: float, shape: BentShape | None) -> FlightPlan:
     """A plan of one short step with everything held at angles (h + c,), rad."""
     held = [Hold(float(angle)) for angle in angles]
-    return flight_plan(model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha)
+    grid = TimeGrid(0.0, STEP_S, 1, None)
+    return flight_plan(model, held, grid, may_halve=True, wake_alpha=wake_alpha, shape=shape)
 
 
 @dataclass(frozen=True)
@@ -240,7 +246,7 @@ class CommonPath:
     low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
     hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
     as in ``FlightPlan``. begin : the start for which the lattice was tabulated. controls : as in
-    ``ControlTable``; None without control surfaces.
+    ``ControlTable``; None without control surfaces. shape : of the surfaces, or of the half that flies.
     """
 
     low_rad: float
@@ -251,6 +257,7 @@ class CommonPath:
     halved: bool
     begin: NominalStart
     controls: Array | None = None
+    shape: BentShape | None = None
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies the plans: the given one, or one half of it."""
@@ -282,7 +289,8 @@ class CommonPath:
         schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
         moved = _motion(flown.aircraft, schedules, grid.halves_s)
         controls = _control_table(flown, self.controls, moved, 0.5 * grid.step_s)
-        return _plan(flown, grid, moved, OperatorTable(self.matrices, self.strips, position, controls))
+        table = OperatorTable(self.matrices, self.strips, position, controls)
+        return _plan(flown, grid, moved, table, self.shape)
 
 
 def common_path(
@@ -323,13 +331,15 @@ def common_path(
         if begin.drive_rad is not None:
             columns = trim_columns(model.aircraft, model.flight.trim_drive)
             angles[:, columns[columns < angles.shape[1]]] = begin.drive_rad
+    shape = begin.shape
     if may_halve:
-        model, motion = _halved(model, motion)
+        model, motion, shape = _halved(model, motion, shape)
     mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha)
     # a path of controls alone has one lattice
     rows = motion.angles if np.ptp(motion.angles, axis=0).any() else motion.angles[:1]
     operators = [
-        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake) for row in rows
+        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake, shape=shape)
+        for row in rows
     ]
     return CommonPath(
         low_rad,
@@ -340,6 +350,7 @@ def common_path(
         bool(model.lattice.images),
         begin,
         _stacked_controls(operators),
+        shape,
     )
 
 
@@ -381,6 +392,7 @@ def _plan(
     grid: TimeGrid,
     motion: _Motion,
     table: OperatorTable,
+    shape: BentShape | None,
     wind_N: Array | None = None,
 ) -> FlightPlan:
     """A plan from a motion, a table and wind at the grid's times and middles in alternation."""
@@ -405,19 +417,23 @@ def _plan(
             between,
         ),
         halved=bool(model.lattice.images),
+        shape=shape,
     )
 
 
-def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
-    """One half of an aircraft whose halves move alike, and its motion; the whole if they do not."""
+def _halved(
+    model: ChainModel, motion: _Motion, shape: BentShape | None
+) -> tuple[ChainModel, _Motion, BentShape | None]:
+    """One half of an aircraft whose halves move alike, its motion and shape; the whole if they do not."""
     mirror, half = model.mirror, model.half
     if mirror is None or half is None:
-        return model, motion
+        return model, motion, shape
     own, image = (motion.angles[:, list(side)] for side in (mirror.own_hinges, mirror.image_hinges))
     up, down = (motion.deflected[:, list(side)] for side in (mirror.own_controls, mirror.image_controls))
     if max(np.abs(own - image).max(initial=0.0), np.abs(up - down).max(initial=0.0)) > ALIKE_RAD:
-        return model, motion
-    return half, motion.columns(mirror.own_hinges, mirror.own_controls)
+        return model, motion, shape
+    own_shape = shape and tuple(shape[k] for k in mirror.own)
+    return half, motion.columns(mirror.own_hinges, mirror.own_controls), own_shape
 
 
 def _nodes(length_rad: float, spacing_rad: float) -> int:
@@ -441,7 +457,12 @@ def _control_table(
 
 
 def _operator_table(
-    model: ChainModel, motion: _Motion, spacing: float, wake_alpha: float, spacing_s: float
+    model: ChainModel,
+    motion: _Motion,
+    spacing: float,
+    wake_alpha: float,
+    shape: BentShape | None,
+    spacing_s: float,
 ) -> OperatorTable:
     mach, angles, wake = model.flight.mach or 0.0, motion.angles, wake_direction(wake_alpha)
     moved = np.abs(np.diff(angles, axis=0))
@@ -450,7 +471,7 @@ def _operator_table(
     travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
 
     def operator(row: Array) -> LatticeOperator:
-        return lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake)
+        return lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake, shape=shape)
 
     if travelled[-1] < 1e-9:
         operators = [operator(angles[0])]

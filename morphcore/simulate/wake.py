@@ -1,40 +1,50 @@
-"""The start of a flight that its lattice is built for: the wake's direction and the angle of the trim drive.
+"""The start that a flight's lattice is built for: direction of the wake, angle of the trim drive, shape.
 
 The tables of a plan hold the wake along one direction, that of the free stream at the trim of the rigid model
 at the plan's first hinge angles. Angle of attack and wake depend on each other, and so does the angle of a
 drive that balances the pitching moment (``flight.trim_drive``): all are found together, once for each model,
 and shared by all parameter sets of a batch.
+
+With ``lattice.shape = "trimmed"`` a nominal chain of many links takes the place of the rigid model, and its
+shape in trim that of the unbent surfaces: trim and shape are found in turns. They depend neither on the
+number of links nor on the parameters of the models that fly the plan, so an identification has one lattice
+for all parameter sets, and a model has the same one after it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from morphcore.aero.bent_shape import BentShape, largest_change
 from morphcore.errors import InvalidInput, TrimNotFound
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, physical_guess
 from morphcore.models.flexible import FlexibleModel
+from morphcore.models.kinematics import bent_shape, whole_joints
 from morphcore.simulate.schedule import HingeMotion, Schedule
-from morphcore.simulate.trim import StartMode, trim
+from morphcore.simulate.trim import StartMode, Trim, trim
 from morphdata.drives import Drive, without_side
 
 if TYPE_CHECKING:
     from morphcore.simulate.plan import FlightPlan
 
 Array = NDArray[np.float64]
-# a plan of one instant for angles (h + c,) of all hinges and controls, rad, and the wake's angle of attack
-Instant = Callable[[ChainModel, Array, float], "FlightPlan"]
+# a plan of one instant for angles (h + c,) of all hinges and controls, rad, the wake's angle of attack, and
+# the shape of the lattice
+Instant = Callable[[ChainModel, Array, float, BentShape | None], "FlightPlan"]
 
 TOLERANCE_RAD = (
     1e-7  # limit of the last step, which leaves a thousandth of it: the trim hardly feels the wake
 )
 MAX_ROUNDS = 12  # three are enough up to 20 degrees
 PROBE_RAD = 1e-3  # of the drive, for the first slope of its moment
+SHAPE_TOLERANCE = 1e-7  # of the last change of shape, rad and half-spans
+MAX_SHAPES = 25  # six are enough where the tip is at a third of the half-span
 MIN_AUTHORITY = 1e-6  # 1/rad, slope of the moment's coefficient: below it the drive moves no lifting surface
 
 
@@ -43,10 +53,12 @@ class NominalStart:
     """Where a plan starts.
 
     alpha : angle of attack of the wake, rad. drive_rad : angle of the trim drive; None if there is none.
+    shape : of all surfaces, on which the lattice is tabulated; None: unbent.
     """
 
     alpha: float
     drive_rad: float | None = None
+    shape: BentShape | None = None
 
 
 def wake_direction(alpha: float) -> tuple[float, float, float]:
@@ -162,66 +174,122 @@ def nominal_start(model: ChainModel, angles: Array, start: StartMode, instant: I
     Raises
     ------
     TrimNotFound
-        The rigid model has no level flight.
+        The nominal model has no level flight, or its shape does not settle.
     InvalidInput
         The trim drive does not exist, or would have to leave its range.
     """
-    flight = model.flight
-    if start == "given" and flight.start is not None:
+    flight, shaped = model.flight, model.lattice.settings.shape == "trimmed"
+    given = start == "given" and flight.start is not None
+    if given and flight.start is not None and not shaped:
         return NominalStart(flight.start.alpha_rad)
-    trim_drives(model.aircraft, flight.trim_drive)
-    columns = trim_columns(model.aircraft, flight.trim_drive)
+    if not given:
+        trim_drives(model.aircraft, flight.trim_drive)
+    columns = trim_columns(model.aircraft, None if given else flight.trim_drive)
     first = np.array(angles, dtype=np.float64)
     first[columns] = 0.0  # the start does not depend on where the trim drive was before
-    key = first.tobytes()
+    key = start.encode() + first.tobytes()
     if key not in model.starts:
-        found = _found(model, first, columns, instant)
-        model.starts[key] = found.alpha, found.drive_rad
+        found = _found(_Balance(model, first, columns, instant, "given" if given else "trim"))
+        model.starts[key] = found.alpha, found.drive_rad, found.shape
     return NominalStart(*model.starts[key])
 
 
-def _found(model: ChainModel, angles: Array, columns: NDArray[np.int64], instant: Instant) -> NominalStart:
-    rigid, flight = model.rigid, model.flight
-    area = sum(surface.area_m2 for surface in rigid.aircraft.surfaces)
-    scale = flight.dynamic_pressure_pa * area * rigid.reference_surface.mean_chord_m
-    if scale == 0.0:
-        return NominalStart(0.0)  # without air there is no wake
-    drives, batch = trim_drives(rigid.aircraft, flight.trim_drive), physical_guess(rigid)
+class _Balance:
+    """Trims of the nominal model whose wake is along the stream and whose trim drive leaves no moment."""
 
-    def defect(x: Array) -> Array:
+    def __init__(
+        self,
+        model: ChainModel,
+        angles: Array,
+        columns: NDArray[np.int64],
+        instant: Instant,
+        start: StartMode,
+    ) -> None:
+        self.shaped = model.lattice.settings.shape == "trimmed" and model.fine.joints > 0
+        self.model = model.fine if self.shaped else model.rigid
+        self.batch = physical_guess(self.model)
+        self.angles, self.columns, self.instant, self.start = angles, columns, instant, start
+        aircraft, self.flight = self.model.aircraft, self.model.flight
+        area = sum(surface.area_m2 for surface in aircraft.surfaces)
+        self.scale = self.flight.dynamic_pressure_pa * area * self.model.reference_surface.mean_chord_m
+        drives = () if start == "given" else trim_drives(aircraft, self.flight.trim_drive)
+        self.low, self.high = trim_range(drives)
+        self.drives = len(drives) > 0
+        alpha = self.flight.start.alpha_rad if start == "given" and self.flight.start is not None else 0.0
+        # angle of attack and that of the drive; inverse of their slopes, which hardly depend on the shape
+        self.x = np.array([alpha, np.clip(0.0, self.low, self.high)])[: 2 if self.drives else 1]
+        self.inverse: Array | None = None
+        self.found: Trim | None = None
+
+    def defect(self, x: Array, shape: BentShape | None) -> Array:
         """Trimmed less assumed angle of attack, and the coefficient of the moment, at (alpha, drive)."""
-        moved = angles.copy()
-        moved[columns] = x[1:].sum()
-        plan = instant(rigid, moved, float(x[0]))
-        found = trim(plan.flown(rigid), batch, plan).require()
-        return np.array([found.alpha[0] - x[0], found.moment_B[0, 1] / scale])[: x.size]
+        moved = self.angles.copy()
+        moved[self.columns] = x[1:].sum()
+        plan = self.instant(self.model, moved, float(x[0]), shape)
+        flown = plan.flown(self.model)
+        found = trim(flown, self.batch, plan, start=self.start).require()
+        if plan.halved:
+            found = replace(found, q_joint=whole_joints(self.model, found.q_joint))
+        self.found = found
+        return np.array([found.alpha[0] - x[0], found.moment_B[0, 1] / self.scale])[: x.size]
 
-    # Broyden's first method: the slopes are nearly constant
-    low, high = trim_range(drives)
-    x = np.array([0.0, np.clip(0.0, low, high)])[: 2 if drives else 1]
-    f = defect(x)
-    inverse = -np.eye(x.size)
-    if drives:
-        probe = np.array([0.0, PROBE_RAD if x[1] + PROBE_RAD <= high else -PROBE_RAD])
-        slope = (defect(x + probe) - f) / probe[1]
+    def settle(self, shape: BentShape | None) -> None:
+        """Find the start with a lattice of this shape by Broyden's first method: slopes hardly change."""
+        x = self.x
+        f = self.defect(x, shape)
+        if self.start == "given":
+            return
+        inverse = self._inverse(x, f, shape) if self.inverse is None else self.inverse
+        step = np.full(x.size, np.inf)
+        for _ in range(MAX_ROUNDS):
+            before, x = x, x - inverse @ f
+            beyond = self.drives and not self.low <= x[1] <= self.high
+            x[1:] = np.clip(x[1:], self.low, self.high)
+            step = x - before
+            if beyond and step[1] == 0.0:
+                raise no_authority(self.flight.trim_drive, x[1], f[1] * self.scale)
+            if np.abs(step).max() < TOLERANCE_RAD:
+                self.x, self.inverse = x, inverse
+                return
+            new = self.defect(x, shape)
+            moved = inverse @ (new - f)
+            inverse = inverse + np.outer(step - moved, step @ inverse) / (step @ moved)
+            f = new
+        raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MAX_ROUNDS)
+
+    def _inverse(self, x: Array, f: Array, shape: BentShape | None) -> Array:
+        """Inverse of the slopes of the defect, for the first step."""
+        if not self.drives:
+            return -np.eye(x.size)
+        probe = np.array([0.0, PROBE_RAD if x[1] + PROBE_RAD <= self.high else -PROBE_RAD])
+        slope = (self.defect(x + probe, shape) - f) / probe[1]
         if abs(slope[1]) < MIN_AUTHORITY:
-            raise no_authority(flight.trim_drive, x[1], f[1] * scale)
-        inverse = np.linalg.inv(np.array([[-1.0, slope[0]], [0.0, slope[1]]]))
-    step = np.full(x.size, np.inf)
-    for _ in range(MAX_ROUNDS):
-        before, x = x, x - inverse @ f
-        beyond = bool(drives) and not low <= x[1] <= high
-        x[1:] = np.clip(x[1:], low, high)
-        step = x - before
-        if beyond and step[1] == 0.0:
-            raise no_authority(flight.trim_drive, x[1], f[1] * scale)
-        if np.abs(step).max() < TOLERANCE_RAD:
-            return NominalStart(float(x[0]), float(x[1]) if drives else None)
-        new = defect(x)
-        moved = inverse @ (new - f)
-        inverse = inverse + np.outer(step - moved, step @ inverse) / (step @ moved)
-        f = new
-    raise TrimNotFound(residual=float(np.abs(step).max()), iterations=MAX_ROUNDS)
+            raise no_authority(self.flight.trim_drive, x[1], f[1] * self.scale)
+        return np.linalg.inv(np.array([[-1.0, slope[0]], [0.0, slope[1]]]))
+
+    def shape(self) -> BentShape:
+        """The surfaces in the last trim."""
+        assert self.found is not None  # noqa: S101 - called after `settle`
+        return bent_shape(self.model, self.batch, self.found.q_joint[0])
+
+
+def _found(balance: _Balance) -> NominalStart:
+    if balance.scale == 0.0:
+        return NominalStart(0.0)  # without air there is no wake
+    balance.settle(None)
+    shape = change = None
+    if balance.shaped:
+        shape = balance.shape()
+        for _ in range(MAX_SHAPES):
+            balance.settle(shape)
+            before, shape = shape, balance.shape()
+            change = largest_change(before, shape)
+            if change < SHAPE_TOLERANCE:
+                break
+        else:
+            raise TrimNotFound(residual=float(change or 0.0), iterations=MAX_SHAPES)
+    x = balance.x
+    return NominalStart(float(x[0]), float(x[1]) if balance.drives else None, shape)
 
 
 def trim_range(drives: Sequence[Drive]) -> tuple[float, float]:
