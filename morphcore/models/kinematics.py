@@ -110,7 +110,7 @@ def tip_bending(
     bent = tip_positions(model, batch, level, q_joint)
     from_there = tip_positions(model, batch, level, np.zeros_like(q_joint))
     for number, surface in enumerate(shape or ()):
-        if surface is not None:
+        if surface is not None and model.surfaces[number, 1] > 1:  # a rigid surface does not bend
             from_there[:, number] = surface.tip_W
     spans = np.array([surface.length_m for surface in model.aircraft.surfaces])
     return np.asarray(np.linalg.norm(bent - from_there, axis=2) / spans)

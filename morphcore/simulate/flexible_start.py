@@ -90,7 +90,8 @@ def start_flexible(
 
 def _rigid_angle(model: FlexibleModel, schedules: Sequence[Schedule], time_s: float) -> float:
     """Angle of the trim drive of the rigid model, rad; 0 if that has no trim."""
-    rigid = chain_model(model.aircraft, model.flight, 1, model.lattice.settings)
+    unbent = model.lattice.settings.model_copy(update={"shape": "undeformed"})
+    rigid = chain_model(model.aircraft, model.flight, 1, unbent)
     angles = np.array([each.motion([time_s]).angle[0] for each in schedules])
     try:
         return start_at(rigid, angles, "trim").drive_rad or 0.0
