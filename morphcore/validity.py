@@ -199,7 +199,7 @@ def bending_warnings(
     """Wings bent further from the shape of their lattice than it is good for.
 
     Trims of Patil's wing as a chain, with the tables against a fresh lattice on the bent chain
-    (tests/simulate/test_bending_warning.py): on unbent wings the thrust is too large by 0.5, 1.4, 2.3, 3.4
+    (tests/simulate/test_trimmed_shape.py): on unbent wings the thrust is too large by 0.5, 1.4, 2.3, 3.4
     and 5 per cent at a tip deflection of 5, 13, 20, 27 and 36 per cent of the span, the angle of attack by
     0.1, 0.25, 0.4, 0.7 and 1 mrad; on wings bent as in trim by a tenth of that.
 
