@@ -23,6 +23,9 @@ CoreLaw = Literal["line", "smoothed"]
 CORE_LAWS: tuple[CoreLaw, ...] = get_args(CoreLaw)
 
 
+LatticeShape = Literal["undeformed", "trimmed"]
+
+
 class VortexCore(Document):
     """Law that keeps the velocity of a vortex finite: a factor of the distance, or a cut-off."""
 
@@ -53,11 +56,21 @@ class Lattice(Document):
         default=10, ge=4, le=20, description="Lattice panels along the span."
     )
     core: VortexCore = VortexCore()
+    shape: Annotated[LatticeShape, Option("--lattice-shape", MODEL)] = Field(
+        default="undeformed",
+        description="Wings on which the lattice of rigid and equivalent models is tabulated: undeformed, or "
+        "bent as in trim, for slender wings. That of the flexible model follows its wings.",
+    )
 
     def to_document(self) -> dict[str, Any]:
         """Return the JSON form, with the effective core fraction."""
         core = {"law": self.core.law, "fraction": self.core.radius_fraction}
-        return {"chordwise": self.chordwise, "spanwise": self.spanwise, "core": core}
+        return {
+            "chordwise": self.chordwise,
+            "spanwise": self.spanwise,
+            "core": core,
+            "shape": self.shape,
+        }
 
 
 DEFAULT_CORE = VortexCore()

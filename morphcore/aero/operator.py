@@ -1,10 +1,11 @@
 r"""The lattice of a whole aircraft, reduced to an operator on the links' motion.
 
-With the lattice frozen on the undeformed surfaces (at their hinge angles) and its wake along a fixed
-direction, the circulations are linear in the normal velocity of the structure, and on a flat link that
-velocity is ``w(x) = D0 + D1 x`` along each strip. So the whole lattice is one matrix from (D0, D1) of the
-strips to five numbers for each strip (rows as listed in aero/kernels/loads.py), from which the forces on all
-bound edges follow. On swept surfaces x is measured along the chord, which is oblique in the axes of the link.
+With the lattice frozen on the undeformed surfaces (at their hinge angles), or on those bent as in trim
+(`bent_shape`), and its wake along a fixed direction, the circulations are linear in the normal velocity of
+the structure, and on a flat link that velocity is ``w(x) = D0 + D1 x`` along each strip. So the whole lattice
+is one matrix from (D0, D1) of the strips to five numbers for each strip (rows as listed in
+aero/kernels/loads.py), from which the forces on all bound edges follow. On swept surfaces x is measured along
+the chord, which is oblique in the axes of the link.
 
 Kutta-Joukowski on a ring of circulation G in the flow U = induced velocity - velocity of the structure:
 
@@ -18,7 +19,9 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
   of second order elsewhere.
 - The velocity induced in the plane of the surface gives a normal force. It vanishes if all surfaces and their
   wakes lie in one plane. Otherwise, or with sweep or taper, three more numbers for each strip hold it, its
-  moment, and the moment of the forces in the plane about the strip's point on the axis.
+  moment about y, and the moment of the forces in the plane about the strip's point on the axis; its moment
+  about x takes the place of X. So the force of every edge, spanwise or chordwise, acts at its middle: where
+  surfaces touch at different angles their last edges attract each other, and arms matter more than forces.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.kernels.loads import (
     CENTRE_X,
     CHORD_SLOPE,
@@ -42,6 +46,7 @@ from morphcore.aero.kernels.loads import (
     MORE_OUTPUTS,
     OUTPUTS,
     STRIP_COLUMNS,
+    VORTEX_X,
 )
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
@@ -114,12 +119,13 @@ class AircraftLattice:
 
     @property
     def has_more_outputs(self) -> bool:
-        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are oblongs in one plane, wake too."""
+        """Whether strips need `MORE_OUTPUTS`: unless all surfaces are unbent oblongs in a plane, wake too."""
         surfaces = self.aircraft.surfaces
         turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
         heights = {surface.position_m[2] for surface in surfaces}
         oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
-        return self.steep or turns or len(heights) > 1 or not oblong
+        bent = self.settings.shape == "trimmed"
+        return self.steep or bent or turns or len(heights) > 1 or not oblong
 
     @cached_property
     def paired(self) -> NDArray[np.bool_]:
@@ -189,8 +195,13 @@ def lattice_operator(
     *,
     mach: float = 0.0,
     wake_direction_B: Sequence[float] = BODY_AFT,
+    shape: BentShape | None = None,
 ) -> LatticeOperator:
-    """The reduced operator for given angles (h,) of all hinges, rad."""
+    """The reduced operator for given angles (h,) of all hinges, rad.
+
+    ``shape`` of the surfaces, on which they induce velocities on each other; None: unbent. Strips' own axes
+    and edges are those of the links on which they ride.
+    """
     aircraft, angles = lattice.aircraft, np.asarray(hinge_rad, dtype=np.float64)
     if angles.shape != (len(aircraft.hinges),):
         raise ValueError(f"{angles.size} angles for {len(aircraft.hinges)} hinges")
@@ -198,61 +209,77 @@ def lattice_operator(
         surface_pose(surface, angles[own])
         for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
     ]
-    corners, controls, fronts, sides = [], [], [], []
-    for (R_BW, r_B), part in zip(poses, lattice.lattices, strict=True):
-        ring = part.ring_corners_W @ R_BW.T + r_B
+    corners, controls, fronts, sides, axes = [], [], [], [], []
+    for surface, bent, (R_BW, r_B), part in zip(
+        aircraft.surfaces, shape or [None] * len(poses), poses, lattice.lattices, strict=True
+    ):
+        ring_W, control_W, own = part.ring_corners_W, part.control_points_W, R_BW[None]
+        if bent is not None:
+            ring_W, control_W, R_WS = bent.placed(part, surface.elastic_axis_W)
+            own = R_BW @ R_WS
+        ring = ring_W @ R_BW.T + r_B
+        axes.append(own)
         corners.append(ring.reshape(-1, 3))
-        controls.append((part.control_points_W @ R_BW.T + r_B).reshape(-1, 3))
+        controls.append((control_W @ R_BW.T + r_B).reshape(-1, 3))
         fronts.append((0.5 * (ring[:-1, :-1] + ring[:-1, 1:])).reshape(-1, 3))
         sides.append((0.5 * (ring[:-1] + ring[1:])).reshape(-1, 3))
     corners += [ring * ACROSS for ring in corners if lattice.images]
-    groups = (controls, fronts, sides)
-    points = np.concatenate([part for group in groups for part in group])
+    points = np.concatenate([part for group in (controls, fronts, sides) for part in group])
     velocity = influence(
         points, np.concatenate(corners), lattice.table, wake_direction_B, lattice.settings.core, mach
     )
-    normal = _at_points(poses, groups, 2)
     rings = lattice.rings
 
-    def along(direction: Array) -> Array:
-        """Component (points, rings) of the induced velocity along a direction at each point."""
+    def along(axis: int, neighbour: int = 0) -> Array:
+        """Induced velocity (points, rings) along an axis of the strips; ``neighbour`` as in `_at_points`."""
+        direction = _at_points(lattice, axes, axis, neighbour)
         induced = np.einsum("pa,arp->pr", direction, velocity)
         # an image has the circulation of its original
         return np.asarray(induced[:, :rings] + induced[:, rings:] if lattice.images else induced)
 
-    induced = along(normal)
+    induced = along(2)
     circulation = np.asarray(np.linalg.solve(induced[:rings], _boundary(lattice)), np.float64)
-    flow = [induced[rings:] @ circulation]
+    rootward = [induced[rings:] @ circulation]
     if lattice.has_more_outputs:
-        flow += [along(_at_points(poses, groups, axis))[rings:] @ circulation for axis in (0, 1)]
-    return _reduced(lattice, circulation, flow, _uniform_flows(lattice, poses))
+        rootward += [along(axis)[rings:] @ circulation for axis in (0, 1)]
+    tipward = rootward
+    if shape is not None:
+        tipward = [along(axis, 1)[rings:] @ circulation for axis in (2, 0, 1)]
+    flow = list(zip(rootward, tipward, strict=True))
+    return _reduced(lattice, circulation, flow, _uniform_flows(lattice, axes))
 
 
-def _at_points(poses: Sequence[tuple[Array, Array]], groups: Sequence[Sequence[Array]], axis: int) -> Array:
-    """One of the wing axes (points, 3) in B at each point of some groups of points of all surfaces."""
-    return np.concatenate(
-        [
-            np.repeat(R_BW[None, :, axis], part.shape[0], axis=0)
-            for group in groups
-            for (R_BW, _), part in zip(poses, group, strict=True)
-        ]
-    )
+def _at_points(lattice: AircraftLattice, axes: Sequence[Array], axis: int, neighbour: int) -> Array:
+    """One axis (points, 3) of the strips in B at control points, fronts and sides of all surfaces.
+
+    axes : (strips, 3, 3) of each surface's strips, or (1, 3, 3) of a straight one. neighbour : 0, at a side
+    the axes of the strip whose root side it is; 1, of the one whose tip side it is.
+    """
+    panels, sides = [], []
+    for own, part in zip(axes, lattice.lattices, strict=True):
+        beside = np.clip(np.arange(part.spanwise + 1) - neighbour, 0, part.spanwise - 1)
+        direction = np.broadcast_to(own[:, :, axis], (part.spanwise, 3))
+        panels.append(np.tile(direction, (part.chordwise, 1)))
+        sides.append(np.tile(direction[beside], (part.chordwise, 1)))
+    return np.concatenate([*panels, *panels, *sides])
 
 
-def _uniform_flows(lattice: AircraftLattice, poses: Sequence[tuple[Array, Array]]) -> list[Array]:
+def _uniform_flows(lattice: AircraftLattice, axes: Sequence[Array]) -> list[Array]:
     """Normal velocities (strips,) of all strips, for each surface, in a uniform flow normal to it.
 
-    Other surfaces meet that flow by the cosine between the normals. Mirror images meet it alike, as in an
-    aircraft of which only one half is computed.
+    Other surfaces, and a bent one's own strips, meet that flow by the cosine between the normals. Mirror
+    images meet it alike, as in an aircraft of which only one half is computed. axes : as in `_at_points`.
     """
-    counts = [part.spanwise for part in lattice.lattices]
-    normals = np.stack([R_BW[:, 2] for R_BW, _ in poses])
+    rows = [len(own) for own in axes]
+    counts = [part.spanwise // count for part, count in zip(lattice.lattices, rows, strict=True)]
+    normals, alike = np.concatenate([own[:, :, 2] for own in axes]), np.repeat(lattice.paired, rows)
     flows = []
-    for normal, paired in zip(normals, lattice.paired, strict=True):
+    for own, paired in zip(axes, lattice.paired, strict=True):
+        normal = own[0, :, 2]
         met = normals @ normal
         if paired:
-            met = np.where(lattice.paired, np.maximum(met, (normals * ACROSS) @ normal), met)
-        flows.append(np.repeat(met, counts))
+            met = np.where(alike, np.maximum(met, (normals * ACROSS) @ normal), met)
+        flows.append(np.repeat(met, np.repeat(counts, rows)))
     return flows
 
 
@@ -280,11 +307,15 @@ def _boundary(lattice: AircraftLattice) -> Array:
 
 
 def _reduced(
-    lattice: AircraftLattice, circulation: Array, flow: Sequence[Array], uniform_flows: Sequence[Array]
+    lattice: AircraftLattice,
+    circulation: Array,
+    flow: Sequence[tuple[Array, Array]],
+    uniform_flows: Sequence[Array],
 ) -> LatticeOperator:
     """The operator from circulations (rings, inputs) and what they induce at fronts and sides.
 
-    flow : normal velocity (points, inputs); if it has further outputs, also those along x and y of W.
+    flow : normal velocity (points, inputs); if it has further outputs, also those along x and y. In the axes
+    of the strip whose root side a side is, and in those of the one whose tip side it is.
     uniform_flows : of `_uniform_flows`, in which a surface has its chordwise distribution of circulation.
     """
     motions = 2 * lattice.strips
@@ -301,8 +332,12 @@ def _reduced(
         gamma = circulation[fronts].reshape(*shape, inputs)
         reference = (circulation[fronts, :motions:2] * uniform).sum(axis=1).reshape(shape)
         on_edges = [
-            (each[fronts].reshape(*shape, inputs), each[sides].reshape(part.chordwise, -1, inputs))
-            for each in flow
+            (
+                root[fronts].reshape(*shape, inputs),
+                root[sides].reshape(part.chordwise, -1, inputs)[:, :-1],
+                tip[sides].reshape(part.chordwise, -1, inputs)[:, 1:],
+            )
+            for root, tip in flow
         ]
         ring, side0 = fronts.stop, sides.stop
         edges = _edges(surface, part, reference / reference[-1])
@@ -319,8 +354,12 @@ def _reduced(
             )
         if lattice.has_more_outputs:
             more = lattice.more_rows(strip0) + MORE_OUTPUTS * np.arange(part.spanwise)
-            for place, (front, side) in ((0, (1.0, 1.0)), (2, edges.middles_x)):
-                loads[more + place] = edges.summed(
+            for place, (front, side) in (
+                (more, (1.0, 1.0)),
+                (more + 2, edges.middles(0)),
+                (row + 2, edges.middles(1)),
+            ):
+                loads[place] = edges.summed(
                     on_edges[1], front * edges.front[..., 1], side * edges.side[..., 1]
                 ) - edges.summed(on_edges[2], front * edges.front[..., 0], side * edges.side[..., 0])
             loads[more + 1] = edges.moment(on_edges[0])
@@ -351,25 +390,24 @@ class _Edges:
     width: Array
     sign: float
 
-    def summed(self, flow: tuple[Array, Array], front: Array, side: Array) -> Array:
+    def summed(self, flow: tuple[Array, Array, Array], front: Array, side: Array) -> Array:
         """Sum (spanwise, inputs) over a strip's edges of velocity times weight, by their circulation.
 
-        flow : velocities on fronts and sides, (chordwise, spanwise or spanwise + 1, inputs); front, side :
-        weights, (chordwise, spanwise) and (chordwise, spanwise, 2). Per width of the strip.
+        flow : velocities on fronts, root and tip sides, (chordwise, spanwise, inputs); front, side : weights,
+        (chordwise, spanwise) and (chordwise, spanwise, 2). Per width of the strip.
         """
-        on_fronts, on_sides = flow
+        on_fronts, on_roots, on_tips = flow
         total = np.einsum("ijn,ij->jn", on_fronts, self.bound * front)
-        total += np.einsum("ijn,ij->jn", on_sides[:, 1:], self.share * side[..., 1])
-        total -= np.einsum("ijn,ij->jn", on_sides[:, :-1], self.share * side[..., 0])
+        total += np.einsum("ijn,ij->jn", on_tips, self.share * side[..., 1])
+        total -= np.einsum("ijn,ij->jn", on_roots, self.share * side[..., 0])
         return np.asarray(total / self.width[:, None])
 
-    @property
-    def middles_x(self) -> tuple[Array, Array]:
-        """Along x of the link, the middles of the fronts and of the sides."""
-        front = 0.5 * (self.corners[:-1, :, 0, 0] + self.corners[:-1, :, 1, 0])
-        return front, 0.5 * (self.corners[:-1, :, :, 0] + self.corners[1:, :, :, 0])
+    def middles(self, axis: int) -> tuple[Array, Array]:
+        """Along an axis of the link, the middles of the fronts and of the sides."""
+        front = 0.5 * (self.corners[:-1, :, 0, axis] + self.corners[:-1, :, 1, axis])
+        return front, 0.5 * (self.corners[:-1, :, :, axis] + self.corners[1:, :, :, axis])
 
-    def moment(self, flow: tuple[Array, Array]) -> Array:
+    def moment(self, flow: tuple[Array, Array, Array]) -> Array:
         """Moment about z (spanwise, inputs) of the forces that a normal velocity makes in the plane."""
         front = 0.5 * (self.corners[:-1, :, 0] + self.corners[:-1, :, 1])
         side = 0.5 * (self.corners[:-1] + self.corners[1:])
@@ -386,6 +424,8 @@ class _Edges:
         out[:, EDGE_DX], out[:, EDGE_DY] = trailing[:, 0], trailing[:, 1]
         out[:, CHORD_X], out[:, CHORD_Y] = chord_W[0], chord_W[1]
         out[:, CHORD_SLOPE] = chord_W[1] / chord_W[0]
+        vortex = self.share * self.area
+        out[:, VORTEX_X] = np.sum(vortex * self.centre_x, axis=0) / np.sum(vortex, axis=0)
         return out
 
 

@@ -160,9 +160,9 @@ def _of_bending(run: Identification, best: ParameterBatch, fits: Sequence[Sample
     trims = shared_trims(run.model, best, [fit.case for fit in fits], run.settings.start)
     for number, (fit, (case, found)) in enumerate(zip(fits, trims, strict=True)):
         flown = case.plan.flown(run.model)
-        bending = tip_bending(flown, best, found.q_joint)[found.converged]
-        name = f"the trim of sample {fit.case.sample.name!r}"
-        if warnings := bending_warnings(flown.aircraft, bending, name, f"/samples/{number}"):
+        bending = tip_bending(flown, best, found.q_joint, case.plan.shape)[found.converged]
+        name, shape = f"the trim of sample {fit.case.sample.name!r}", flown.lattice.settings.shape
+        if warnings := bending_warnings(flown.aircraft, bending, name, f"/samples/{number}", shape):
             return warnings
     return []
 

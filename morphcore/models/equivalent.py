@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.kernels.loads import L_MOMENT
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.aero.vlm import prandtl_glauert
@@ -40,6 +41,7 @@ IntArray = NDArray[np.int64]
 # Lift coefficient from which the lattice accounts for the velocity that the wake induces along wings of one
 # plane: without it, 0.05 per cent of the angle of attack and 0.07 of the thrust at 0.38, 0.2 and 0.6 at 0.7
 STEEP_LIFT = 0.45
+FINE_LINKS = 8  # of a chain that stands for the beams: its nominal tip deflects by 0.3 per cent less
 
 
 @dataclass(frozen=True, repr=False)
@@ -148,8 +150,16 @@ class ChainModel(Shown):
         return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images, lattice.steep)
 
     @cached_property
-    def starts(self) -> dict[bytes, tuple[float, tuple[float, ...]]]:
-        """Angle of attack and trim drives, rad, that were found by first angles: see simulate/wake.py."""
+    def fine(self) -> ChainModel:
+        """A chain of the same aircraft whose nominal parameters represent the beams: it bends as they do."""
+        lattice = self.lattice
+        return _chain_model(
+            self.aircraft, self.flight, FINE_LINKS, lattice.settings, lattice.images, lattice.steep
+        )
+
+    @cached_property
+    def starts(self) -> dict[bytes, tuple[float, tuple[float, ...], BentShape | None]]:
+        """Angle of attack and trim drives, rad, and shape, found by first angles: see simulate/wake.py."""
         return {}
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.bent_shape import BentShape, BentSurface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges
 from morphcore.multibody.kernels.hinge import H_ORIGIN, HINGE_ROWS
@@ -105,10 +106,33 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
     return tips
 
 
-def tip_bending(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Array:
-    """Displacement (p, s) of the tips by the joints' angles q_joint (p, coordinates), over the span."""
+def tip_bending(
+    model: ChainModel, batch: ParameterBatch, q_joint: Array, shape: BentShape | None = None
+) -> Array:
+    """Displacement (p, s) of the tips by the joints' angles q_joint (p, coordinates), over the span.
+
+    shape : from which it is measured, that of the lattice; None: unbent.
+    """
     level = level_hinges(model)
     bent = tip_positions(model, batch, level, q_joint)
-    straight = tip_positions(model, batch, level, np.zeros_like(q_joint))
+    from_there = tip_positions(model, batch, level, np.zeros_like(q_joint))
+    for number, surface in enumerate(shape or ()):
+        if surface is not None and model.surfaces[number, 1] > 1:  # a rigid surface does not bend
+            from_there[:, number] = surface.tip_W
     spans = np.array([surface.length_m for surface in model.aircraft.surfaces])
-    return np.asarray(np.linalg.norm(bent - straight, axis=2) / spans)
+    return np.asarray(np.linalg.norm(bent - from_there, axis=2) / spans)
+
+
+def bent_shape(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> BentShape:
+    """The surfaces of one parameter set with its joints at angles (coordinates,), rad, hinges apart."""
+    R_WL, r_W = link_poses(model, batch, level_hinges(model), q_joint[None])
+    chosen = model.set_of(batch)
+    shape: list[BentSurface | None] = []
+    for number, (surface, row) in enumerate(zip(model.aircraft.surfaces, model.surfaces, strict=True)):
+        mine = slice(int(row[0]), int(row[0] + row[1]))
+        if row[1] == 1:
+            shape.append(None)
+            continue
+        edges = link_edges(batch["division"][:, chosen[number]], surface.length_m)[0]
+        shape.append(BentSurface(edges, R_WL[0, mine], r_W[0, mine], surface.span_sign))
+    return tuple(shape)

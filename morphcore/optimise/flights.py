@@ -106,7 +106,7 @@ class MorphFlights:
         with naming_obstacles(partial(chain_obstacle, model, batch)):
             found = trim(self.model, batch, waiting, start=start).require(model.flight)
         self.alpha_rad = float(found.alpha[0])  # at the start
-        self.bending = tip_bending(self.model, batch, found.q_joint)  # (1, s), at the start
+        self.bending = tip_bending(self.model, batch, found.q_joint, path.shape)  # (1, s), at the start
         self.constants = lane_constants(self.model, batch, self.grid.step_s)
         self.constants.set_thrust(*found.acting_B)
         self.state = trimmed_state(self.model, batch, waiting, found)

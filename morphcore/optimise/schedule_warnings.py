@@ -40,7 +40,9 @@ def schedule_warnings(
     if optimum is not None and flown is not None and flown.variation is not None:
         bench = case.flights("equivalent")
         motion = bench.motion(optimum)
-        found += bending_warnings(bench.model.aircraft, bench.bending, "the trim", "/model")
+        found += bending_warnings(
+            bench.model.aircraft, bench.bending, "the trim", "/model", case.lattice.shape
+        )
         first = path_angles(case.aircraft, case.drives, np.array([case.morph.initial_rad]))[0]
         found += wake_warnings(
             case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces", case.flight.sideslip_rad

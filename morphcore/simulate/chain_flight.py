@@ -62,6 +62,7 @@ def chain_flight(
         air=air,
         may_halve=model.is_even(batch),
         wake_alpha=begin.alpha,
+        shape=begin.shape,
     )
     flown = plan.flown(model)
     found = require_attached(flown, batch, plan, trim(flown, batch, plan, start=start), start)
@@ -92,7 +93,7 @@ def chain_flight(
     velocity_N = np.einsum("kij,kj->ki", rotation_from_quaternion(quaternion), history[:, VELOCITY:POSITION])
     angles, hinges, q_joint = plan.angles[at], plan.hinges[at], history[:, JOINTS:]
     below = tips_z(flown, batch, hinges, q_joint[None])[0]
-    bending = tip_bending(flown, batch.select(np.zeros(at.size, dtype=np.int64)), q_joint)
+    bending = tip_bending(flown, batch.select(np.zeros(at.size, dtype=np.int64)), q_joint, plan.shape)
     twist = tips_twist(flown, batch, q_joint[None])[0] if "twist" in outputs.parts else None
     reported = np.concatenate(states) if states else np.zeros((0, wanted))
     loads, points = _loads(flown, batch, plan, constants, reported, at, outputs)

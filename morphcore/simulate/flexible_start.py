@@ -134,7 +134,8 @@ def _scale(model: FlexibleModel) -> float:
 
 def _rigid_angles(model: FlexibleModel, schedules: Sequence[Schedule], time_s: float, count: int) -> Array:
     """Angles of the trim drives of the rigid model, rad; 0 if that has no trim."""
-    rigid = chain_model(model.aircraft, model.flight, 1, model.lattice.settings)
+    unbent = model.lattice.settings.model_copy(update={"shape": "undeformed"})
+    rigid = chain_model(model.aircraft, model.flight, 1, unbent)
     angles = np.array([each.motion([time_s]).angle[0] for each in schedules])
     try:
         return np.array(start_at(rigid, angles, "trim").drives_rad or np.zeros(count))

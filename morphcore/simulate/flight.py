@@ -56,7 +56,7 @@ from morphcore.validity import (
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
 from morphdata.flight import Flight as FlightDocument
-from morphdata.lattice import DEFAULT_LATTICE, Lattice
+from morphdata.lattice import DEFAULT_LATTICE, Lattice, LatticeShape
 from morphdata.points import Point
 from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.csv_table import write_table
@@ -180,7 +180,7 @@ def simulate(  # noqa: PLR0913 - each argument is one condition of the flight
     rng : numpy.random.Generator, optional
         Source of the turbulence.
     lattice : Lattice
-        Panels of each surface and core of their vortices.
+        Panels of each surface, core of their vortices, and the wings on which it is tabulated.
     elements : int
         Beam elements of each flexible surface, in the flexible model.
     channels : sequence of str, optional
@@ -277,7 +277,7 @@ def flight_steps(  # noqa: PLR0913 - as above
             else:
                 columns = channel_columns(wanted.channels, record, aircraft, flight)
                 trajectory = recorded_trajectory(aircraft, times, record, columns)
-                warnings = _warnings(aircraft, flight, times, record, smooth)
+                warnings = _warnings(aircraft, flight, times, record, smooth, lattice.shape)
                 warnings += tuple(gust_warnings(environment, flight, grid.step_s))
                 drives = _trim_angles(aircraft, flight, record) if start == "trim" else {}
                 if start == "trim":
@@ -299,6 +299,7 @@ def _warnings(
     times: Array,
     record: FlightRecord,
     smooth: MovingAir | None,
+    shape: LatticeShape,
 ) -> tuple[ResultWarning, ...]:
     """Warnings where the flight left the method's validity; turbulence does not count as incidence."""
     wind_N = air_at_reference(flight, smooth, times)
@@ -307,7 +308,7 @@ def _warnings(
     bending = np.zeros((0, 0)) if record.bending is None else record.bending
     return (
         *air_warnings(flight, [("the flight", "/flight", motion)]),
-        *bending_warnings(aircraft, bending, "the flight", "/model"),
+        *bending_warnings(aircraft, bending, "the flight", "/model", shape),
         *([] if record.bending is None else _wake_warnings(aircraft, flight, record)),
         *steep_warning("the flight", "/schedules", record.euler[:, 1]),
         *light_wing_warnings(aircraft, flight),

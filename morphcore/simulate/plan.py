@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.environment import MovingAir
 from morphcore.aero.gust_lag import KUESSNER
 from morphcore.aero.operator import LatticeOperator, lattice_operator
@@ -76,7 +77,8 @@ class FlightPlan(Shown):
     aircraft : the model, with s surfaces on h hinges. angles, rates, accelerations : (steps + 1, h) of all
     hinges, rad, rad/s, rad/s^2. hinges : (steps + 1, s, HINGE_ROWS) for the kernels. wind_N : (steps + 1, 3)
     m/s, the uniform wind. middle : hinges, wind and lattices between the grid times. halved : the aircraft is
-    one half of a symmetric one whose other half moves alike. gusts : None without.
+    one half of a symmetric one whose other half moves alike. gusts : None without. shape : of the surfaces on
+    which the lattice was tabulated; None: unbent.
     """
 
     grid: TimeGrid
@@ -90,6 +92,7 @@ class FlightPlan(Shown):
     middle: Middles
     halved: bool = False
     gusts: GustTable | None = None
+    shape: BentShape | None = None
 
     def air(self, first: int, last: int) -> Array:
         """Rows of the air at grid times, as `Middles.air`."""
@@ -182,12 +185,13 @@ def flight_plan(
     may_halve: bool = False,
     start: StartMode = "trim",
     wake_alpha: float | None = None,
+    shape: BentShape | None = None,
 ) -> FlightPlan:
     """Prepare a flight: one schedule for each of the aircraft's hinges, then one for each control, or none.
 
-    The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad; None: that of the start
-    at the first hinge angles (`wake.nominal_start`), where also the trim drives are. With ``wake_alpha`` or
-    ``start="given"`` all drives follow their schedules.
+    The wake leaves along the free stream at the angle of attack ``wake_alpha``, rad, and the lattice is that
+    of the ``shape``; None: those of the start at the first hinge angles (`wake.nominal_start`), where also
+    the trim drives are. With ``wake_alpha`` or ``start="given"`` all drives follow their schedules.
 
     air : gust and turbulence. They begin with the flight, whose start is trimmed in the uniform wind.
 
@@ -199,15 +203,16 @@ def flight_plan(
     schedules = of_every_part(model.aircraft, schedules)
     if wake_alpha is None:
         begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
-        schedules, wake_alpha = trimmed_schedules(model, schedules, times, begin), begin.alpha
+        schedules = trimmed_schedules(model, schedules, times, begin)
+        wake_alpha, shape = begin.alpha, begin.shape
     motion = _motion(model.aircraft, schedules, times)
     if may_halve and air is None:
-        model, motion = _halved(model, motion)
+        model, motion, shape = _halved(model, motion, shape)
     gusts = None
     if air is not None:
         gusts = GustTable(air, model.lattice, wake_alpha, KUESSNER, times, motion.angles)
-    table = _operator_table(model, motion, node_spacing_rad, wake_alpha, 0.5 * grid.step_s)
-    return _plan(model, grid, motion, table, gusts)
+    table = _operator_table(model, motion, node_spacing_rad, wake_alpha, shape, 0.5 * grid.step_s)
+    return _plan(model, grid, motion, table, shape, gusts)
 
 
 @dataclass(frozen=True)
@@ -244,10 +249,11 @@ def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart
     return nominal_start(model, angles, start, _instant)
 
 
-def _instant(model: ChainModel, angles: Array, wake_alpha: float) -> FlightPlan:
+def _instant(model: ChainModel, angles: Array, wake_alpha: float, shape: BentShape | None) -> FlightPlan:
     """A plan of one short step with everything held at angles (h + c,), rad."""
     held = [Hold(float(angle)) for angle in angles]
-    return flight_plan(model, held, TimeGrid(0.0, STEP_S, 1, None), may_halve=True, wake_alpha=wake_alpha)
+    grid = TimeGrid(0.0, STEP_S, 1, None)
+    return flight_plan(model, held, grid, may_halve=True, wake_alpha=wake_alpha, shape=shape)
 
 
 @dataclass(frozen=True)
@@ -260,7 +266,7 @@ class CommonPath:
     low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
     hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
     as in ``FlightPlan``. begin : the start for which the lattice was tabulated. controls : as in
-    ``ControlTable``; None without control surfaces.
+    ``ControlTable``; None without control surfaces. shape : of the surfaces, or of the half that flies.
     """
 
     low_rad: float
@@ -271,6 +277,7 @@ class CommonPath:
     halved: bool
     begin: NominalStart
     controls: Array | None = None
+    shape: BentShape | None = None
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies the plans: the given one, or one half of it."""
@@ -302,7 +309,8 @@ class CommonPath:
         schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
         moved = _motion(flown.aircraft, schedules, grid.halves_s)
         controls = _control_table(flown, self.controls, moved, 0.5 * grid.step_s)
-        return _plan(flown, grid, moved, OperatorTable(self.matrices, self.strips, position, controls))
+        table = OperatorTable(self.matrices, self.strips, position, controls)
+        return _plan(flown, grid, moved, table, self.shape)
 
 
 def common_path(
@@ -344,13 +352,15 @@ def common_path(
             held = trim_controls(model.aircraft, model.flight)
             for control, angle in zip(held, begin.drives_rad, strict=True):
                 angles[:, control.columns[control.columns < angles.shape[1]]] = angle
+    shape = begin.shape
     if may_halve:
-        model, motion = _halved(model, motion)
+        model, motion, shape = _halved(model, motion, shape)
     mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha, model.flight.sideslip_rad)
     # a path of controls alone has one lattice
     rows = motion.angles if np.ptp(motion.angles, axis=0).any() else motion.angles[:1]
     operators = [
-        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake) for row in rows
+        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake, shape=shape)
+        for row in rows
     ]
     return CommonPath(
         low_rad,
@@ -361,6 +371,7 @@ def common_path(
         bool(model.lattice.images),
         begin,
         _stacked_controls(operators),
+        shape,
     )
 
 
@@ -402,6 +413,7 @@ def _plan(
     grid: TimeGrid,
     motion: _Motion,
     table: OperatorTable,
+    shape: BentShape | None,
     gusts: GustTable | None = None,
 ) -> FlightPlan:
     """A plan from a motion, a table and gusts at the grid's times and middles in alternation."""
@@ -427,19 +439,23 @@ def _plan(
         ),
         halved=bool(model.lattice.images),
         gusts=gusts and gusts.at(slice(0, None, 2)),
+        shape=shape,
     )
 
 
-def _halved(model: ChainModel, motion: _Motion) -> tuple[ChainModel, _Motion]:
-    """One half of an aircraft whose halves move alike, and its motion; the whole if they do not."""
+def _halved(
+    model: ChainModel, motion: _Motion, shape: BentShape | None
+) -> tuple[ChainModel, _Motion, BentShape | None]:
+    """One half of an aircraft whose halves move alike, its motion and shape; the whole if they do not."""
     mirror, half = model.mirror, model.half
     if mirror is None or half is None:
-        return model, motion
+        return model, motion, shape
     own, image = (motion.angles[:, list(side)] for side in (mirror.own_hinges, mirror.image_hinges))
     up, down = (motion.deflected[:, list(side)] for side in (mirror.own_controls, mirror.image_controls))
     if max(np.abs(own - image).max(initial=0.0), np.abs(up - down).max(initial=0.0)) > ALIKE_RAD:
-        return model, motion
-    return half, motion.columns(mirror.own_hinges, mirror.own_controls)
+        return model, motion, shape
+    own_shape = shape and tuple(shape[k] for k in mirror.own)
+    return half, motion.columns(mirror.own_hinges, mirror.own_controls), own_shape
 
 
 def _nodes(length_rad: float, spacing_rad: float) -> int:
@@ -463,7 +479,12 @@ def _control_table(
 
 
 def _operator_table(
-    model: ChainModel, motion: _Motion, spacing: float, wake_alpha: float, spacing_s: float
+    model: ChainModel,
+    motion: _Motion,
+    spacing: float,
+    wake_alpha: float,
+    shape: BentShape | None,
+    spacing_s: float,
 ) -> OperatorTable:
     mach, angles = model.flight.mach or 0.0, motion.angles
     wake = wake_direction(wake_alpha, model.flight.sideslip_rad)
@@ -473,7 +494,7 @@ def _operator_table(
     travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
 
     def operator(row: Array) -> LatticeOperator:
-        return lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake)
+        return lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake, shape=shape)
 
     if travelled[-1] < 1e-9:
         operators = [operator(angles[0])]

@@ -81,14 +81,22 @@ def flight_document(**more: Any) -> FlightDocument:
 
 
 def chain_loads(
-    document: Document, alpha: float, angles: dict[str, float], lattice: Lattice, **flight: Any
+    document: Document,
+    alpha: float,
+    angles: dict[str, float],
+    lattice: Lattice,
+    wake_alpha: float | None = None,
+    **flight: Any,
 ) -> Array:
-    """Moment about the reference point and force (6,) of the air in B, from the rigid model's kernels."""
+    """Moment about the reference point and force (6,) of the air in B, from the rigid model's kernels.
+
+    wake_alpha : of the wake, rad; None: that of the trim.
+    """
     aircraft = Aircraft.of(AircraftDocument.parse(document))
     model = chain_model(aircraft, Flight.of(flight_document(**flight)), 1, lattice)
     held = {name: Hold(angle) for name, angle in angles.items()}
     schedules = hinge_schedules(aircraft, followed_schedules(aircraft, held))
-    plan = flight_plan(model, schedules, time_grid(0.01 * np.arange(3)))
+    plan = flight_plan(model, schedules, time_grid(0.01 * np.arange(3)), wake_alpha=wake_alpha)
     air_B = SPEED * np.array([np.cos(alpha), 0.0, np.sin(alpha)])
     normals = np.stack([surface_pose(each)[0][:, 2] for each in aircraft.surfaces])
     lag = np.zeros((1, model.links, 3))

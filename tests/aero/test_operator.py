@@ -65,8 +65,8 @@ def circulations(lattice, angles, inputs):
 def test_circulation_of_any_motion(build):
     """Any velocity of any strip gives the circulation that the whole lattice's own solution has.
 
-    Trailing-edge circulation times width, vortex moment and its chordwise moment, strip by strip, to
-    round-off: swept, hinged about other axes, tapered, with the elastic axis off mid-chord.
+    Trailing-edge circulation times width, vortex moment and, in a plane, its chordwise moment, strip by
+    strip, to round-off: swept, hinged about other axes, tapered, with the elastic axis off mid-chord.
     """
     lattice = build()
     rng = np.random.default_rng(0)
@@ -89,7 +89,8 @@ def test_circulation_of_any_motion(build):
         scale = np.abs(gamma).max()
         np.testing.assert_allclose(out[:, 0], mine[-1] * width, atol=1e-11 * scale)
         np.testing.assert_allclose(out[:, 1], (mine * area).sum(axis=0), atol=1e-11 * scale)
-        np.testing.assert_allclose(out[:, 2], (mine * area * centre).sum(axis=0), atol=1e-11 * scale)
+        if not lattice.has_more_outputs:  # otherwise it is m_x, see tests/aero/test_shapes.py
+            np.testing.assert_allclose(out[:, 2], (mine * area * centre).sum(axis=0), atol=1e-11 * scale)
 
 
 def test_flat_plate_of_six_metres():

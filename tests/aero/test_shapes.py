@@ -161,16 +161,15 @@ CLOSE = aircraft(
 def test_links_against_all_edges(name: str, omega: tuple[float, float, float]) -> None:
     """Every surface's six loads are those of all edges of the lattice, in sideslip, with rates.
 
-    Within 0.1 per cent of the lift (moments: times a metre) without rates, 0.3 per cent at a roll, pitch, yaw
-    rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 2.5 per cent, the
-    tail's pitch moment, because what is induced in its plane acts at the strips' centres.
+    Within 0.03 per cent of the lift (moments: times a metre) without rates, 0.3 per cent at a roll, pitch,
+    yaw rate of 0.02 V a metre; a V tail and a fin close behind a V wing, in its wake: 0.15 per cent.
     """
     shape = CLOSE if name == "close" else SHAPES[name]
     twist = np.concatenate([omega, velocity(0.08, 0.05)])
     found = of_links(shape, twist)
     expected = edge_loads(chain_model(shape, FLIGHT, 1), np.zeros(0), twist)
     lift = np.abs(expected[:, 5]).max()
-    share = 0.025 if name == "close" else 3e-3 if any(omega) else 1e-3
+    share = 3e-3 if any(omega) else 1.5e-3 if name == "close" else 3e-4
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=share * lift)
 
 

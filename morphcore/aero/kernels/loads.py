@@ -20,6 +20,10 @@ wakes are in one plane, three more outputs of each strip follow those of all str
              per density and g, m^2/s
     2  m_y   moment of the normal force of 0: u_n times the distance along x from the axis, m^2/s
 
+and output 2 is m_x, the same with the distance along y. X is then S times ``VORTEX_X``, its centroid in
+uniform incidence: it only meets the yaw rate, which changes the velocity along the chord by less than a
+thousandth.
+
 All quantities are in link axes; velocities are those of the structure relative to still air.
 """
 
@@ -33,9 +37,20 @@ from morphcore.lanes import not_in_lanes
 OUTPUTS, MORE_OUTPUTS = 5, 3
 # columns of the table of strips, in link axes about each strip's middle on the link axis (the elastic axis),
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
-# lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x
-EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7
-STRIP_COLUMNS = 8
+# lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x; centroid
+# of the strip's vortex moment along x
+EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE, VORTEX_X = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+)
+STRIP_COLUMNS = 9
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
@@ -198,6 +213,15 @@ def lane_product(lanes, matrix, inputs, outputs):
                 y[7, l] += a7 * p + b7 * q + c7 * s + d7 * t
 
 
+@inlined
+def open_edge(twist, g, edge, edge_y, ex, ey, behind, w_x, l):
+    """Forces of a strip's open trailing edge in the velocity there: lift, suction along x and y, drag."""
+    wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
+    lift = g * (ey * (twist[3, l] - wz * edge_y) - ex * (twist[4, l] + wz * edge))
+    suction = g * (twist[5, l] + wx * edge_y - wy * edge)
+    return lift, ey * suction, ex * suction, g * (wy * behind + w_x)
+
+
 @kernel
 def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist, density, sums, wrench):
     """Wrench (6 rows) of the air on link ``k`` of a surface: its share of the strips, profile drag, cm0.
@@ -231,31 +255,31 @@ def link_wrench(lanes, surface, k, ranges, strips, overlap, outputs, link, twist
         ex, ey, aside = strips[strip, EDGE_DX], strips[strip, EDGE_DY], strips[strip, EDGE_Y]
         slope = strips[strip, CHORD_SLOPE]
         behind = centre - edge
-        for l in range(len(lanes)):
-            wx, wy, wz = twist[0, l], twist[1, l], twist[2, l]
-            weight, y = part[0, l], part[1, l]
-            g = weight * out[0, l]
-            moment = weight * out[1, l]
-            edge_y = y + aside
-            lift = g * (ey * (twist[3, l] - wz * edge_y) - ex * (twist[4, l] + wz * edge))
-            suction = g * (twist[5, l] + wx * edge_y - wy * edge)
-            forward, across = ey * suction, ex * suction
-            back = g * (wy * behind + out[3, l])
-            sums[0, l] -= edge_y * lift + moment * twist[4, l] + weight * out[2, l] * wz
-            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * slope
-            sums[2, l] += y * back - edge_y * forward - edge * across
-            sums[3, l] += forward - back
-            sums[4, l] += moment * wx - across - g * out[4, l]
-            sums[5, l] -= lift
-        if surface[MORE0] >= 0:
-            more = outputs[surface[MORE0] + MORE_OUTPUTS * j : surface[MORE0] + MORE_OUTPUTS * (j + 1)]
+        if surface[MORE0] < 0:
             for l in range(len(lanes)):
-                g = part[0, l] * out[0, l]
-                normal, along = g * more[0, l], g * more[2, l]
-                sums[0, l] += part[1, l] * normal + slope * along
-                sums[1, l] -= along
-                sums[2, l] += g * more[1, l]
-                sums[5, l] += normal
+                wz, weight, y = twist[2, l], part[0, l], part[1, l]
+                g, moment, edge_y = weight * out[0, l], weight * out[1, l], y + aside
+                lift, forward, across, back = open_edge(twist, g, edge, edge_y, ex, ey, behind, out[3, l], l)
+                sums[0, l] -= edge_y * lift + moment * twist[4, l] + weight * out[2, l] * wz
+                sums[1, l] += edge * lift + moment * (twist[3, l] - wz * y) - weight * out[2, l] * wz * slope
+                sums[2, l] += y * back - edge_y * forward - edge * across
+                sums[3, l] += forward - back
+                sums[4, l] += moment * twist[0, l] - across - g * out[4, l]
+                sums[5, l] -= lift
+            continue
+        more = outputs[surface[MORE0] + MORE_OUTPUTS * j : surface[MORE0] + MORE_OUTPUTS * (j + 1)]
+        vortex_x, vortex_y = strips[strip, VORTEX_X], slope * strips[strip, VORTEX_X]
+        for l in range(len(lanes)):
+            wz, weight, y = twist[2, l], part[0, l], part[1, l]
+            g, moment, edge_y = weight * out[0, l], weight * out[1, l], y + aside
+            lift, forward, across, back = open_edge(twist, g, edge, edge_y, ex, ey, behind, out[3, l], l)
+            normal = g * more[0, l]
+            sums[0, l] += y * normal + g * out[2, l] - edge_y * lift - moment * (twist[4, l] + wz * vortex_x)
+            sums[1, l] += edge * lift + moment * (twist[3, l] - wz * (y + vortex_y)) - g * more[2, l]
+            sums[2, l] += y * back - edge_y * forward - edge * across + g * more[1, l]
+            sums[3, l] += forward - back
+            sums[4, l] += moment * twist[0, l] - across - g * out[4, l]
+            sums[5, l] += normal - lift
     for l in range(len(lanes)):
         wx, wz = twist[0, l], twist[2, l]
         fx, fy, fz = density * sums[3, l], density * sums[4, l], density * sums[5, l]

@@ -258,7 +258,12 @@ def test_full_aircraft_is_accepted(service: RunningService) -> None:
         "separate_wings": True,
         "aero_coefficients": ["lift_factor"],
         "bounds": {"stiffness_nm_rad": [1e2, 1e6], "lift_factor": [0.5, 1.5]},
-        "lattice": {"chordwise": 4, "spanwise": 12, "core": {"law": "smoothed", "fraction": 0.04}},
+        "lattice": {
+            "chordwise": 4,
+            "spanwise": 12,
+            "core": {"law": "smoothed", "fraction": 0.04},
+            "shape": "trimmed",
+        },
         "step_s": 0.004,
         "start": "given",
     }

@@ -99,7 +99,12 @@ def test_every_option_reaches_the_worker(service: RunningService) -> None:
     document = optimize_document()
     document["model"] = {
         "parameters": RESULT["model"],
-        "lattice": {"chordwise": 2, "spanwise": 6, "core": {"law": "smoothed", "fraction": 0.05}},
+        "lattice": {
+            "chordwise": 2,
+            "spanwise": 6,
+            "core": {"law": "smoothed", "fraction": 0.05},
+            "shape": "trimmed",
+        },
         "start": "given",
     }
     document["morph"] = {

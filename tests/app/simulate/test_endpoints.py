@@ -16,7 +16,7 @@ from tests.app.running_service import RunningService
 TABLE = {"kind": "tabulated", "time_s": [0.0, 0.1, 0.2], "angle_rad": [0.0, 0.1, 0.2]}
 SPLINE = {"kind": "spline", "knot_time_s": [0.0, 1.0, 2.0], "knot_angle_rad": [0.0, 0.5, 1.0]}
 AS_IDENTIFIED = {
-    "lattice": {"chordwise": 2, "spanwise": 8, "core": {"law": "line", "fraction": 0.1}},
+    "lattice": {"chordwise": 2, "spanwise": 8, "core": {"law": "line", "fraction": 0.1}, "shape": "trimmed"},
     "step_s": 0.004,
     "start": "given",
 }
