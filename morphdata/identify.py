@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
@@ -15,9 +16,11 @@ from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Auto, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
+from morphdata.links import MAX_WINGS, LinksPerWing, SurfaceKey, shown_links
 from morphdata.measurement import Measurement, absent_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
-from morphdata.parameters import MAX_LINKS, parameters_in
+from morphdata.pairs import links_by_name, links_faults, own_lift_faults
+from morphdata.parameters import parameters_in
 from morphdata.renamed import RENAMED, both_spellings, current_name
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
@@ -37,7 +40,6 @@ else:
         WithJsonSchema({"type": "string", "enum": both_spellings(corrections())}),
     ]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
-Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 AUTO_LINKS = (1, 2, 3, 4, 5, 6)  # numbers of links per wing that "auto" tries, in this order
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
@@ -119,6 +121,12 @@ class SearchedModel(Document):
     separate_wings: Annotated[bool, Option("--separate-wings", MODEL)] = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
+    own_lift: Annotated[list[SurfaceKey] | None, Option("--own-lift", MODEL)] = Field(
+        default=None,
+        max_length=MAX_WINGS,
+        description="Surfaces that get a lift factor of their own, mirror images by a name for both; the "
+        "others share one. Left out: all.",
+    )
     aero_coefficients: Annotated[list[Correction] | None, BeforeValidator(_current_corrections)] = Field(
         default=None,
         max_length=len(both_spellings(corrections())),
@@ -140,8 +148,8 @@ class SearchedModel(Document):
         default="trim", description="Trim each model by itself, or start from `flight.start`."
     )
 
-    def numbers_of_links(self) -> Sequence[int]:
-        """List the numbers of links per wing of all models that are searched."""
+    def numbers_of_links(self) -> Sequence[LinksPerWing]:
+        """List the links per wing of all models that are searched."""
         raise NotImplementedError
 
     def faults(self) -> Iterator[Fault]:
@@ -151,7 +159,10 @@ class SearchedModel(Document):
         )
         division = None if self.bounds is None else self.bounds.given().get("division")
         if division is not None:
-            yield from _division_faults(self.numbers_of_links(), *division)
+            numbers = [
+                links.values() if isinstance(links, dict) else [links] for links in self.numbers_of_links()
+            ]
+            yield from _division_faults([links for each in numbers for links in each], *division)
 
 
 def repeated_faults(items: Sequence[object], pointer: str, hint: str) -> Iterator[Fault]:
@@ -180,13 +191,14 @@ def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterato
 class EquivalentModel(SearchedModel):
     """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
-    links_per_wing: Annotated[Links | Auto, Option("--links", MODEL)] = Field(
+    links_per_wing: Annotated[LinksPerWing | Auto, Option("--links", MODEL)] = Field(
         default=3,
-        description="Links per wing. `auto`: models of one link, two links and so on up to six are "
+        description="Links per wing: one number for all flexible surfaces, or one for each by name, mirror "
+        "images by a name for both. `auto`: models of one link, two links and so on up to six are "
         "identified, and the one under which the training samples are most likely is taken.",
     )
 
-    def numbers_of_links(self) -> Sequence[int]:
+    def numbers_of_links(self) -> Sequence[LinksPerWing]:
         """List the number of links per wing, or all that are tried."""
         return AUTO_LINKS if self.links_per_wing == "auto" else (self.links_per_wing,)
 
@@ -262,6 +274,8 @@ class SamplesRequest(Request):
         yield from start_faults(self.flight, self.model.start)
         yield from trim_drive_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
+        yield from links_faults(self.aircraft, self.model.numbers_of_links(), "/model/links_per_wing")
+        yield from own_lift_faults(self.aircraft, self.model.own_lift or (), "/model/own_lift")
         yield from samples_faults(self.samples)
         samples = self.inline_samples()
         yield from total_rows_faults(sum(len(sample.time_s) for sample in samples.values()))
@@ -348,13 +362,14 @@ class IdentifyRequest(SamplesRequest):
                 at,
                 f"Set model.links_per_wing to {known.links_per_wing}, or begin from no model.",
             )
-        elif known.links_per_wing != links:
+        elif links_by_name(self.aircraft, known.links_per_wing) != links_by_name(self.aircraft, links):
             yield Fault(
                 "links_differ",
-                f"The search is for {links} links per wing and would begin from a model with "
-                f"{known.links_per_wing}.",
+                f"The search is for {shown_links(links)} per wing and would begin from a model with "
+                f"{shown_links(known.links_per_wing)}.",
                 at,
-                f"Begin from a model with {links}, or set model.links_per_wing to {known.links_per_wing}.",
+                "Begin from a model with as many, or set model.links_per_wing to "
+                f"{json.dumps(known.links_per_wing)}.",
             )
         elif known.separate_wings and not self.model.separate_wings:
             yield Fault(

@@ -38,6 +38,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
 from morphdata.identify import EquivalentModel
+from morphdata.links import LinksPerWing
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
@@ -126,6 +127,7 @@ class Identification:
             separate_wings=self.settings.separate_wings,
             aero_coefficients=free,
             bounds=bounds,
+            own_lift=self.settings.own_lift,
         )
         # the same with the bounds that the search has widened by now, and the weight that it gives the prior
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
@@ -136,7 +138,7 @@ class Identification:
             [*([] if warm_start is None else [self.space.encode(warm_start)]), self.space.guess]
         )
 
-    def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
+    def chain(self, aircraft: Aircraft, flight: Flight, links: LinksPerWing) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
         return chain_model(aircraft, flight, links, self.settings.lattice)
 

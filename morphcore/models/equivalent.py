@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,12 +27,35 @@ from morphcore.models.kernels.layout import (
     state_rows,
 )
 from morphcore.models.links import beam_division, link_edges
+from morphcore.models.parameter_batch import ParameterBatch, together
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
+from morphdata.faults import refuse
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
-from morphdata.parameters import MAX_LINKS
-from morphdata.renamed import RENAMED, current_name
+from morphdata.links import (
+    MAX_LINKS,
+    LinksPerWing,
+    by_pair,
+    common_names,
+    links_document,
+    links_of,
+    means,
+    shown_links,
+)
+from morphdata.refusals import escaped
+
+__all__ = [
+    "ChainModel",
+    "LaneConstants",
+    "ParameterBatch",
+    "chain_model",
+    "fitted",
+    "from_lanes",
+    "lane_constants",
+    "physical_guess",
+    "to_lanes",
+]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -43,71 +66,10 @@ STEEP_LIFT = 0.45
 
 
 @dataclass(frozen=True, repr=False)
-class ParameterBatch(Shown):
-    """Parameters of a batch of equivalent models of one aircraft (p particles, w sets, n links).
-
-    Attributes
-    ----------
-    values : mapping of str to ndarray
-        Keyed by the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span
-        that sum to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and
-        edgewise; ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``ac_offset_m`` (forward
-        positive) and ``lag_s`` (p,): values of its largest surface; other surfaces scale them with their
-        chords.
-    surfaces : tuple of tuples of str, optional
-        Names of the surfaces of each set. None: a single set belongs to all flexible surfaces, which form one
-        mirror pair; several sets belong to the flexible surfaces in the aircraft's order.
-    """
-
-    values: Mapping[str, Array]
-    surfaces: tuple[tuple[str, ...], ...] | None = None
-
-    def __post_init__(self) -> None:
-        if any(name in RENAMED for name in self.values):
-            current = {current_name(name): value for name, value in self.values.items()}
-            object.__setattr__(self, "values", current)
-
-    def __getitem__(self, name: str) -> Array:
-        """The values of one parameter; its former name is also accepted."""
-        return self.values[current_name(name)]
-
-    @property
-    def particles(self) -> int:
-        """Number of parameter sets."""
-        return int(self["division"].shape[0])
-
-    @property
-    def sets(self) -> int:
-        """Number of sets of surface values, w."""
-        return int(self["division"].shape[1])
-
-    @property
-    def links(self) -> int:
-        """Links per flexible surface."""
-        return int(self["division"].shape[2])
-
-    def select(self, index: NDArray[np.int64] | slice) -> ParameterBatch:
-        """Return a subset of the particles."""
-        return replace(self, values={name: value[index] for name, value in self.values.items()})
-
-    def changed(self, **values: Array) -> ParameterBatch:
-        """Return a copy with other values of some parameters.
-
-        Raises
-        ------
-        KeyError
-            A name is not one of its parameters.
-        """
-        values = {current_name(name): value for name, value in values.items()}
-        if not values.keys() <= self.values.keys():
-            raise KeyError(f"got {', '.join(values)}, but the parameters are {', '.join(self.values)}")
-        return replace(self, values={**self.values, **values})
-
-
-@dataclass(frozen=True, repr=False)
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
+    links_per_wing : links of each flexible surface, by name where they differ.
     surfaces : (s, 11) first link, links, first strip, strips, first overlap pair of each surface; whether it
         also represents its mirror image; the first of its further outputs of the lattice (or -1); its
         `AircraftLattice.control_inputs`; whether it carries point masses.
@@ -116,7 +78,7 @@ class ChainModel(Shown):
     aircraft: Aircraft
     flight: Flight
     lattice: AircraftLattice
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     surfaces: IntArray
 
     @cached_property
@@ -135,17 +97,17 @@ class ChainModel(Shown):
         every = self.aircraft.surfaces
         own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
         images = tuple(every[k] for k in self.mirror.image)
-        return _chain_model(
-            own, self.flight, self.links_per_wing, self.lattice.settings, images, self.lattice.steep
-        )
+        counts = self.surfaces[list(self.mirror.own), 1]
+        half = _chain_model(own, self.flight, counts, self.lattice.settings, images, self.lattice.steep)
+        return replace(half, links_per_wing=self.links_per_wing)
 
     @cached_property
     def rigid(self) -> ChainModel:
         """The rigid model of the same aircraft (or half of one) in the same flight."""
         if self.links_per_wing == 1:
             return self
-        lattice = self.lattice
-        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images, lattice.steep)
+        lattice, ones = self.lattice, np.ones_like(self.surfaces[:, 1])
+        return _chain_model(self.aircraft, self.flight, ones, lattice.settings, lattice.images, lattice.steep)
 
     @cached_property
     def starts(self) -> dict[bytes, tuple[float, float | None]]:
@@ -202,6 +164,32 @@ class ChainModel(Shown):
         """
         groups = mirror_groups([self.aircraft.surfaces[k] for k in self.flexible])
         return tuple(sorted((tuple(self.flexible[k] for k in group) for group in groups), key=self._rank))
+
+    @cached_property
+    def unlike(self) -> dict[str, tuple[int, ...]]:
+        """Mirror pairs of all surfaces, rigid ones too, by a name for both; the largest comes first."""
+        surfaces = self.aircraft.surfaces
+        groups = sorted(mirror_groups(surfaces), key=self._rank)
+        reference = surfaces.index(self.reference_surface)
+        groups.sort(key=lambda group: reference not in group)
+        return dict(zip(common_names([surface.name for surface in surfaces], groups), groups, strict=True))
+
+    def own_column(self, batch: ParameterBatch, number: int) -> int:
+        """Column of a batch's lift factors that a surface has: that of its own, or the first."""
+        if not batch.apart:
+            return 0
+        surfaces, images = self.aircraft.surfaces, self.lattice.images
+        names = [surface.name for surface in (*surfaces, *images)]
+        mine = {*next(pair for pair in self.unlike.values() if number in pair)}
+        mine |= {len(surfaces) + number} if images else set()
+        found = [k for k, key in enumerate(batch.apart, 1) if mine & set(means(key, names))]
+        return found[0] if found else 0
+
+    def links_on(self, number: int) -> int:
+        """Links of a flexible surface; those asked for, if it is rigid and stands for all."""
+        if self.aircraft.surfaces[number].flexible or not isinstance(self.links_per_wing, int):
+            return int(self.surfaces[number, 1])
+        return self.links_per_wing
 
     def _rank(self, group: Sequence[int]) -> tuple[float, str]:
         return -self.aircraft.surfaces[group[0]].area_m2, self.label(group)
@@ -278,53 +266,80 @@ class ChainModel(Shown):
         for parameter in self.parameters:
             known = batch.values.get(parameter.name)
             if parameter.scope == "aircraft" and known is not None:
+                known = batch.of_aircraft(parameter.name, self.own_column(batch, number))
                 values[parameter.name] = known * parameter.in_proportion(surface, self.reference_surface)
             elif parameter.scope != "aircraft" and known is not None and surface.flexible:
-                values[parameter.name] = known[:, chosen]
+                values[parameter.name] = batch.of_set(parameter.name, chosen)
             else:
                 values[parameter.name] = parameter.guess(cut)
         return values
 
 
 def chain_model(
-    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
+    aircraft: Aircraft, flight: Flight, links_per_wing: LinksPerWing, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
     """Build the equivalent model with 1 to 16 links on each flexible surface; 1 is the rigid model.
 
+    Parameters
+    ----------
+    aircraft : Aircraft
+    flight : Flight
+    links_per_wing : int or mapping of str to int
+        Of all flexible surfaces, or of each by name, mirror images by a name for both.
+    lattice : Lattice, optional
+
     Raises
     ------
-    InvalidInput : the number of links is out of range.
+    InvalidInput : a number of links is out of range, or a surface is not named or is unknown.
     """
-    links = whole_number(
-        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", minimum=1, maximum=MAX_LINKS
-    )
+    pointer, by_name = "/model/links_per_wing", not isinstance(links_per_wing, int | np.integer)
+    given = links_per_wing if isinstance(links_per_wing, dict) else {"": links_per_wing}
+    checked = {
+        name: whole_number(
+            links, f"links_per_wing of {name!r}" if name else "links_per_wing",
+            pointer=f"{pointer}/{escaped(name)}" if by_name else pointer, minimum=1, maximum=MAX_LINKS,
+        )
+        for name, links in given.items()
+    }  # fmt: skip
+    surfaces = aircraft.surfaces
+    names, flexible = [each.name for each in surfaces], [each.flexible for each in surfaces]
+    pairs = mirror_groups(surfaces)
+    links = checked if by_name else checked[""]
+    counts, faults = links_of(links, names, flexible, pairs, pointer)
+    refuse(faults)
+    bent = [pair for pair in pairs if flexible[pair[0]]]
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
-    return _chain_model(aircraft, flight, links, lattice, steep=steep)
+    model = _chain_model(aircraft, flight, counts, lattice, steep=steep)
+    return replace(model, links_per_wing=links_document(names, bent, counts) if by_name else checked[""])
 
 
 def _chain_model(
     aircraft: Aircraft,
     flight: Flight,
-    links_per_wing: int,
+    counts: Sequence[int] | IntArray,
     lattice: Lattice,
     images: Sequence[Surface] = (),
     steep: bool = False,  # noqa: FBT001, FBT002 - private
 ) -> ChainModel:
+    """A chain of so many links for each surface, called a rigid model until its links are named."""
     lattices = aircraft_lattice(aircraft, lattice, images, steep=steep)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0, controls in zip(
-        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, strict=True
+    for surface, part, strip0, controls, count in zip(
+        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, counts, strict=True
     ):
-        count = links_per_wing if surface.flexible else 1
         more, lumped = lattices.more_rows(strip0), int(bool(surface.point_masses))
         rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
         link += count
         pair += count * part.spanwise
-    return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
+    return ChainModel(aircraft, flight, lattices, 1, np.array(rows, dtype=np.int64))
 
 
 def physical_guess(
-    model: ChainModel, division: Array | None = None, *, separate_wings: bool = False
+    model: ChainModel,
+    division: Array | None = None,
+    *,
+    separate_wings: bool = False,
+    apart: Sequence[str] = (),
 ) -> ParameterBatch:
     """Parameters from beam and thin-airfoil theory, with neutral corrections and Jones' lag.
 
@@ -340,23 +355,30 @@ def physical_guess(
         those of `beam_division`.
     separate_wings : bool
         Whether each surface of a mirror pair has its own set.
+    apart : sequence of str, optional
+        Keys of `ChainModel.unlike` with a lift factor of their own.
     """
     sets = model.sets(separate_wings=separate_wings)
-    n = model.links_per_wing
+    links = [model.links_on(group[0]) for group in sets]
     bent = [model.aircraft.surfaces[group[0]] for group in sets]
-    shares = np.stack([beam_division(surface, n) for surface in bent])[None] if division is None else division
-    shares = np.broadcast_to(shares, (shares.shape[0], len(sets), n))
-    cuts = [CutSurface(surface, model.flight, shares[:, k]) for k, surface in enumerate(bent)]
-    reference = CutSurface(model.reference_surface, model.flight, shares[:, 0])
-    return ParameterBatch(
-        {
-            parameter.name: parameter.guess(reference)
-            if parameter.scope == "aircraft"
-            else np.stack([parameter.guess(cut) for cut in cuts], axis=1)
-            for parameter in model.parameters
-        },
-        model.set_names(sets),
-    )
+    if division is None:
+        own = [beam_division(surface, n)[None] for surface, n in zip(bent, links, strict=True)]
+    else:
+        division = np.broadcast_to(division, (division.shape[0], len(sets), division.shape[2]))
+        own = [division[:, k, :n] for k, n in enumerate(links)]
+    cuts = [CutSurface(surface, model.flight, shares) for surface, shares in zip(bent, own, strict=True)]
+    reference = CutSurface(model.reference_surface, model.flight, own[0])
+    values = {}
+    for parameter in model.parameters:
+        if parameter.scope == "aircraft":
+            guess = parameter.guess(reference)
+            values[parameter.name] = (
+                together([guess] * (1 + len(apart))) if parameter.apart and apart else guess
+            )
+        else:
+            values[parameter.name] = together([parameter.guess(cut) for cut in cuts])
+    differ = None if len(set(links)) == 1 else tuple(links)
+    return ParameterBatch(values, model.set_names(sets), differ, tuple(apart))
 
 
 def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
@@ -383,8 +405,21 @@ def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
                 own = own * factor[:, None]
             values[parameter.name] = own.copy()
             values[parameter.name][:, 0] = known[:, 0]
-        batch = ParameterBatch(values, guess.surfaces)
-    model.set_of(batch)
+        batch = replace(batch, values=values, surfaces=guess.surfaces)
+    for k, number in enumerate(model.set_of(batch)):
+        links = batch.set_links[number] if batch.set_links else batch.links
+        if model.aircraft.surfaces[k].flexible and links != model.surfaces[k, 1]:
+            raise InvalidInput(
+                f"the model is of {shown_links(model.links_per_wing)} per wing, its parameters are for "
+                f"{shown_links(batch.links_per_wing)}",
+                pointer="/model/parameters/links_per_wing",
+                hint=f"give parameters for as many, or set model.links_per_wing to {batch.links_per_wing}",
+            )
+    if batch.apart:
+        factors = dict(zip(batch.apart, batch["lift_factor"][0, 1:].tolist(), strict=True))
+        names = [surface.name for surface in model.aircraft.surfaces]
+        pointer = "/model/parameters/aero/lift_factors"
+        refuse(by_pair(factors, names, [*model.unlike.values()], pointer)[1])
     return batch
 
 

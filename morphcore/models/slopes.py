@@ -38,7 +38,7 @@ def sloped_motion(model: ChainModel, batch: ParameterBatch, R_BL: Array, air_B: 
         first, count = int(model.surfaces[s, 0]), int(model.surfaces[s, 1])
         division = np.ones((batch.particles, 1))
         if count > 1:
-            division = batch["division"][:, model.set_of(batch)[s]]
+            division = batch.of_set("division", model.set_of(batch)[s])
         slopes = twist_slopes(surface, link_edges(division, surface.length_m))
         mine = slice(first, first + count)
         chord = surface.chord_W

@@ -128,7 +128,9 @@ def _form(flag: str, field: FieldInfo) -> Form:
         return Form(str, choices[0] if len(choices) == 1 else "NAME", str, remark)
     if kind in (bool, int, float, str):
         words = [word for other in others if get_origin(other) is Literal for word in get_args(other)]
-        return _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
+        by_name = any(get_origin(other) is dict for other in others)
+        plain = _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
+        return _number_or_names(flag, plain) if by_name else plain
     if get_origin(kind) is list:
         return _list_form(flag, get_args(kind)[0])
     fields = {} if get_origin(kind) is dict else kind.model_fields
@@ -149,6 +151,21 @@ def _form(flag: str, field: FieldInfo) -> Form:
 def _number_or_word(words: Sequence[str]) -> Form:
     """Read ``3`` as a whole number, and anything else as it is written."""
     return Form(str, "|".join(["N", *words]), lambda text: int(text) if text.isdecimal() else text)
+
+
+def _number_or_names(flag: str, plain: Form) -> Form:
+    """Read ``wing=4,tail=1`` as numbers by name, and what has no name in the plain form."""
+
+    def read(text: str) -> Any:
+        if "=" not in text:
+            return plain.read(text)
+        pairs = [part.rpartition("=") for part in text.split(",")]
+        if not all(name.strip() and number.strip().isdecimal() for name, _, number in pairs):
+            hint = f"write {flag} wing=4,tail=1"
+            raise CommandError(f"{flag} {text}: not of the form NAME=N,NAME=N", code=Exit.USAGE, hint=hint)
+        return {name.strip(): int(number) for name, _, number in pairs}
+
+    return Form(str, f"{plain.metavar}|NAME=N,...", read)
 
 
 def _list_form(flag: str, item: Any) -> Form:
