@@ -13,10 +13,18 @@ from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document
 from morphdata.execution import Request, SpreadExecution
 from morphdata.faults import Fault
-from morphdata.flight import EXAMPLE_FLIGHT, Auto, Flight
+from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
-from morphdata.links import MAX_WINGS, LinksPerWing, SurfaceKey, shown_links
+from morphdata.links import (
+    MAX_WINGS,
+    AskedLinks,
+    LinksPerWing,
+    SurfaceKey,
+    shown_links,
+    to_choose,
+    with_links,
+)
 from morphdata.measurement import Measurement, absent_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
 from morphdata.pairs import links_by_name, links_faults, own_lift_faults
@@ -152,6 +160,10 @@ class SearchedModel(Document):
         """List the links per wing of all models that are searched."""
         raise NotImplementedError
 
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces, with their pointers below `links_per_wing`."""
+        raise NotImplementedError
+
     def faults(self) -> Iterator[Fault]:
         """Check that corrections are named once, and that the links fit into the bounds of their lengths."""
         yield from repeated_faults(
@@ -191,7 +203,7 @@ def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterato
 class EquivalentModel(SearchedModel):
     """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
-    links_per_wing: Annotated[LinksPerWing | Auto, Option("--links", MODEL)] = Field(
+    links_per_wing: Annotated[AskedLinks, Option("--links", MODEL)] = Field(
         default=3,
         description="Links per wing: one number for all flexible surfaces, or one for each by name, mirror "
         "images by a name for both. `auto`: models of one link, two links and so on up to six are "
@@ -200,7 +212,12 @@ class EquivalentModel(SearchedModel):
 
     def numbers_of_links(self) -> Sequence[LinksPerWing]:
         """List the number of links per wing, or all that are tried."""
-        return AUTO_LINKS if self.links_per_wing == "auto" else (self.links_per_wing,)
+        numbers = AUTO_LINKS if to_choose(self.links_per_wing) else AUTO_LINKS[:1]
+        return [with_links(self.links_per_wing, number) for number in numbers]
+
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces; numbers that are tried name the same."""
+        yield "", self.numbers_of_links()[-1]
 
 
 class Search(SwarmSearch):
@@ -274,7 +291,8 @@ class SamplesRequest(Request):
         yield from start_faults(self.flight, self.model.start)
         yield from trim_drive_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
-        yield from links_faults(self.aircraft, self.model.numbers_of_links(), "/model/links_per_wing")
+        for pointer, links in self.model.links_at():
+            yield from links_faults(self.aircraft, links, f"/model/links_per_wing{pointer}")
         yield from own_lift_faults(self.aircraft, self.model.own_lift or (), "/model/own_lift")
         yield from samples_faults(self.samples)
         samples = self.inline_samples()
@@ -355,17 +373,18 @@ class IdentifyRequest(SamplesRequest):
             return
         yield from model_surfaces_faults(self.aircraft, known, "/search/warm_start/parameters")
         at, links = "/search/warm_start/parameters", self.model.links_per_wing
-        if links == "auto":
+        own = self.model.numbers_of_links()[0]
+        if to_choose(links):
             yield Fault(
                 "links_differ",
                 "The number of links per wing is to be chosen, and the model to begin from has one already.",
                 at,
-                f"Set model.links_per_wing to {known.links_per_wing}, or begin from no model.",
+                f"Set model.links_per_wing to {json.dumps(known.links_per_wing)}, or begin from no model.",
             )
-        elif links_by_name(self.aircraft, known.links_per_wing) != links_by_name(self.aircraft, links):
+        elif links_by_name(self.aircraft, known.links_per_wing) != links_by_name(self.aircraft, own):
             yield Fault(
                 "links_differ",
-                f"The search is for {shown_links(links)} per wing and would begin from a model with "
+                f"The search is for {shown_links(own)} per wing and would begin from a model with "
                 f"{shown_links(known.links_per_wing)}.",
                 at,
                 "Begin from a model with as many, or set model.links_per_wing to "

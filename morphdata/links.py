@@ -13,6 +13,7 @@ from typing import Annotated, TypeVar
 from pydantic import Field
 
 from morphdata.faults import Fault
+from morphdata.flight import Auto
 from morphdata.refusals import escaped
 
 MAX_LINKS = 16
@@ -23,6 +24,8 @@ Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 SurfaceKey = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
 LinksBySurface = Annotated[dict[SurfaceKey, Links], Field(min_length=1, max_length=MAX_WINGS)]
 LinksPerWing = Links | LinksBySurface
+ChosenLinks = Links | Auto
+AskedLinks = ChosenLinks | Annotated[dict[SurfaceKey, ChosenLinks], Field(min_length=1, max_length=MAX_WINGS)]
 Pairs = Sequence[Sequence[int]]
 T = TypeVar("T")
 
@@ -134,16 +137,36 @@ def links_of(
     return [found.get(number_of[k], 1) if bends else 1 for k, bends in enumerate(flexible)], faults
 
 
-def links_document(names: Sequence[str], pairs: Pairs, counts: Sequence[int]) -> LinksPerWing:
-    """Return numbers of links by surface as documents have them: one number where all are the same.
+def links_document(names: Sequence[str], counts: Sequence[int]) -> LinksPerWing:
+    """Return numbers of links of flexible surfaces as documents have them: one where all are the same.
 
-    >>> links_document(["right wing", "left wing", "tail"], [(0, 1), (2,)], [4, 4, 1])
+    >>> links_document(["right wing", "left wing", "tail"], [4, 4, 1])
     {'wing': 4, 'tail': 1}
     """
-    own = [counts[pair[0]] for pair in pairs]
-    if len(set(own)) < 2:
-        return own[0] if own else 1
-    return dict(zip(common_names(names, pairs), own, strict=True))
+    if len(set(counts)) < 2:
+        return counts[0] if counts else 1
+    found = {}
+    for k, (name, count) in enumerate(zip(names, counts, strict=True)):
+        both = means(surface_word(name), names)
+        alike = k in both and all(counts[other] == count for other in both)
+        found[surface_word(name) if alike else name] = count
+    return found
+
+
+def to_choose(links: AskedLinks) -> bool:
+    """Whether a number of links is to be chosen from the samples."""
+    return links == "auto" or (isinstance(links, dict) and "auto" in links.values())
+
+
+def with_links(links: AskedLinks, number: int) -> LinksPerWing:
+    """Return numbers of links with one in the place of each that is to be chosen.
+
+    >>> with_links("auto", 2), with_links({"wing": "auto", "tail": 1}, 2)
+    (2, {'wing': 2, 'tail': 1})
+    """
+    if isinstance(links, dict):
+        return {name: number if own == "auto" else own for name, own in links.items()}
+    return number if links == "auto" else links
 
 
 def mean_links(links: LinksPerWing) -> float:

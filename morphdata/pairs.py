@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from morphdata.aircraft import Aircraft, Surface
 from morphdata.drives import Hinge, drive_name
 from morphdata.faults import Fault
 from morphdata.links import LinksPerWing, by_pair, links_of
 from morphdata.masses import reflected_masses
-from morphdata.vehicle import paired_by_reflection
+
+T = TypeVar("T")
 
 
 def links_by_name(aircraft: Aircraft, links: LinksPerWing) -> dict[str, int]:
@@ -19,10 +21,9 @@ def links_by_name(aircraft: Aircraft, links: LinksPerWing) -> dict[str, int]:
     return dict(zip(names, _links(aircraft, links, "")[0], strict=True))
 
 
-def links_faults(aircraft: Aircraft, every: Sequence[LinksPerWing], pointer: str) -> Iterator[Fault]:
+def links_faults(aircraft: Aircraft, links: LinksPerWing, pointer: str) -> Iterator[Fault]:
     """Check that numbers of links by surface name each flexible surface once, and no others."""
-    for links in every:
-        yield from _links(aircraft, links, pointer)[1]
+    yield from _links(aircraft, links, pointer)[1]
 
 
 def _links(aircraft: Aircraft, links: LinksPerWing, pointer: str) -> tuple[list[int], list[Fault]]:
@@ -89,3 +90,26 @@ def _plainly(surface: Surface) -> Surface:
 
 def _across(position_m: list[float] | None) -> list[float] | None:
     return position_m and [position_m[0], -position_m[1], position_m[2]]
+
+
+def paired_by_reflection(surfaces: Sequence[T], reflections: Sequence[T]) -> tuple[tuple[int, ...], ...]:
+    """Indices of surfaces by mirror pair, in order of first appearance.
+
+    Parameters
+    ----------
+    surfaces, reflections : sequence
+        Each surface and its mirror image, both without their names, which are not compared.
+
+    Returns
+    -------
+    tuple of tuples of int
+        Groups (first, image) and (first,); every surface is in exactly one.
+    """
+    groups = []
+    waiting = list(range(len(surfaces)))
+    while waiting:
+        first = waiting.pop(0)
+        image = [k for k in waiting if surfaces[k] == reflections[first]][:1]
+        waiting = [k for k in waiting if k not in image]
+        groups.append((first, *image))
+    return tuple(groups)

@@ -35,6 +35,10 @@ class StudiedModels(SearchedModel):
         """List the compared numbers of links per wing."""
         return self.links_per_wing
 
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces, with their places in the list."""
+        yield from ((f"/{number}", links) for number, links in enumerate(self.links_per_wing))
+
     def faults(self) -> Iterator[Fault]:
         """Check that each number of links is listed once, and check every such model."""
         yield from repeated_faults(self.links_per_wing, "/links_per_wing", "List each number once.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
@@ -13,7 +13,7 @@ from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
-from morphdata.links import LinksPerWing
+from morphdata.links import AskedLinks, to_choose
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
@@ -63,7 +63,7 @@ def identify(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: LinksPerWing | Literal["auto"] = LINKS,
+    links_per_wing: AskedLinks = LINKS,
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
@@ -151,7 +151,7 @@ def _identification(
     from morphcore.identify.identification import Identification
     from morphcore.identify.settings import search_settings
 
-    kind = AutoIdentification if model.links_per_wing == "auto" else Identification
+    kind = AutoIdentification if to_choose(model.links_per_wing) else Identification
     return kind(
         aircraft,
         flight,

@@ -38,7 +38,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
 from morphdata.identify import EquivalentModel
-from morphdata.links import LinksPerWing
+from morphdata.links import LinksPerWing, to_choose
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
@@ -110,13 +110,13 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
-        if self.settings.links_per_wing == "auto":
+        if to_choose(self.settings.links_per_wing):
             raise InvalidInput(
                 "one identification has one number of links per wing",
                 pointer="/model/links_per_wing",
                 hint='use AutoIdentification, or identify(..., links_per_wing="auto")',
             )
-        self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
+        self.model = self.chain(aircraft, flight, self.settings.numbers_of_links()[0])
         free: Sequence[str] | None = self.settings.aero_coefficients
         bounds = None if self.settings.bounds is None else self.settings.bounds.given()
         if free is None:

@@ -307,10 +307,12 @@ def chain_model(
     links = checked if by_name else checked[""]
     counts, faults = links_of(links, names, flexible, pairs, pointer)
     refuse(faults)
-    bent = [pair for pair in pairs if flexible[pair[0]]]
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
     model = _chain_model(aircraft, flight, counts, lattice, steep=steep)
-    return replace(model, links_per_wing=links_document(names, bent, counts) if by_name else checked[""])
+    if not by_name:
+        return replace(model, links_per_wing=checked[""])
+    bent = [k for k, bends in enumerate(flexible) if bends]
+    return replace(model, links_per_wing=links_document([names[k] for k in bent], [counts[k] for k in bent]))
 
 
 def _chain_model(

@@ -71,10 +71,8 @@ class ParameterBatch(Shown):
         if self.set_links is None or self.surfaces is None:
             return self.links
         names = [name for group in self.surfaces for name in group]
-        ends = np.cumsum([len(group) for group in self.surfaces])
-        pairs = [range(end - len(group), end) for group, end in zip(self.surfaces, ends, strict=True)]
         counts = [n for n, group in zip(self.set_links, self.surfaces, strict=True) for _ in group]
-        return links_document(names, pairs, counts)
+        return links_document(names, counts)
 
     def of_set(self, name: str, number: int) -> Array:
         """A view of one set's values (p, ...) of a parameter, of as many links or joints as it has."""

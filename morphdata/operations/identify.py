@@ -10,7 +10,7 @@ from morphdata.drives import SIDES, shown_drives
 from morphdata.identifiable import corrections, on_request
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
-from morphdata.links import LinksPerWing, mean_links
+from morphdata.links import LinksPerWing, mean_links, to_choose
 from morphdata.operations.descriptor import Operation, after_budget
 from morphdata.pairs import joints_of_sets, mirror_pairs
 from morphdata.samples import InlineSample
@@ -130,7 +130,7 @@ def samples_summary(request: SamplesRequest) -> dict[str, Any]:
 
 def _summary(request: IdentifyRequest) -> dict[str, Any]:
     links = request.model.links_per_wing
-    return {**samples_summary(request), "links_per_wing": None if links == "auto" else links}
+    return {**samples_summary(request), "links_per_wing": None if to_choose(links) else links}
 
 
 IDENTIFY = Operation(
