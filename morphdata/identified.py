@@ -114,6 +114,7 @@ class SearchReport(Result):
     aero_coefficients: list[Correction] | None = Field(
         default=None, description="Aerodynamic corrections that were searched."
     )
+    own_lift: list[str] = Field(default=[], description="Surfaces with a lift factor of their own.")
     prior_rad: float | None = Field(
         default=None,
         description="Being off the physical guess by one search coordinate (a factor e of a stiffness) "

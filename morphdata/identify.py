@@ -133,7 +133,8 @@ class SearchedModel(Document):
         default=None,
         max_length=MAX_WINGS,
         description="Surfaces that get a lift factor of their own, mirror images by a name for both; the "
-        "others share one. Left out: all.",
+        "others share one. Left out: one for all, and one for each where three training samples or more tell "
+        "them apart.",
     )
     aero_coefficients: Annotated[list[Correction] | None, BeforeValidator(_current_corrections)] = Field(
         default=None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from morphcore.identify.drive_histories import SmoothedSamples, smoothed_samples
 from morphcore.identify.first_angles import first_angle_columns, with_first_angles
 from morphcore.identify.free_corrections import determined_corrections
 from morphcore.identify.free_start import with_start
+from morphcore.identify.lift_apart import is_apart, told_apart
 from morphcore.identify.measurement import Openness, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
 from morphcore.identify.parameters import SearchSpace, search_space
@@ -122,21 +124,29 @@ class Identification:
         if free is None:
             training = [sample for sample in samples.given if sample.role == "train"]
             free = determined_corrections(self.model.parameters, training, bounds or ())
-        self._first_space: SearchSpace = search_space(
+        self._space_of = partial(
+            search_space,
             self.model,
             separate_wings=self.settings.separate_wings,
             aero_coefficients=free,
             bounds=bounds,
-            own_lift=self.settings.own_lift,
         )
+        self._shared_space = self._space_of(own_lift=self.settings.own_lift or ())
+        self._first_space: SearchSpace = self._shared_space
         # the same with the bounds that the search has widened by now, and the weight that it gives the prior
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         require_names(self.space, self.uncertainty.profile)
-        warm_start = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
-        self.known: Array = np.stack(
-            [*([] if warm_start is None else [self.space.encode(warm_start)]), self.space.guess]
-        )
+        self.known: Array = self._known_in(self.space)
+
+    def _known_in(self, space: SearchSpace) -> Array:
+        warm_start = self.search.warm_start
+        return np.stack([*([] if warm_start is None else [space.encode(warm_start)]), space.guess])
+
+    @cached_property
+    def apart_space(self) -> SearchSpace:
+        """The unknowns with a lift factor of each surface; mirror images share theirs."""
+        return self._space_of(own_lift=None)
 
     def chain(self, aircraft: Aircraft, flight: Flight, links: LinksPerWing) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
@@ -218,9 +228,11 @@ class Identification:
 
     def linearised(self, point: Array) -> tuple[Array, Array]:
         """Residuals (m,) and their Jacobian (m, d) at a search point (d,); the last ones are kept."""
-        if self._linear is None or self._linear[0] is not self.openness or any(self._linear[1] != point):
+        last = self._linear
+        if last is None or last[0] is not self.openness or not np.array_equal(last[1], point):
             self._linear = (self.openness, point, *linearised(self, point))
-        return self._linear[2:]
+            last = self._linear
+        return last[2:]
 
     # the iterator
 
@@ -277,6 +289,9 @@ class Identification:
             self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
             if self._round != state.prepared.round:
                 self.openness, self._round = state.prepared.openness, state.prepared.round
+        space = self.apart_space if is_apart(state) else self._shared_space
+        if space is not self._first_space:
+            self._first_space, self.known = space, self._known_in(space)
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         if isinstance(state.solver, LeastSquaresState | HybridState):
             own = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
@@ -288,7 +303,7 @@ class Identification:
         """Return the state of the next round, where the residuals call for one; else the same."""
         begin = self._clock()
         with one_blas_thread():
-            found = reviewed(self, state, stop)
+            found = reviewed(self, state, stop) or told_apart(self, state, stop)
         if found is None:
             return self.entered(state)
         return replace(found, wall_s=state.wall_s + self._clock() - begin)

@@ -303,7 +303,7 @@ def search_space(
     separate_wings: bool = False,
     aero_coefficients: Sequence[str] | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
-    own_lift: Sequence[str] | None = None,
+    own_lift: Sequence[str] | None = (),
 ) -> SearchSpace:
     """The unknowns of a model, bounded around beam and thin-airfoil theory.
 

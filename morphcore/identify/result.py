@@ -209,7 +209,11 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         search=_search_document(run, state),
         cost=_flight_times(run, rigid, best, judged=judged),
         settings=run.settings.model_copy(
-            update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
+            update={
+                "step_s": run.step_s,
+                "aero_coefficients": list(space.free_aero),
+                "own_lift": list(space.fixed.apart),
+            }
         ),
         warnings=fit_warnings(
             run,
@@ -243,6 +247,7 @@ def _search_document(run: Identification, state: SearchState) -> dict[str, Any]:
     """Method, effort and history of the search."""
     return {
         "aero_coefficients": both_spellings(run.space.free_aero),
+        "own_lift": list(run.space.fixed.apart),
         "method": run.search.method,
         "seed": run.search.seed,
         "prior_rad": float(np.sqrt(run.prior_weight)),

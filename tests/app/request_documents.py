@@ -115,6 +115,7 @@ RESULT: Document = {
             "ac_offset_m": 0.0,
             "profile_drag": 0.01,
             "lag_s": 0.0,
+            "lift_factors": None,
             "zero_lift_rad": 0.0,
             "cm0": 0.0,
         },
