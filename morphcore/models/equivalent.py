@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -292,8 +292,8 @@ def chain_model(
     ------
     InvalidInput : a number of links is out of range, or a surface is not named or is unknown.
     """
-    pointer, by_name = "/model/links_per_wing", not isinstance(links_per_wing, int | np.integer)
-    given = links_per_wing if isinstance(links_per_wing, dict) else {"": links_per_wing}
+    pointer, by_name = "/model/links_per_wing", isinstance(links_per_wing, Mapping)
+    given = links_per_wing if isinstance(links_per_wing, Mapping) else {"": links_per_wing}
     checked = {
         name: whole_number(
             links, f"links_per_wing of {name!r}" if name else "links_per_wing",

@@ -14,7 +14,6 @@ from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import (
     ChainModel,
     ParameterBatch,
-    chain_model,
     fitted,
     lane_constants,
     physical_guess,
@@ -33,6 +32,7 @@ from tests.models.test_every_surface_its_own import (
     aircraft,
     flight,
 )
+from tests.models.test_every_surface_its_own import chain as four_surfaces
 from tests.simulate.flights import fly
 
 UNLIKE: LinksPerWing = {"wing": 4, "tail": 1}
@@ -42,7 +42,7 @@ SIDES = {"left": ConstantRate(0.0, 0.2, 0.5), "right": ConstantRate(0.0, 0.3, 0.
 
 def chain(links: LinksPerWing, names: tuple[str, ...] = NAMES, **change: dict[str, Any]) -> ChainModel:
     """The equivalent model of wings and a flexible tail."""
-    return chain_model(aircraft(names, **change), flight(), links, LATTICE)
+    return four_surfaces(names, links, **change)
 
 
 def apart(model: ChainModel, wing: float = 1.05, tail: float = 0.9) -> ParameterBatch:
