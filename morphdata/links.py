@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from morphdata.faults import Fault
 from morphdata.flight import Auto
@@ -20,12 +20,23 @@ MAX_LINKS = 16
 MAX_WINGS = 16
 MAX_NAME = 200
 
+
+def _form(value: Any) -> str:
+    return "by_surface" if isinstance(value, Mapping) else "all"
+
+
 Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
-SurfaceKey = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
-LinksBySurface = Annotated[dict[SurfaceKey, Links], Field(min_length=1, max_length=MAX_WINGS)]
-LinksPerWing = Links | LinksBySurface
 ChosenLinks = Links | Auto
-AskedLinks = ChosenLinks | Annotated[dict[SurfaceKey, ChosenLinks], Field(min_length=1, max_length=MAX_WINGS)]
+SurfaceKey = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+BY_SURFACE = Field(min_length=1, max_length=MAX_WINGS)
+LinksBySurface = Annotated[dict[SurfaceKey, Links], BY_SURFACE]
+AskedBySurface = Annotated[dict[SurfaceKey, ChosenLinks], BY_SURFACE]
+LinksPerWing = Annotated[
+    Annotated[Links, Tag("all")] | Annotated[LinksBySurface, Tag("by_surface")], Discriminator(_form)
+]
+AskedLinks = Annotated[
+    Annotated[ChosenLinks, Tag("all")] | Annotated[AskedBySurface, Tag("by_surface")], Discriminator(_form)
+]
 Pairs = Sequence[Sequence[int]]
 T = TypeVar("T")
 

@@ -39,6 +39,12 @@ def joints_of_sets(aircraft: Aircraft, links: LinksPerWing, *, separate_wings: b
     return sum(counts[k] - 1 for group in sets for k in group if surfaces[k].flexible)
 
 
+def own_lift_count(aircraft: Aircraft, keys: Sequence[str]) -> int:
+    """Count the lift factors beside the first: where all surfaces are named, one of them has that."""
+    names, pairs = [each.name for each in aircraft.surfaces], mirror_pairs(aircraft) if keys else ()
+    return min(len(by_pair(dict.fromkeys(keys, True), names, pairs, "")[0]), max(len(pairs) - 1, 0))
+
+
 def own_lift_faults(aircraft: Aircraft, keys: Sequence[str], pointer: str) -> Iterator[Fault]:
     """Check the names of surfaces that are to have a lift factor of their own."""
     names, pairs = [each.name for each in aircraft.surfaces], mirror_pairs(aircraft) if keys else ()

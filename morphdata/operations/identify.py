@@ -12,7 +12,7 @@ from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
 from morphdata.links import LinksPerWing, mean_links, to_choose
 from morphdata.operations.descriptor import Operation, after_budget
-from morphdata.pairs import joints_of_sets, mirror_pairs
+from morphdata.pairs import joints_of_sets, mirror_pairs, own_lift_count
 from morphdata.samples import InlineSample
 
 # nominal figures, to an order of magnitude, for settings that a request leaves to the solver
@@ -81,7 +81,7 @@ def _parameter_count(request: SamplesRequest, links: LinksPerWing, training: Seq
     else:
         searched = list(model.aero_coefficients)
     of_pairs = sum(name in ("profile_drag", *on_request()) for name in searched)
-    apart = len(pairs) - 1 if model.own_lift is None else min(len(model.own_lift), len(pairs) - 1)
+    apart = own_lift_count(request.aircraft, model.own_lift or ())
     joints = joints_of_sets(request.aircraft, links, separate_wings=model.separate_wings)
     aero = len(searched) + of_pairs * (groups - 1) + apart * ("lift_factor" in searched)
     return 7 * joints + aero

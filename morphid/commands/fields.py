@@ -168,12 +168,23 @@ def _number_or_names(flag: str, plain: Form) -> Form:
     return Form(str, f"{plain.metavar}|NAME=N,...", read)
 
 
+def _numbers_or_names(flag: str, text: str) -> list[Any]:
+    """Read ``1,2,wing=4+tail=1``: numbers, and numbers by name."""
+    words = text.split(",")
+    plain = [word for word in words if "=" not in word]
+    numbers = iter(_numbers(flag, ",".join(plain), int, "1,2,3") if plain else [])
+    named = _number_or_names(flag, Form(str, None, str)).read
+    return [named(word.replace("+", ",")) if "=" in word else next(numbers) for word in words]
+
+
 def _list_form(flag: str, item: Any) -> Form:
     if get_origin(item) is Literal:
         remark = f"Any of {', '.join(get_args(item))}."
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")], remark)
     if _kinds(item) == [str]:
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")])
+    if any(get_origin(kind) is dict for kind in _kinds(item)):
+        return Form(str, "N,N,NAME=N+NAME=N,...", lambda text: _numbers_or_names(flag, text))
     return Form(str, "N,N,...", lambda text: _numbers(flag, text, int, "1,2,3"))
 
 

@@ -115,7 +115,6 @@ RESULT: Document = {
             "ac_offset_m": 0.0,
             "profile_drag": 0.01,
             "lag_s": 0.0,
-            "lift_factors": None,
             "zero_lift_rad": 0.0,
             "cm0": 0.0,
         },
@@ -207,5 +206,6 @@ OPTIMIZE_RESULT: Document = {
 
 
 def in_both_spellings(model: Document) -> Document:
-    """A model as the service returns it: renamed corrections under their old names, too."""
-    return {**model, "aero": {**model["aero"], "centre_shift_m": model["aero"]["ac_offset_m"]}}
+    """A model as the service returns it: renamed corrections under both names, and what it lacks."""
+    shared = {"centre_shift_m": model["aero"]["ac_offset_m"], "lift_factors": None}
+    return {**model, "aero": {**shared, **model["aero"]}}
