@@ -14,6 +14,7 @@ from morphcore.errors import InvalidInput
 from morphcore.identify import AutoIdentification, Identification, IdentifyResult, SearchSettings
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.identify.parameters import search_space
+from morphcore.identify.study import Study
 from morphcore.models.equivalent import ChainModel, ParameterBatch, chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.simulate.schedule import ConstantRate
@@ -171,3 +172,21 @@ def test_the_links_of_one_surface_are_chosen() -> None:
         {"wing": 2, "tail": 1},
         {"wing": 3, "tail": 1},
     ]
+
+
+def test_a_study_compares_models_by_surface() -> None:
+    """A row of each, by the mean of its numbers, and a reason in words."""
+    run = Study(
+        aircraft(), flight(), samples(),
+        links=[{"wing": 2, "tail": 1}, 1],
+        model=EquivalentModel(lattice=LATTICE, step_s=0.01),
+        search=SearchSettings(method="least_squares", iterations=2),
+    )  # fmt: skip
+    checkpoint = [step.checkpoint for step in run.steps()][-1]
+    found = run.result(checkpoint)
+    assert [row.links_per_wing for row in found.rows] == [1, {"wing": 2, "tail": 1}]
+    assert [row.bodies for row in found.rows] == [5, 7]
+    assert found.recommended.links_per_wing == {"wing": 2, "tail": 1}
+    assert found.recommended.reason.startswith("2 links of wing, 1 of tail per wing: J = ")
+    assert found.row({"wing": 2, "tail": 1}).batch.links_per_wing == {"wing": 2, "tail": 1}
+    json.dumps(found.to_document())
