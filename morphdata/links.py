@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 from pydantic import Discriminator, Field, Tag
@@ -19,6 +20,7 @@ from morphdata.refusals import escaped
 MAX_LINKS = 16
 MAX_WINGS = 16
 MAX_NAME = 200
+UNKNOWN = "no_such_surface"
 
 
 def _form(value: Any) -> str:
@@ -101,7 +103,7 @@ def by_pair(
         places = means(key, names)
         if not places:
             known = ", ".join(common_names(names, pairs))
-            faults.append(Fault("no_such_surface", f"There is no surface {key!r}.", at, f"Use {known}."))
+            faults.append(Fault(UNKNOWN, f"There is no surface {key!r}.", at, f"Use {known}."))
         for number in dict.fromkeys(pair_of[k] for k in places):
             if found.setdefault(number, value) != value:
                 word = common_names(names, pairs)[number]
@@ -133,10 +135,11 @@ def links_of(
     """
     if isinstance(given, int):
         return [given if bends else 1 for bends in flexible], []
-    found, faults = by_pair(given, names, pairs, pointer)
     shown = common_names(names, pairs)
     bent = [number for number, pair in enumerate(pairs) if flexible[pair[0]]]
     hint = f"Give one for each flexible surface: {', '.join(shown[number] for number in bent)}."
+    found, faults = by_pair(given, names, pairs, pointer)
+    faults = [replace(fault, hint=hint) if fault.code == UNKNOWN else fault for fault in faults]
     for number in bent:
         if number not in found and not faults:
             faults.append(Fault("missing", f"{shown[number]!r} has no number of links.", pointer, hint))

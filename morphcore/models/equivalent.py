@@ -98,8 +98,10 @@ class ChainModel(Shown):
         own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
         images = tuple(every[k] for k in self.mirror.image)
         counts = self.surfaces[list(self.mirror.own), 1]
-        half = _chain_model(own, self.flight, counts, self.lattice.settings, images, self.lattice.steep)
-        return replace(half, links_per_wing=self.links_per_wing)
+        lattice = self.lattice
+        return _chain_model(
+            own, self.flight, self.links_per_wing, counts, lattice.settings, images, lattice.steep
+        )
 
     @cached_property
     def rigid(self) -> ChainModel:
@@ -107,7 +109,9 @@ class ChainModel(Shown):
         if self.links_per_wing == 1:
             return self
         lattice, ones = self.lattice, np.ones_like(self.surfaces[:, 1])
-        return _chain_model(self.aircraft, self.flight, ones, lattice.settings, lattice.images, lattice.steep)
+        return _chain_model(
+            self.aircraft, self.flight, 1, ones, lattice.settings, lattice.images, lattice.steep
+        )
 
     @cached_property
     def starts(self) -> dict[bytes, tuple[float, float | None]]:
@@ -304,26 +308,26 @@ def chain_model(
     surfaces = aircraft.surfaces
     names, flexible = [each.name for each in surfaces], [each.flexible for each in surfaces]
     pairs = mirror_groups(surfaces)
-    links = checked if by_name else checked[""]
+    links: LinksPerWing = checked if by_name else checked[""]
     counts, faults = links_of(links, names, flexible, pairs, pointer)
     refuse(faults)
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
-    model = _chain_model(aircraft, flight, counts, lattice, steep=steep)
-    if not by_name:
-        return replace(model, links_per_wing=checked[""])
-    bent = [k for k, bends in enumerate(flexible) if bends]
-    return replace(model, links_per_wing=links_document([names[k] for k in bent], [counts[k] for k in bent]))
+    if by_name:
+        bent = [k for k, bends in enumerate(flexible) if bends]
+        links = links_document([names[k] for k in bent], [counts[k] for k in bent])
+    return _chain_model(aircraft, flight, links, counts, lattice, steep=steep)
 
 
 def _chain_model(
     aircraft: Aircraft,
     flight: Flight,
+    links_per_wing: LinksPerWing,
     counts: Sequence[int] | IntArray,
     lattice: Lattice,
     images: Sequence[Surface] = (),
     steep: bool = False,  # noqa: FBT001, FBT002 - private
 ) -> ChainModel:
-    """A chain of so many links for each surface, called a rigid model until its links are named."""
+    """A chain of so many links for each surface, as ``links_per_wing`` says in the form of documents."""
     lattices = aircraft_lattice(aircraft, lattice, images, steep=steep)
     rows, link, pair = [], 0, 0
     for surface, part, strip0, controls, count in zip(
@@ -333,7 +337,7 @@ def _chain_model(
         rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
         link += count
         pair += count * part.spanwise
-    return ChainModel(aircraft, flight, lattices, 1, np.array(rows, dtype=np.int64))
+    return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
 
 
 def physical_guess(

@@ -95,7 +95,7 @@ def test_links_by_surface_are_one_option(text: str, expected: object) -> None:
     [
         ("wing=", Exit.USAGE, "write --links wing=4,tail=1"),
         ("wing=4,3", Exit.USAGE, "write --links wing=4,tail=1"),
-        ("wing=4,fin=1", Exit.INVALID_INPUT, "Use wing"),
+        ("wing=4,fin=1", Exit.INVALID_INPUT, "each flexible surface: wing"),
         ("wing=17", Exit.INVALID_INPUT, "at most 16"),
         ("left wing=4,right wing=3", Exit.INVALID_INPUT, "give it once, for 'wing'"),
     ],

@@ -74,7 +74,7 @@ def test_numbers_by_surface_are_listed_too(play: Play) -> None:
         ("1,1", Exit.INVALID_INPUT, "given by --links 1,1"),
         ("1,99", Exit.INVALID_INPUT, "given by --links 1,99"),
         ("1,wing=", Exit.USAGE, "NAME=N"),
-        ("1,wing=2+fin=1", Exit.INVALID_INPUT, "Use wing"),
+        ("1,wing=2+fin=1", Exit.INVALID_INPUT, "each flexible surface: wing"),
     ],
 )
 def test_wrong_numbers_of_links_are_named(links: str, code: Exit, reported: str) -> None:
