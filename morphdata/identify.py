@@ -22,6 +22,7 @@ from morphdata.links import (
     LinksPerWing,
     SurfaceKey,
     shown_links,
+    shown_per_wing,
     to_choose,
     with_links,
 )
@@ -385,7 +386,7 @@ class IdentifyRequest(SamplesRequest):
         elif links_by_name(self.aircraft, known.links_per_wing) != links_by_name(self.aircraft, own):
             yield Fault(
                 "links_differ",
-                f"The search is for {shown_links(own)} per wing and would begin from a model with "
+                f"The search is for {shown_per_wing(own)} and would begin from a model with "
                 f"{shown_links(known.links_per_wing)}.",
                 at,
                 "Begin from a model with as many, or set model.links_per_wing to "

@@ -199,3 +199,12 @@ def shown_links(links: LinksPerWing) -> str:
     (name, first), *others = links.items()
     rest = "".join(f", {count} of {other}" for other, count in others)
     return f"{first} link{'s' if first != 1 else ''} of {name}{rest}"
+
+
+def shown_per_wing(links: LinksPerWing) -> str:
+    """Return numbers of links as text that stands by itself.
+
+    >>> shown_per_wing(4), shown_per_wing({"wing": 4, "tail": 1})
+    ('4 links per wing', '4 links of wing, 1 of tail')
+    """
+    return shown_links(links) if isinstance(links, dict) else f"{shown_links(links)} per wing"

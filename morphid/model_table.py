@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from morphdata.links import shown_links
+from morphdata.links import shown_per_wing
 from morphdata.renamed import current_name, current_names
 from morphid.screen import new_table, short
 
@@ -58,7 +58,7 @@ def model_table(result: Document) -> Table:
     intervals = {current_name(name): ends for name, ends in (uncertainty.get("interval_95") or {}).items()}
     unseen = current_names(uncertainty.get("undetermined") or ())
     bound = current_names(uncertainty.get("at_bound") or ())
-    title = f"Equivalent model, {shown_links(model['links_per_wing'])} per wing"
+    title = f"Equivalent model, {shown_per_wing(model['links_per_wing'])}"
     bounds = {
         current_name(name): each for name, each in (uncertainty.get("cramer_rao_percent") or {}).items()
     }

@@ -21,7 +21,7 @@ from morphcore.export.figure import (
     power_of_ten,
     rendered,
 )
-from morphdata.links import LinksPerWing, mean_links, shown_links
+from morphdata.links import LinksPerWing, mean_links, shown_per_wing
 
 MILLISECONDS = 1e3  # of a second
 MARGIN = 1.8  # factor above the largest and below the smallest value
@@ -91,7 +91,7 @@ def _title(document: Document) -> str:
     said = "accuracy, and wall time of one flight"
     said += f" of {duration_s:g} s on one core" if duration_s else ""
     chosen = _recommended(document)
-    return said if chosen is None else f"{said}; recommended: {shown_links(chosen)} per wing"
+    return said if chosen is None else f"{said}; recommended: {shown_per_wing(chosen)}"
 
 
 def _abscissa(axes: Axes, document: Document) -> None:

@@ -28,7 +28,7 @@ from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
-from morphdata.links import shown_links
+from morphdata.links import shown_per_wing
 from morphdata.measurement import ANGLES
 from morphdata.renamed import both_spellings, under_both_spellings
 
@@ -153,7 +153,7 @@ class IdentifyResult(Shown):
         angles = [f"rms {angle}, mrad" for angle in ANGLES]
         documents = [fit.to_document() for fit in self.fits]
         return Summary(
-            f"IdentifyResult: {shown_links(self.parameters.links_per_wing)} per wing",
+            f"IdentifyResult: {shown_per_wing(self.parameters.links_per_wing)}",
             {
                 **{
                     f"{parameter.name}, {parameter.unit}": self.parameters[parameter.name]

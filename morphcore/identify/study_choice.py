@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from morphcore.identify.study_row import Role, StudyRow
-from morphdata.links import LinksPerWing, shown_links
+from morphdata.links import LinksPerWing, shown_links, shown_per_wing
 
 WORTH_OF_A_LINK = 2.0  # factor in the error
 # RMS of any attitude angle; the step of 10 ms holds attitude to within this (simulate/time_grid.py)
@@ -69,7 +69,7 @@ def _reason(chosen: StudyRow, flown: Sequence[StudyRow], role: Role) -> str:
     """The sentences, with the figures that they rest on."""
     n = chosen.mean_links
     flights = "the flights held out" if role == "held_out" else "the fitted flights, for none was held out"
-    said = f"{shown_links(chosen.links_per_wing)} per wing: J = {chosen.J(role):.2g} rad^2 on {flights}"
+    said = f"{shown_per_wing(chosen.links_per_wing)}: J = {chosen.J(role):.2g} rad^2 on {flights}"
     if chosen.worst_rms_rad is not None:
         said += f", RMS up to {1e3 * chosen.worst_rms_rad:.2g} mrad in an angle"
     others = [

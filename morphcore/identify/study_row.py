@@ -14,7 +14,7 @@ from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
-from morphdata.links import LinksPerWing, mean_links, shown_links
+from morphdata.links import LinksPerWing, mean_links, shown_per_wing
 from morphdata.measurement import ANGLES
 
 Document = dict[str, Any]
@@ -92,7 +92,7 @@ class StudyRow(Shown):
         """
         if self.model is None:
             raise NotFlyable(
-                f"no model of {shown_links(self.links_per_wing)} per wing flew the samples",
+                f"no model of {shown_per_wing(self.links_per_wing)} flew the samples",
                 pointer="/model/links_per_wing",
                 hint="take the row of another number of links",
             )

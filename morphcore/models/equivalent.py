@@ -42,6 +42,7 @@ from morphdata.links import (
     links_of,
     means,
     shown_links,
+    shown_per_wing,
 )
 from morphdata.refusals import escaped
 
@@ -416,7 +417,7 @@ def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
         links = batch.set_links[number] if batch.set_links else batch.links
         if model.aircraft.surfaces[k].flexible and links != model.surfaces[k, 1]:
             raise InvalidInput(
-                f"the model is of {shown_links(model.links_per_wing)} per wing, its parameters are for "
+                f"the model is of {shown_per_wing(model.links_per_wing)}, its parameters are for "
                 f"{shown_links(batch.links_per_wing)}",
                 pointer="/model/parameters/links_per_wing",
                 hint=f"give parameters for as many, or set model.links_per_wing to {batch.links_per_wing}",

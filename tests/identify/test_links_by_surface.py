@@ -187,6 +187,6 @@ def test_a_study_compares_models_by_surface() -> None:
     assert [row.links_per_wing for row in found.rows] == [1, {"wing": 2, "tail": 1}]
     assert [row.bodies for row in found.rows] == [5, 7]
     assert found.recommended.links_per_wing == {"wing": 2, "tail": 1}
-    assert found.recommended.reason.startswith("2 links of wing, 1 of tail per wing: J = ")
+    assert found.recommended.reason.startswith("2 links of wing, 1 of tail: J = ")
     assert found.row({"wing": 2, "tail": 1}).batch.links_per_wing == {"wing": 2, "tail": 1}
     json.dumps(found.to_document())

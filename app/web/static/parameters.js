@@ -115,7 +115,7 @@ function modelCard(result, title = "Identified model") {
   ));
   return card(
     title, { help: "parameters" },
-    element("p", { class: "soft" }, `${linksText(result.model.links_per_wing)} per wing; joints and links are counted from the root.`),
+    element("p", { class: "soft" }, `${perWing(result.model.links_per_wing)}; joints and links are counted from the root.`),
     namesLine("At a bound", currentNames(result.uncertainty?.at_bound)),
     element("table", { class: "parameters" }, head, ...bodies),
   );

@@ -6,6 +6,7 @@ const count = (value, unit) => `${value} ${unit}${value === 1 ? "" : "s"}`;
 /* Links per wing: "4 links", or by surface "4 links of wing, 1 of tail". */
 const linksText = (links) => (typeof links === "number" ? count(links, "link")
   : Object.entries(links).map(([name, own], i) => `${i ? own : count(own, "link")} of ${name}`).join(", "));
+const perWing = (links) => (typeof links === "number" ? `${linksText(links)} per wing` : linksText(links));
 const comparedText = (every) => (every.every((links) => typeof links === "number") ? `${every.join(", ")} links` : every.map(linksText).join("; "));
 const ANGLES = [["phi", "φ"], ["theta", "θ"], ["psi", "ψ"]];
 const LETTERS = Object.fromEntries(ANGLES);
@@ -100,8 +101,8 @@ function studyCards(result) {
   const cards = [card("Accuracy and cost", { help: "study" }, reason, table(titles, rows, { marked: chosen, stack: true }))];
   if (chosen >= 0) {
     const row = result.rows[chosen];
-    cards.push(...[verdictCard(row.verdict, `Verdict on ${linksText(row.links_per_wing)} per wing`)].filter(Boolean));
-    cards.push(fitCard(row.fit, `Fit with ${linksText(row.links_per_wing)} per wing`), modelCard({ search: result.search, ...row }, "Recommended model"));
+    cards.push(...[verdictCard(row.verdict, `Verdict on ${perWing(row.links_per_wing)}`)].filter(Boolean));
+    cards.push(fitCard(row.fit, `Fit with ${perWing(row.links_per_wing)}`), modelCard({ search: result.search, ...row }, "Recommended model"));
   }
   return cards;
 }
