@@ -171,6 +171,14 @@ class SearchedModel(Document):
         yield from repeated_faults(
             self.aero_coefficients or (), "/aero_coefficients", "Name each correction once."
         )
+        listed = self.aero_coefficients
+        if self.own_lift and listed is not None and "lift_factor" not in listed:
+            yield Fault(
+                "not_searched",
+                "own_lift names surfaces, but no lift factor is searched.",
+                "/own_lift",
+                "Add lift_factor to aero_coefficients, or leave own_lift out.",
+            )
         division = None if self.bounds is None else self.bounds.given().get("division")
         if division is not None:
             numbers = [

@@ -80,6 +80,7 @@ def test_the_unknowns_of_unlike_surfaces(
             "wing, tail",
         ),
         ("identify", {"own_lift": ["fin"]}, "/model/own_lift/0", "wing, tail"),
+        ("identify", {"own_lift": ["tail"], "aero_coefficients": []}, "/model/own_lift", "lift_factor"),
     ],
 )
 def test_wrong_names_are_refused_with_those_to_use(
